@@ -27,7 +27,7 @@ def summed(values: NDArray[Any]) -> Any:
 
 
 def largest(values: NDArray[Any]) -> Any:
-    """The maximum of 0 and the last axis: a number for a vector, (m, 1) for m rows."""
+    """The maximum along the last axis, or 0 if that is negative: a number, or (m, 1) for rows."""
     return values.max(axis=-1, initial=0.0, keepdims=values.ndim > 1)
 
 
@@ -37,14 +37,14 @@ def even(value: float, length: int) -> Array:
 
 
 def evenly(function: Callable[[Array], Array], values: Array) -> Array:
-    """function(values) of an elementwise function, evaluated once for an array of `even`."""
+    """function(values) of an elementwise function, evaluated once if `values` is made by `even`."""
     if values.strides == (0,) and len(values):
         return even(function(values[:1])[0], len(values))
     return function(values)
 
 
 def taken(values: Array, which: Indices) -> Array:
-    """values[which]; from an array of `even`, again one that stores only one number."""
+    """values[which]; from an array made by `even`, again one that stores only one number."""
     if values.strides == (0,) and len(values):
         return even(values[0], len(which))
     return np.asarray(values[which])
@@ -53,7 +53,7 @@ def taken(values: Array, which: Indices) -> Array:
 def among_zeros(
     values: NDArray[Any], places: Indices, count: int, *, axis: int = 0
 ) -> NDArray[Any]:
-    """An array of length `count` along an axis: values at these places, 0 or False elsewhere."""
+    """An array of length `count` along an axis: `values` at these places, 0 or False elsewhere."""
     shape = list(values.shape)
     shape[axis] = count
     full = np.zeros(shape, dtype=values.dtype)

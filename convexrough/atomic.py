@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and JSON without infinities."""
+"""Files that are written completely or not at all, and JSON without infinities."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from typing import Any
 
 from convexrough.errors import file_errors
 
-#: Name of an unfinished file: the name of the file to be, and the process that writes it.
+#: Name of an unfinished file, with its final name and the process that writes it.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
 
 
 def unfinished(path: Path) -> Path:
-    """The path next to `path` under which this process writes the file until it is complete."""
+    """The path next to `path` of the incomplete file that this process writes."""
     return path.with_name(f".{path.name}.{os.getpid()}.unfinished")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path; its file replaces `path` if the body succeeds and is removed otherwise.
+    """A temporary path; its file replaces `path` if the body succeeds, and is removed otherwise.
 
     Raises FileError where it cannot be written. A killed process leaves the temporary file behind.
     """
@@ -35,7 +35,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             os.replace(temporary, path)
     finally:
-        with suppress(OSError):  # a file system that became read-only has raised already
+        with suppress(OSError):  # an error was raised already
             temporary.unlink(missing_ok=True)
 
 

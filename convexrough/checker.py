@@ -1,15 +1,21 @@
 """Check a proof of which asperities touch, and which slide: python checker.py proof.json
 
-This file needs only the standard library and trusts no claim of the proof. With contact radii a_i,
-loads P_i = 4 E* a_i^3 / (3 R_i), relative radii R_i, distances r_ij, offsets d_i and
-D_i = D0 + d_i at the approach D0, the contact law of n asperities is
+This file needs only the standard library and trusts no claim of the proof. Asperity i of a scene
+with n asperities has the contact radius a_i, which is 0 where it is open, and the load
+P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the mean curvature of the
+tip plus that of the *base*: the sphere, or a flat, cylinder or ellipsoid in its place. With the
+distances r_ij between contact points, the contact law is
 
-    a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0.
+    a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
+
+without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i: the
+height of the asperity minus the distance of the base from its tangent plane on the axis. Below,
+A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
-checker computes with rationals and with intervals between rationals. Comments cite the equations
-(1) to (12) of docs/theory/proof-file-steps.md.
+checker computes with rationals and with intervals between rationals. The numbers (1) to (12) are
+those of docs/theory/proof-file-steps.md.
 
 Exit status: 0 if all claims are proved; 1 if one is refused, with the reason; 2 if unreadable.
 """
@@ -29,15 +35,15 @@ from typing import Any, NamedTuple
 
 FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
-MOST_INVERTED = 600  # touching asperities whose matrix is inverted to prove order: half a minute
+MOST_INVERTED = 600  # most touching asperities for an inverse in the proof of order: half a minute
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
 UNIT = 1 << 320  # inverse distances are integers over this, too small by at most the factor SLACK
 SLACK = 1 + Fraction(1, 1 << 96)
 FAR = 1 << 400  # the distance from an asperity to itself, so that it does not displace itself
-ROOT_BITS = 60  # of the integer Cholesky factor
-ONE_BITS = 80  # of fixed-point numbers in the proof of order
+ROOT_BITS = 60  # bits of the integer Cholesky factor
+ONE_BITS = 80  # binary places of fixed-point numbers in the proof of order
 ONE = 1 << ONE_BITS
 
 Tell = Callable[[str], object]
@@ -127,7 +133,7 @@ PI = Interval(*(Fraction(31415926535897932384626433832795028841971 + i, 10**40) 
 
 
 def read(path: str) -> Any:
-    """The contents of a file of JSON without numbers and without repeated keys."""
+    """The contents of a JSON file in which all numbers are strings and no key is repeated."""
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(dict(pairs)) < len(pairs):
@@ -153,7 +159,7 @@ def read(path: str) -> Any:
 
 
 def table(value: Any, *keys: str) -> list[Any]:
-    """The values of these keys. Other keys are refused, as they would not be checked."""
+    """The values of the given keys. Other keys are refused, as they would not be checked."""
     if not isinstance(value, dict) or set(value) != set(keys):
         found = ", ".join(value) if isinstance(value, dict) else type(value).__name__
         raise Unreadable(f"expected a table of {', '.join(keys)}, found {found[:200]}")
@@ -167,7 +173,7 @@ def as_list(values: Any, n: int | None = None) -> list[Any]:
 
 
 def number(text: Any) -> Fraction:
-    """A float64 exactly as float.hex writes it, so that reading rounds nothing."""
+    """The float64 number that `float.hex` wrote as this text; reading it rounds nothing."""
     try:
         value = float.fromhex(text)
         if math.isfinite(value) and value.hex() == text:
@@ -182,19 +188,19 @@ def numbers(values: Any, n: int | None = None) -> list[Fraction]:
 
 
 def added(texts: Any) -> Fraction:
-    """The sum of a list, a number with more digits than float64 has."""
+    """The sum of float64 numbers, which represents one number with more digits."""
     return sum(numbers(texts), Fraction(0))
 
 
 def digest(scene: Any, prescribed: Any) -> str:
-    """SHA-256 of both as one JSON object with sorted keys and without spaces."""
+    """SHA-256 of scene and prescribed quantity, as JSON with sorted keys and without spaces."""
     given = {"prescribed": prescribed, "scene": scene}
     text = json.dumps(given, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Scene(NamedTuple):
-    """The scene, without rounding of lengths."""
+    """The scene; only points and offsets are rounded, to the grid and outwards."""
 
     modulus: Fraction  # E*, used only for loads from radii
     ratio: Fraction  # Poisson's ratio
@@ -210,7 +216,7 @@ def curvatures(value: Any) -> list[Fraction]:
     radii = as_list(value, 2) if isinstance(value, list) else [value, value]
     found = [Fraction(0) if text == "inf" else number(text) for text in radii]
     if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
-        raise Refused("a radius of the base is not positive")
+        raise Refused("a radius of the sphere is not positive")
     return [1 / radius if radius else radius for radius in found]
 
 
@@ -248,7 +254,7 @@ def read_scene(given: Any) -> Scene:
 def distances(
     scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
 ) -> Iterator[tuple[int, list[int]]]:
-    """For each i of `some`: i, and integers m with m - 2 < r_ij < m + 3 for j in `chosen` (1)."""
+    """Each i of `some` with integers m, m - 2 < r_ij < m + 3 in grid units, for `chosen` j (1)."""
     place = {j: k for k, j in enumerate(chosen)}
     points = [scene.points[j] for j in chosen]
     for i in some:
@@ -264,15 +270,15 @@ def distances(
 
 
 class Box(NamedTuple):
-    """A box 0 <= a_i <= b_i, on which the Hessian is at least 1 - theta of its local part."""
+    """A box 0 <= a_i <= b_i on which the Hessian is at least (1 - theta) diag(1 / (2 E* b))."""
 
     radii: list[Fraction]  # b_i; asperities with b_i = 0 are fixed open
-    able: list[int]  # indices of the others
+    able: list[int]  # the indices with b_i > 0
     theta: Fraction
 
 
 def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
-    """The box, after a proof that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
+    """The box, after the proof that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
     b, theta, shells = numbers(given[0], len(scene.points)), number(given[1]), given[2]
     able = [i for i in range(len(b)) if b[i] > 0]
     if min(b) < 0 or not 0 < theta < 1:
@@ -288,7 +294,7 @@ def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
 def prove_by_shells(
     scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
 ) -> None:
-    """Prove A + diag(1 / (2 E* radii)) >= 0 by spheres that overlap little or not at all (3)."""
+    """Prove A + diag(1 / (2 E* radii)) >= 0 by spherical shells whose overlap satisfies (3)."""
     sizes = [math.floor(shells[i] * scene.grid) for i in able]
     if min(sizes, default=1) <= 0:
         raise Refused("a shell is not positive")
@@ -322,19 +328,19 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
 
 
 class State(NamedTuple):
-    """Intervals that contain a solution, and the loads near it. Forces and V are over E*."""
+    """Intervals that contain a solution, and trial loads. Forces and energies are divided by E*."""
 
-    near: list[Interval]  # loads of the given radii, scaled to the prescribed total, if any
-    pushed: list[Interval]  # (A P)_i of these loads
+    near: list[Interval]  # trial loads: those of the given radii, scaled to a prescribed total
+    pushed: list[Interval]  # displacements (A P)_i of the trial loads
     approach: Interval  # D0 of the solution
     depths: list[Interval]  # D_i - (A P)_i of the solution: the indentation, or minus the gap
     loads: list[Interval]  # P_i of the solution
     total: Interval  # sum of the P_i
-    energy: Interval  # V of the solution: the least energy of all loads with this total
+    energy: Interval  # of the solution: the least energy of all loads with this total (9)
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The one solution in the box with this load, or without one with the approach in `place`."""
+    """The unique solution in the box, with this load or, without one, the approach in `place`."""
     radii, centre = table(place, "radii", "approach")
     a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
@@ -348,7 +354,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
         scaling = Interval(1).wider((load / added_up(near) - 1).size())
         near, local, pushed = ([x * scaling for x in xs] for xs in (near, local, pushed))
 
-    # (6) The distance of the solution in energy, then in each load (7): it is inside the box.
+    # (6) Bound the distance to the solution in energy, then in each load (7): it is in the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
@@ -358,7 +364,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     if any(near[i].high + error[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
-    # (8) The indentation of each asperity: D_i less the displacement by the others.
+    # (8) Enclose the depth of each asperity: D_i less the displacement by the others.
     moved = [(distance * s.root()).high for s in spread]
     shift = Fraction(0)
     if load is not None:
@@ -378,7 +384,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     deep = [depth.positive_part() for depth in depths]
     loads = [(x * x * x * R[i]).root() * Fraction(4, 3) for i, x in enumerate(deep)]
 
-    # (9) The energy of the solution, at most distance * misfit below that of the near loads.
+    # (9) The energy of the solution is at most distance * misfit below that of the trial loads.
     mean = [local[i] * Fraction(3, 5) + pushed[i] * Fraction(1, 2) - d[i] for i in everyone]
     energy = added_up([near[i] * mean[i] for i in everyone if a[i] > 0])
     energy += Interval(-(distance * misfit).high, 0)
@@ -391,7 +397,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
 def push(
     scene: Scene, box: Box, loads: list[Fraction], tell: Tell
 ) -> tuple[list[Interval], list[Interval]]:
-    """(A P)_i and a bound on sum_j A_ij^2 2 b_j, from sums of integers (1)."""
+    """Enclosures of (A P)_i and of sum_j A_ij^2 2 b_j, with sums of integers (1)."""
     force = max(loads) / 2**GRID or Fraction(1)
     parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
@@ -411,7 +417,7 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 
     top : None if the approach is prescribed, else any number above all (A P)_i
     """
-    ceiling = state.approach
+    ceiling = state.approach  # an upper bound on D0 of every solution
     if top is not None:
         ceiling = Interval(top)
         for p, w, d, R in zip(state.near, state.pushed, scene.offsets, scene.radii, strict=True):
@@ -420,22 +426,22 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
             if p.high > 0:
                 part = p / (w * -1 + top)
                 ceiling += p / state.total * (part * part / (12 * R) - d)
-    reach = [R * (d + ceiling).high for R, d in zip(scene.radii, scene.offsets, strict=True)]
-    return "global" if all(map(le, reach, (b * b for b in box.radii))) else "local"
+    squares = [R * (d + ceiling).high for R, d in zip(scene.radii, scene.offsets, strict=True)]
+    return "global" if all(map(le, squares, (b * b for b in box.radii))) else "local"
 
 
 # Friction -----------------------------------------------------------------------------------------
 
 
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
-    """A fall of D0 from this state during which no indentation rises as the load falls (11).
+    """An amount by which D0 can decrease from this state so that no indentation increases (11).
 
-    It is proved if the rates missed are below 0 for all that may touch, and if the gap of every
-    other exceeds the fall times the rate that it misses.
+    Let `missed` be minus the lower bound on the rate of each asperity. It must be negative for all
+    that may touch. The gap of any other must exceed the amount times `missed`, where positive.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
-    reach = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
-    weights = [math.ceil(2 * a * scene.grid) for a in reach]
+    radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
+    weights = [math.ceil(2 * a * scene.grid) for a in radii]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
     rows: dict[int, list[int]] = {}  # rows of A C times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
@@ -458,7 +464,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 def missed_by_inverse(
     rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
-    """Minus the lower bounds (11) on rates times ONE, with weights by an approximate inverse X."""
+    """The lower bounds (11) on rates, multiplied by -ONE; an approximate inverse gives weights."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
     X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
     for k in range(n):  # Gauss-Jordan elimination in place
@@ -494,7 +500,7 @@ def missed_by_inverse(
 def prove_shear(
     scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any, tell: Tell
 ) -> dict[str, Any]:
-    """What is proved of a friction state, the difference of two normal solutions (12)."""
+    """What is proved about a friction state, which is the difference of two solutions (12)."""
     force, place = table(entry, "force", "held")
     f, unit = scene.friction, scene.friction * scene.modulus
     if number(force) <= 0 or f <= 0:
@@ -530,7 +536,7 @@ WEAKER = {"global": "local", "local": "local", "proved": "proved for one step"}
 
 
 def prove(document: Any, tell: Tell) -> dict[str, Any]:
-    """All that is proved: statuses, and intervals of loads, gaps, forces, slips and losses."""
+    """All that is proved: statuses, and intervals for loads, gaps, forces, slips and losses."""
     form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
     if form != FORMAT:
         raise Unreadable(f"expected the format {FORMAT!r}")
@@ -584,7 +590,7 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
 
 
 def sentence(document: Any) -> str:
-    """The claims in words: of the contact, and of each shear force."""
+    """The claims in sentences: one about the contact, and one for each shear force."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
     bounds = [numbers(pair, 2) for pair in claims["loads"]]
     largest = max(high for _, high in bounds) or Fraction(1)
@@ -613,7 +619,7 @@ def counted(claims: Any, *statuses: str) -> str:
 
 
 def check(document: Any, tell: Tell) -> str:
-    """The claims in words. Raises Refused if more is claimed than proved, and Unreadable."""
+    """The claims in sentences. Raises Refused if one is not proved, Unreadable if not a proof."""
     proved = prove(document, tell)
     hold("claims", document["claims"], proved)
     return sentence(document)

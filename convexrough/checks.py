@@ -11,13 +11,16 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array, even
 from convexrough.errors import InputError
 
-#: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
+#: Limits on the sizes of numbers in a scene's units, whose products and powers float64 can hold.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: What error messages expect instead of a number outside this range.
+#: What an error message expects instead of a number outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
-#: What error messages expect of a phase; pi may be rounded up.
+#: What an error message expects as a coefficient of variation.
+VARIATION = "a standard deviation over the mean, from 0 to 1: not in per cent"
+
+#: What an error message expects as a phase; pi may be rounded up.
 PHASE = "a phase in radians, from -pi to pi; 90 degrees are 1.5708"
 
 
@@ -31,6 +34,14 @@ def positive(what: str, value: float | None) -> float:
 
 def non_negative(what: str, value: float | None) -> float:
     return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
+
+
+def variation(what: str, value: float | None) -> float:
+    return _checked(what, value, VARIATION, is_variation)
+
+
+def is_variation(number: float) -> bool:
+    return 0 <= number <= 1
 
 
 def phase(what: str, value: float | None) -> float:
@@ -75,7 +86,7 @@ def array(
     """A read-only copy of a vector. A number stands for `length` equal values.
 
     sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : what has one value each, for messages
+    one  : name for messages of the thing that has one value
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:

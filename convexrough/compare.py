@@ -1,9 +1,8 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-The same code certifies all results; it does not depend on the solver. A certificate of global scope
-proves that the solution is the only one. If another certified result differs from it by more than
-the bounds, the mathematics or the code of the package has a mistake. Two certificates of local
-scope may differ by more than their bounds: each box may contain a solution of its own.
+One code certifies all results, independently of the solver. If a certified result contradicts one
+of global scope, the mathematics or the code of the package has a mistake. Two certificates of local
+scope may differ: each box may contain a solution of its own.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
-#: How many asperities a message names before it says "and so many more".
+#: Largest number of asperities that a message names; it counts the others.
 MOST_NAMED = 5
 
 #: Solvers that CVXPY can call if the packages with these names are installed.
@@ -54,8 +53,8 @@ class Entry(Record):
         where either has no solution
     steps : for each iteration its solver, step, objective and residual, if `compare` was called
         with `log`; OSQP and the solvers of CVXPY do not report theirs
-    memory : [bytes] largest increase of the resident memory of the process during the solution,
-        without memory that the allocator reused; None if the system is not Linux
+    memory : [bytes] largest increase of the resident memory of the process, without memory that the
+        allocator reused; None if the system is not Linux
     """
 
     solver: str
@@ -70,7 +69,7 @@ class Entry(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Table, Plottable):
-    """The entries of all solvers; the first is that of the reference, Newton's method.
+    """The entries of all solvers; the first is Newton's method, the reference.
 
     contradictions : sentences about pairs of certified results, at least one of them of global
         scope, that contradict each other; each shows a mistake in the mathematics or in the code
@@ -132,11 +131,11 @@ def compare(
     influence: Kind | None = None,
     log: bool = False,
 ) -> Comparison:
-    """Solve one normal contact with every solver, and compare the results.
+    """Compare the results of every solver for one normal contact.
 
     approach [length] or load [force] : the prescribed quantity, exactly one
-    solvers  : solver objects; the default is `every_solver()`. Newton's method is the reference
-        and always the first
+    solvers  : solver objects; default `every_solver()`. Newton's method is always first, as the
+        reference
     influence : compliance operator, as for `press`
     log : store the steps of each solver in its entry
 
@@ -169,10 +168,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers; each formulation with a final Newton step is included with and without it.
-
-    The cone program in CVXPY is also solved by SCS and QOCO, where they are installed.
-    """
+    """All solvers, also without their final Newton step; SCS and QOCO where they are installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),
@@ -216,7 +212,7 @@ def _enter(
         if solver == _REFERENCE:
             raise
         return Entry(solver.name, "refused", str(error))
-    except Exception as error:  # of a solver from elsewhere; the others still answer
+    except Exception as error:  # a user's solver may raise anything
         if type(solver).__module__.startswith("convexrough."):
             raise
         return Entry(solver.name, "failed", f"{type(error).__name__}: {error}")
@@ -241,10 +237,10 @@ def _relative(difference: Array, loads: Array) -> float:
 
 
 def _load_code_of(solver: solvers.Solver) -> None:
-    """Make a solver import what it needs, so that the measured time contains no imports."""
+    """Make a solver import what it needs, so that measured times contain no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception):  # `_enter` meets it again, and records or raises it
+    with suppress(Exception):  # `_enter` handles the same error later
         press(small, approach=1e-2, solver=solver)
 
 

@@ -50,10 +50,10 @@ class Contact(Cached, Table, Plottable):
     approach      : D0 [length];  load : total [force]
     prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : largest relative error of the displacements D_i = D0 + d_i (d_i: the scene's
-        offsets) because point forces replace pressures, to leading order: max over the loaded
-        asperities of sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
-    crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
+    model_error   : leading relative error of the displacements at loaded asperities because point
+        forces replace pressures: the largest of `surface.model_errors`
+    crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; above 1
+        contact discs overlap and the model fails
     covered       : number of open summits under the contact disc of a neighbour, where a point
         force does not represent the pressure
     influence     : the compliance operator: "dense", "lattice" or "scattered"
@@ -87,12 +87,12 @@ class Contact(Cached, Table, Plottable):
 
     @property
     def gaps(self) -> Array:
-        """Gaps (n,) [length], 0 where touching."""
+        """(n,) [length] gaps, 0 where touching."""
         return self.certificate.gaps
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """Statuses (n,): "contact" or "open" where that is proved, else "undecided"."""
+        """(n,) "contact" or "open" where that is proved, else "undecided"."""
         return self.certificate.status
 
     @cached_property
@@ -172,12 +172,12 @@ class Contact(Cached, Table, Plottable):
 
     @property
     def mean_pressures(self) -> Array:
-        """Load over contact area (n,) [force / length^2], 0 where open."""
+        """(n,) [force / length^2] load over contact area, 0 where open."""
         return frozen(mean_pressures(self.loads, self.contact_radii))
 
 
 def mean_pressures(loads: Array, radii: Array) -> Array:
-    """Loads over contact areas (n,), 0 where the contact radius is 0."""
+    """(n,) loads over contact areas, 0 where the contact radius is 0."""
     areas = np.pi * radii**2
     return np.asarray(np.divide(loads, areas, out=np.zeros(len(areas)), where=areas > 0))
 
@@ -191,10 +191,11 @@ def press(
     start: ArrayLike | None = None,
     influence: Kind | None = None,
 ) -> Contact:
-    """Press the sphere on the asperities by an approach [length] or with a load [force].
+    """The contact when the sphere is pressed by an approach [length] or with a load [force].
 
     solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
-    start  : (n,) [force] initial loads, on which no solution with a global certificate depends
+    start  : (n,) [force] initial loads; a solution with a global certificate does not depend on
+        them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
 
@@ -217,12 +218,12 @@ def solve(
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
 ) -> Contact:
-    """`press` for an assembled problem; the other arguments are as for `press`."""
+    """The contact of an assembled problem; the other arguments are as for `press`."""
     return _contact(problem, solvers.named(solver), start, time.perf_counter())
 
 
 def levels_of(contact: Contact) -> Levels:
-    """The normal solutions of a contact's scene at loads up to the load of the contact.
+    """The normal solutions of a contact's scene at loads up to that of the contact.
 
     `contact.cached(levels_of)` returns the same object each time.
     """
@@ -238,14 +239,13 @@ def levels_of(contact: Contact) -> Levels:
     def pressed(at_load: NormalProblem, start: Array | None) -> Array:
         try:
             return solver.solve(at_load, start).loads
-        except SolverError:  # crowded contacts: start from the known loads
+        except SolverError:  # happens if contacts are crowded
             return solver.solve(at_load, state.loads.high).loads
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
 def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
-    """The problem of a contact, its refined loads, and what is proved from them."""
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
     problem = NormalProblem.assemble(
@@ -305,13 +305,13 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles keep neither; from a copy `levels_of` proves the loads again.
+    # Pickles contain neither; for an unpickled contact `levels_of` proves the loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 
 
 def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
-    """The checked solution. SolverErrors keep the last loads, in the scene's units and order."""
+    """The checked solution. SolverErrors keep the latest loads, in the scene's units and order."""
     try:
         solution = solver.solve(problem, start)
     except SolverError as error:
@@ -356,16 +356,17 @@ def covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """First-order load changes (n,) [force] on a change to the "closest" geometry.
+    """(n,) [force] first-order load changes on a change to the "closest" geometry.
 
     They are 0 if the scene has this geometry. There an asperity of tip radius rho, at a distance r
-    from the axis of a base of radius R, meets the base at r R / (R + rho). Its offset is greater by
-    r^2 rho / (2 R (R + rho)), and compliances 1 / (pi E* r) by about rho / R. At the same approach,
+    from the axis of a sphere of radius R, meets it at r R / (R + rho). So its offset is greater
+    by r^2 rho / (2 R (R + rho)), and compliances are greater by a fraction of about rho / R. At the
+    same approach, with the compliance operator A,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
     where H = (2/3) indentation / P is the local part of the Hessian. With two radii
-    of the base, the terms of x and y are added.
+    of the sphere, the terms of x and y are added.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))
@@ -389,7 +390,7 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """The increase (n,) of the displacements when points move inwards by the fraction rho / R."""
+    """(n,) the increase of displacements when points move inwards by the fraction rho / R."""
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

@@ -17,7 +17,7 @@ class ConvexroughError(Exception):
     """Base class of all errors that this package raises."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the error with its message, so that it passes between processes unchanged."""
+        """Pickle the error with its message, unchanged."""
         return _again, (type(self), self.args), self.__dict__
 
 
@@ -47,7 +47,7 @@ class InputError(ConvexroughError, ValueError):
 
 @contextmanager
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
-    """Put this place (a file, a table) in front of the InputErrors of the body.
+    """Put the place `where` (a file, a table) in front of InputErrors of the body.
 
     unless_known : leave errors that name a place unchanged. A MistakesError is never changed
     """
@@ -84,7 +84,7 @@ class FileError(ConvexroughError):
 
 @contextmanager
 def file_errors(path: Path, what: str) -> Iterator[None]:
-    """Turn an OSError of the body into a FileError: what cannot be done with the path, and why."""
+    """Turn an OSError of the body into a FileError that says what failed with this path and why."""
     try:
         yield
     except OSError as error:
@@ -97,7 +97,7 @@ class SolverError(ConvexroughError):
     what    : the reason, with the number that was too large
     solver  : name of the solver
     advice  : what to try, or ""
-    iterate : the last loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order, or None
+    iterate : the latest loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order, or None
     """
 
     def __init__(

@@ -1,7 +1,8 @@
 """Pressure, traction and displacement at any points of the surface, from contacts and shear states.
 
 Pressure and traction are sums over the contact discs that contain a point; displacements are sums
-over all asperities. Shear is along x.
+over all asperities. Shear is along x. Points are (..., 2) [length] with the axis of the sphere as
+origin. Each disc has a centre r_i, a contact radius a_i and a peak pressure p0_i.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.sphere import hertz, surface_shear
 
-#: Number of pairs of a point and an asperity evaluated at a time: they fit in the CPU's cache.
+#: Number of pairs of a point and an asperity that are evaluated at a time, to fit into a cache.
 BLOCK = 2**14
 
 
 def peak_pressures(contact: Contact) -> Array:
-    """p0_i = 2 E* a_i / (pi R_i): (n,) [force / length^2], 0 where open."""
+    """(n,) [force / length^2] p0_i = 2 E* a_i / (pi R_i) with relative radii R_i, 0 where open."""
     scene = contact.scene
     peaks: Array = hertz.peak_pressure(
         contact.contact_radii, scene.material.contact_modulus, scene.relative_radii
@@ -32,13 +33,10 @@ def peak_pressures(contact: Contact) -> Array:
 
 
 def pressure(contact: Contact, points: ArrayLike) -> Array:
-    """Normal pressure p(r) = sum_i p0_i sqrt(1 - |r - r_i|^2 / a_i^2) over discs that contain r.
+    """(...) [force / length^2] pressure sum_i p0_i sqrt(1 - |r - r_i|^2 / a_i^2) at `points`.
 
-    points : (..., 2) [length]  places on the surface; the axis of the sphere is the origin
-    result : (...) [force / length^2]  0 outside every contact disc
-
-    The centres of the discs are the contact points of the scene: the summits, or in the "closest"
-    geometry the points where the paraboloids first touch.
+    The sum is over discs that contain the point r. Their centres are the contact points of the
+    scene: the summits, or in the "closest" geometry the points where the paraboloids first touch.
     """
     touching = np.flatnonzero(contact.loads)
     return superpose(
@@ -50,9 +48,9 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
-    """Sum of both surfaces' normal displacements relative to the distant bodies: (...) [length].
+    """(...) [length] sum of both surfaces' normal displacements, relative to the distant bodies.
 
-    It is the sum of the fields of all asperities, with Hertz pressures and not point forces.
+    Each asperity contributes the field of its Hertz pressure.
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]
@@ -67,10 +65,10 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
 
 
 def traction(state: ShearState, points: ArrayLike) -> Array:
-    """Shear traction q(r) along x after loading from rest: (...) [force / length^2].
+    """(...) [force / length^2] shear traction along x after loading from rest.
 
     Each asperity contributes f p0 sqrt(1 - r^2/a^2), minus f p0 (c/a) sqrt(1 - r^2/c^2) within its
-    stick radius c.
+    stick radius c, at a distance r from its centre.
     """
     asperities = _Sheared(state)
     return _sum_over_discs(
@@ -84,11 +82,11 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 
 
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
-    """Sum of both surfaces' displacements along x relative to the distant bodies: (...) [length].
+    """(...) [length] sum of both surfaces' displacements along x, relative to the distant bodies.
 
     It is the sum over asperities of Johnson's (3.91) for both bodies, the source paper's [A3] and
-    [A4]. Where the surfaces stick, it equals the relative displacement of the bodies, to the
-    accuracy of Ciavarella and Jaeger's forces, which are exact only on average over directions.
+    [A4]. Where the surfaces stick it is about the relative displacement of the bodies: the forces
+    of Ciavarella and Jaeger are exact only on average over directions.
     """
     asperities = _Sheared(state)
     material = state.contact.scene.material
@@ -126,12 +124,11 @@ class _Sheared:
 
 
 def cell_areas(points: Array) -> Array:
-    """Area of each point's Voronoi cell, so that load / area is a nominal pressure.
+    """(n,) [length^2] area of each point's Voronoi cell, nan on the outline.
 
-    points : (n, 2) [length];  result : (n,) [length^2], nan on the outline
+    points : (n, 2) [length]
 
     Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
-    It takes about 2 s for 1e5 points.
     """
     from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
 
@@ -140,7 +137,7 @@ def cell_areas(points: Array) -> Array:
         return unknown
     try:
         mesh = Delaunay(points)
-    except QhullError:  # all on one line
+    except QhullError:  # all points are on one line
         return unknown
     areas: Array = np.zeros(len(points))
     for turn in range(3):
@@ -158,10 +155,10 @@ def cell_areas(points: Array) -> Array:
 
 
 def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> Array:
-    """sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that contain r.
+    """(...) sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that contain r.
 
     points : (..., 2) [length];  centres : (n, 2) [length];  radii : (n,) [length], positive
-    peaks  : (n,) [any];  result : (...) [as peaks]
+    peaks  : (n,) in the unit of the result
     """
     return _sum_over_discs(
         points,
@@ -174,11 +171,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over the discs that contain r.
-
-    Time and memory grow with the number of pairs of a point and a disc that contains it: a k-d tree
-    finds the discs, in groups whose radii differ by less than a factor 2.
-    """
+    """sum_i profile(|r - r_i|, i) over the discs that contain r, by trees of similar radii."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
@@ -201,7 +194,7 @@ def _sum_over_discs(
 def _sum_everywhere(
     points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
 ) -> Array:
-    """sum_i field_i(r - r_i), in blocks: `field` takes x and y (m, n) relative to n centres."""
+    """sum_i field_i(r - r_i), in blocks; `field` takes x and y (m, n) relative to n centres."""
     places = _places(points)
     flat = places.reshape(-1, 2)
     total = np.zeros(len(flat))
@@ -214,7 +207,6 @@ def _sum_everywhere(
 
 
 def _places(points: ArrayLike) -> Array:
-    """The given points as float64, shape (..., 2), every number finite."""
     expected = "finite numbers of shape (..., 2): x and y of each point"
     try:
         places = np.asarray(points, dtype=np.float64)

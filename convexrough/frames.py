@@ -1,4 +1,4 @@
-"""Named arrays as a pandas data frame or an xarray data set; only this module imports the two."""
+"""Named arrays as a pandas data frame or an xarray data set."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: By name: the dimensions of an array, and the array. Those of the first are a data frame's rows.
+#: Names, with the dimensions of an array and the array. The first one has the rows of a data frame.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
 #: The names of the components of a vector.

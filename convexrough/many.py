@@ -1,8 +1,7 @@
-"""Press many scenes at once, and compute a cycle of each.
+"""Press many scenes with equal numbers of asperities at once, and compute a cycle of each.
 
-All scenes have the same number of asperities. Scenes with the same positions and tip radii share
-one matrix, so that a product for all of them is one product of matrices. Scenes whose solution is
-not proved in this way are pressed one by one.
+Scenes with the same positions and tip radii share one matrix. Scenes whose solution is not proved
+in this way are pressed one by one.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ class Contacts(Table):
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
     controls : (m,) what was prescribed: approaches [length], or loads [force] where `by_load`
-    loads, approaches : (m,) totals [force], and D0 [length];  load_errors, approach_errors : (m,)
-    asperity_loads : (m, n) [force];  asperity_load_errors : (m, n)
+    loads, approaches : (m,) totals [force], and approaches [length]
+    load_errors, approach_errors : (m,) bounds on their errors
+    asperity_loads, asperity_load_errors : (m, n) [force]
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
-    alone    : (k,) indices of the scenes that were pressed one by one, because the joint
-        computation did not prove that their solution is the only one
+    alone    : (k,) indices of the scenes that were pressed one by one
 
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()
@@ -78,8 +77,8 @@ class Contacts(Table):
 
         maximum, minimum : (m,) [force], or one for all; the default minimum is -maximum
 
-        Raises InputError where a scene has no friction, a minimum exceeds its maximum, or either
-        exceeds f P in size.
+        Raises InputError where a scene has no friction, a minimum exceeds its maximum, or the size
+        of either exceeds the friction limit.
 
         >>> found = cr.press_many([scene, scene], load=3.6e-7).cycles([9e-8, 4e-8])
         >>> print([f"{loss:.4g}" for loss in found.losses], found.order.tolist())
@@ -129,7 +128,7 @@ class Contacts(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cycles(Table):
-    """The steady cycles of m contacts. Arrays are (m,), status is (m, n), with `Cycle`'s meanings.
+    """The steady cycles of m contacts. Arrays are (m,), `status` is (m, n); meanings as in `Cycle`.
 
     `cycles[k]` is the `Cycle` of contact k.
 
@@ -166,7 +165,7 @@ class Cycles(Table):
 def press_many(
     scenes: Sequence[Scene], *, approach: ArrayLike | None = None, load: ArrayLike | None = None
 ) -> Contacts:
-    """Press many scenes with equal numbers of asperities by approaches or with loads.
+    """The contacts of many scenes with equal numbers of asperities.
 
     approach [length] or load [force] : (m,), or one for all
 

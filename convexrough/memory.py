@@ -8,10 +8,9 @@ from pathlib import Path
 
 
 class MemoryRise:
-    """The rise of this process's resident memory since the object was made.
+    """The increase of this process's resident memory since the object was made.
 
-    Linux records the peak of all memory of a process and resets it on request. Memory that an
-    allocator reuses is not counted.
+    Memory that an allocator reuses is not counted.
     """
 
     def __init__(self) -> None:
@@ -23,7 +22,7 @@ class MemoryRise:
             self._before = self._level("VmRSS")
 
     def risen(self) -> int | None:
-        """The highest rise so far [bytes]; None if the system does not report it."""
+        """[bytes] the largest increase so far; None if the system does not report it."""
         peak = self._level("VmHWM")
         if self._before is None or peak is None:
             return None

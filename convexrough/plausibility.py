@@ -1,4 +1,4 @@
-"""Measures of whether the asperity model holds for a contact, and warnings where it does not."""
+"""Measures of the validity of the asperity model for a contact, and warnings where it fails."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import UnitNames
 
-#: Contacts of fewer asperities than this get a warning.
+#: Contacts with fewer touching asperities than this cause a warning.
 FEW = 5
 
-#: Fewer asperities in contact than this are taken to be all that were meant, not part of an array.
+#: Scenes with fewer touching asperities than this are not taken to be parts of a larger array.
 ARRAY = 20
 
 #: `array_extent` below which an array is cut off: smooth pressure there is 0.7 of the peak.
@@ -26,7 +26,7 @@ CUT_OFF = 0.7
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
 
-#: Coefficients of friction above this are those of few pairs: clean metals in vacuum, soft rubber.
+#: Few pairs, such as clean metals in vacuum and soft rubber, have a larger coefficient of friction.
 HIGH_FRICTION = 2.0
 
 #: Contact radius over radius of curvature at which a paraboloid differs from a sphere by 1 %.
@@ -37,13 +37,14 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     """Measures of the validity of the model, by name; those without a unit are ratios or counts.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
-    extent       : largest distance of a point of contact from the axis, over the base's radius
-    array_extent : largest |x| or |y| of a summit, over the half width of the smooth base's contact
-        under the same load along this axis, the smaller of both; None without such a contact
-    all_touch    : true if every asperity of the scene touches
+    extent       : largest distance of a point of contact from the axis, over the sphere's radius
+    array_extent : for each of the axes x and y, the largest distance of a summit from the centre,
+        over the half width of the contact of a smooth sphere at this load; the smaller of the two
+        ratios, or None without such a contact
+    all_touch    : True if every asperity of the scene touches
     steepness    : largest ratio of contact radius to tip radius
-    mean_pressure, hardness : largest mean pressure; the material's hardness or None
-        [force / length^2]
+    mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
+        None
     contact_modulus : [force / length^2];  friction : its coefficient or None
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
     mismatch     : Dundurs' beta of two bodies, which the model neglects
@@ -66,7 +67,7 @@ def limits(
         "crowding": crowding,
         "covered": covered,
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
-        "array_extent": _array_extent(scene, float(loads.sum())),
+        "array_extent": array_extent(scene, float(loads.sum())),
         "all_touch": bool(touching.all()),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(pressures.max()),
@@ -88,7 +89,7 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:
-    """The `cautions` about a contact."""
+    """The warnings `cautions` about a contact."""
     return cautions(limits_of(contact), contact.scene.units)
 
 
@@ -112,16 +113,12 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: from "
+            f"contact extends to {normal['extent']:.3g} of the sphere's radius from the axis: from "
             f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
         )
     cut_off = normal["contact"] >= ARRAY and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
-        yield (
-            f"contact reaches the rim of the array, which ends at {normal['array_extent']:.3g} of "
-            "the contact radius of the smooth base: the loads depend on where it ends; check the "
-            "unit of the base's radius, or use a larger array"
-        )
+        yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["all_touch"]:
         yield (
             "every asperity touches, also at the rim of the array: others beyond it would carry "
@@ -135,7 +132,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     if normal["crowding"] > 1:
         yield (
             f"contact discs overlap (crowding {normal['crowding']:.3g}, above 1): the asperity "
-            "model does not hold"
+            "model does not hold; check the units of the modulus, the load and the radii"
         )
     if normal["covered"]:
         yield (
@@ -152,7 +149,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
 
 
 def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
-    """True if simple bounds show that `cautions` has nothing to say, at a fraction of its cost."""
+    """True if simple bounds show that there are no `cautions`, at a fraction of the cost."""
     tips, a, touching = scene.asperities.tip_radii, float(radii.max()), np.count_nonzero(loads)
     smooth = hertz.contact_radius(loads.sum(), scene.material.contact_modulus, scene.mean_radius)
     far = float(scene.asperities.distances.max())
@@ -170,8 +167,17 @@ def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
     )  # fmt: skip
 
 
-def _array_extent(scene: Scene, load: float) -> float | None:
-    """The smaller of max |x| / a and max |y| / b; a row of asperities has only one of them."""
+def at_the_rim(extent: float) -> str:
+    """A warning for an `array_extent` below `CUT_OFF`."""
+    return (
+        f"contact reaches the rim of the array, which ends at {extent:.3g} of the contact radius "
+        "of the smooth sphere: the loads depend on where it ends; check the unit of the sphere's "
+        "radius, or use a larger array"
+    )
+
+
+def array_extent(scene: Scene, load: float) -> float | None:
+    """The smaller of max |x| / a and max |y| / b; of these a row of asperities has only one."""
     smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:
         return None
@@ -181,7 +187,7 @@ def _array_extent(scene: Scene, load: float) -> float | None:
 
 
 def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
-    """A warning if the contact modulus is that of a gel, or of no pair of bodies; needs units."""
+    """A warning if units are named and the contact modulus is that of a gel, or of no solid."""
     unit = units.unit("pressure")
     if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
         limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"

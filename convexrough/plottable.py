@@ -1,4 +1,4 @@
-"""The method `plot` of results; it imports the plotting modules, a higher layer, when called."""
+"""The method `plot` of results. It imports the plotting modules when called."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class Plottable:
-    """A result that can be plotted."""
+    """A result with a method `plot`."""
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the main figure of the result, as `convexrough.plots.plot`; return the axes."""

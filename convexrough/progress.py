@@ -1,4 +1,4 @@
-"""The logger `convexrough`: long work reports its progress there, and the command line shows it."""
+"""The logger `convexrough`, to which long computations report progress; commands show it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LOGGER = logging.getLogger("convexrough")
 
 
 def log_step(solver: str, step: int, objective: float, residual: float) -> None:
-    """Log a step of an iteration (DEBUG); `args` of the log record has the four values by name."""
+    """Log a step of an iteration (DEBUG); `args` of the record has the four values by name."""
     LOGGER.debug(
         "%(solver)s: step %(step)d, objective %(objective).12g, residual %(residual).1e",
         {"solver": solver, "step": step, "objective": objective, "residual": residual},
@@ -22,7 +22,7 @@ def log_step(solver: str, step: int, objective: float, residual: float) -> None:
 def logged(
     call: Callable[[logging.LogRecord], object], least: int = logging.INFO
 ) -> Iterator[None]:
-    """Pass every log record of at least this level to `call` while the body runs."""
+    """Pass every log record of at least the level `least` to `call` while the body runs."""
 
     class Handler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:

@@ -1,4 +1,4 @@
-"""Base classes of results: they print on one screen, convert to tables, and can be pickled."""
+"""Base classes of results, which print a short summary, convert to tables, and can be pickled."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Dimension names, and the attributes whose arrays have these dimensions.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
 
-#: Names that look plural but have no singular.
+#: Plural names that are kept as they are: counts and times.
 COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
 #: Largest array and longest text that are printed in full.
@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """A dataclass that prints a line for each field; unpickled arrays are read-only again."""
+    """A dataclass that prints one line for each field; unpickled arrays are read-only again."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -50,20 +50,19 @@ class Record:
         return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields; what was computed from them is not pickled."""
+        """The fields, without what was computed from them."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False  # a pickle does not store this
+                value.flags.writeable = False  # pickles do not store this flag
         self.__dict__.update(state)
 
     def _fields(self) -> Any:
         return fields(self)  # type: ignore[arg-type]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """The name and the text of each line."""
         for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
             if text := in_text(getattr(self, name)):  # empty values are left out
                 yield name, text
@@ -72,7 +71,6 @@ class Record:
             yield "units", units
 
     def _headline(self) -> str:
-        """The record in one line."""
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
         if hasattr(self, "status"):
             parts.append(in_text(self.status))
@@ -91,15 +89,15 @@ class Table(Record):
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """These arrays, by the singulars of their names."""
+        """The arrays of the record with these names, by the singulars of the names."""
         return {singular(name): getattr(self, name) for name in names}
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas data frame with a row for each asperity, step, point or solver.
 
         Columns are named in the singular, components of vectors with _x and _y. Fields that are one
-        number or text are in `attrs`. Only `to_xarray` has arrays of two dimensions, such as the
-        forces of asperities at each step of a history.
+        number or text are in `attrs`. Other two-dimensional arrays, such as the forces of
+        asperities at each step of a history, are only in `to_xarray`.
 
         Raises ExtraError where pandas is not installed.
         """
@@ -108,9 +106,8 @@ class Table(Record):
     def to_xarray(self) -> xarray.Dataset:
         """An xarray data set of all arrays, with named dimensions.
 
-        Fields that are one number or text are in `attrs`.
-
-        Raises ExtraError where xarray is not installed.
+        Fields that are one number or text are in `attrs`. Raises ExtraError where xarray is not
+        installed.
         """
         return frames.dataset(self._variables(), self._attributes())
 
@@ -151,10 +148,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value in one line: an array as its size and range, statuses as their counts.
-
-    A mapping is shown as its keys, a tuple of records as their number.
-    """
+    """A value in one line: size and range of an array, counts of statuses, keys of a mapping."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):
@@ -185,7 +179,6 @@ def _of_array(values: NDArray[Any]) -> str:
 
 
 def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
-    """The number of each status, in the order of first occurrence."""
     while len(statuses):
         same = statuses == statuses[0]
         yield f"{np.count_nonzero(same):,} {statuses[0]}"

@@ -1,7 +1,7 @@
 """Press and cycle scenes with equal numbers of asperities together, as rows of a stack.
 
-Scenes with the same positions and tip radii are a family: they share one matrix, so that a product
-for all of them is one product of matrices. Scenes that are not proved in this way are left out.
+Scenes with the same positions and tip radii are a family, which shares one matrix. Scenes that are
+not proved in this way are left out.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Scenes with more asperities are solved one by one: stacking them saves nothing.
+#: Scenes with more asperities are solved one by one, as stacks save no time.
 MOST = 512
 
 #: Largest total size of the matrices of all rows processed at once.
@@ -44,8 +44,8 @@ CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_error
 class PressedRows(NamedTuple):
     """Scenes that were proved together: a stack of m rows.
 
-    places  : (m,) indices of the scenes;  problem : the problem whose units the stack has
-    high    : their solutions;  squares : (m, n) squared distances from the axis [length^2]
+    places  : (m,) indices of the scenes;  problem : the problem with the scaled units of the stack
+    high    : the solutions;  squares : (m, n) squared distances from the axis [length^2]
     """
 
     places: Indices
@@ -74,7 +74,7 @@ class PressedRows(NamedTuple):
     def cycles(
         self, upper: Array, lower: Array, friction: Array
     ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
-        """Which cycles (m,) are proved, and the fields of `Cycles` for these rows, by name.
+        """A mask (m,) of the proved cycles, and the fields of `Cycles` for these rows, by name.
 
         upper, lower : (m,) shear forces [force];  friction : (m,) coefficients
         """
@@ -84,7 +84,7 @@ class PressedRows(NamedTuple):
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
-        total = where(inside, total, high.load)[:, None]  # others are computed one by one
+        total = where(inside, total, high.load)[:, None]  # rows outside are left out
         rows = replace(self.stack, exact_load=total, exact_approach=None)
         offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
         found = solved(rows, offsets, self.squares, reach, self.box.closed)
@@ -107,7 +107,7 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """The scenes that can be proved together, pressed; controls : (m,) [force] or [length]."""
+    """The pressed scenes that can be proved together; controls : (m,) [force] or [length]."""
     if not scenes or len(scenes[0]) > MOST:
         return []
     with threads.one_where(MATRICES):
@@ -154,7 +154,7 @@ def _proved(
     controls: Array,
     by_load: bool,
 ) -> Iterator[PressedRows]:
-    """Press the scenes of one stack, in the units of the first problem, and yield those proved."""
+    """Press the scenes of one stack, in the units of the first problem; yield those proved."""
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
     coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
@@ -193,12 +193,12 @@ def _repeated(values: Array, shape: tuple[int, int]) -> Array:
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
-    """Enclosed offsets (m, n) of scenes differing only in heights, as in `NormalProblem.exact`."""
+    """(m, n) enclosed offsets of scenes that differ only in heights, as `NormalProblem.exact`."""
     scene, length = problem.scene, problem.units.length
     if len(rows) == 1 and rows[0] is scene:
         return problem.exact.offsets[None, :]
     bare = replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, 0.0))
-    drops = replace(problem, scene=bare).twofold_offsets()  # below 0
+    drops = replace(problem, scene=bare).twofold_offsets()  # at most 0
     heights = np.array([each.asperities.heights for each in rows]) / length
     offsets = Pair.exact(heights) + Pair(*(part[None, :] for part in drops))
     sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(drops.high))
@@ -206,7 +206,6 @@ def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
 
 
 def _reach(problem: NormalProblem, loads: Array) -> Array:
-    """Squared contact radii [length^2] of smooth spheres under these loads."""
     scene, force = problem.scene, loads * problem.units.force
     a = hertz.contact_radius(force, scene.material.contact_modulus, scene.mean_radius)
     return np.asarray(a**2)

@@ -1,4 +1,4 @@
-"""For the tests of other software: assert that forces are certified, or that two answers agree.
+"""For the tests of other software: assertions that forces are certified, or that two answers agree.
 
 Each function raises AssertionError with the asperities concerned, their errors and statuses; none
 needs a test framework. Loads that are negative, not finite or too few or many raise InputError.
@@ -36,7 +36,7 @@ def assert_certified(
     within: float = WITHIN,
     floor: float = 0.0,
 ) -> Certificate:
-    """Check that exactly the asperities with a load touch; return the certificate of the loads.
+    """The certificate of loads, after a check that exactly the asperities with a load touch.
 
     loads  : (n,) [force] from any source, in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
@@ -61,13 +61,13 @@ def assert_shear_certified(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearCertificate:
-    """Check that exactly the asperities claimed to slide do; return the certificate of the forces.
+    """The certificate of shear forces, after a check that exactly the claimed asperities slide.
 
     forces  : (n,) [force] along the shear force, after loading from rest, from any source
     force   : [force] their prescribed sum
     within  : largest error of a force, as a fraction of the largest force
-    sliding : (n,) bool, which asperities are claimed to slide; default: those whose force is f P_i
-        within a fraction 1e-4 (P_i: the load)
+    sliding : (n,) True where sliding is claimed; default: where the force is the coefficient of
+        friction times the load, within a fraction 1e-4
 
     Raises AssertionError with the asperities concerned.
     """
@@ -93,10 +93,7 @@ def assert_agree(
     within : also check that no two loads differ by more than this fraction of the largest. Without
         it two inaccurate results agree as long as their bounds allow
 
-    They contradict each other where loads, gaps or approaches differ by more than the sum of their
-    proved bounds, or where one proves that an asperity touches and the other that it is open.
-
-    Raises AssertionError with the asperities concerned.
+    A contradiction is what `compare.contradictions` reports.
     """
     __tracebackhide__ = True
     one = _asked(_answer, "first", first, scene, approach, load)
@@ -125,7 +122,7 @@ def assert_agree(
 
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
-    """The answer of a function; the traceback of an InputError shows no frames of the package."""
+    """The answer of a function; InputErrors show no frames of the package in their traceback."""
     __tracebackhide__ = True
     try:
         return question(*arguments, **options)
@@ -159,7 +156,6 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
 
 
 def _check(claim: Claim, scene: Scene) -> None:
-    """Raise AssertionError with the report of `verify` unless the claim holds."""
     __tracebackhide__ = True
     if not claim.holds:
         hints = claim.hints() if isinstance(claim, Verdict) else ()

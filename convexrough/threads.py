@@ -1,4 +1,4 @@
-"""Work on parts of large arrays in threads: numpy and Fourier transforms run in parallel."""
+"""Work on parts of large arrays in threads; numpy and Fourier transforms run in parallel."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
-#: Work on at most this many numbers takes less time than starting threads.
+#: Work on at most this many numbers takes less time than the start of threads.
 MANY = 2**18
 
 
@@ -31,7 +31,7 @@ def worthwhile(numbers: int) -> int:
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
     """Call work(part) for each part, in any order; a part must not write what another reads.
 
-    The threads have ended when this returns, so that the process may be forked.
+    The threads have ended when this returns, so the process may be forked.
     """
     if threads == 1:
         for part in parts:
@@ -98,5 +98,5 @@ one_thread = OneThread()
 
 
 def one_where(numbers: int) -> AbstractContextManager[object]:
-    """`one_thread` if arrays of this many numbers are worth several threads of `each`."""
+    """`one_thread` if `each` uses several threads for arrays of this many numbers."""
     return one_thread if worthwhile(numbers) > 1 else nullcontext()

@@ -1,19 +1,22 @@
-"""How good is the asperity model?  A boundary-element check that knows of no asperities.
+"""Compare the asperity model with boundary elements.
 
-The package makes every asperity a Hertz spring and its effect on the others that of a point force.
-Here the same paraboloids, sphere and envelope of asperities, are cut into square pixels of uniform
-pressure on an elastic half-space. The contact law is over pixels instead of asperities:
+The package treats every asperity as a Hertzian contact that acts on the others as a point force.
+This script does not use that model. It cuts the same shapes, the sphere and the envelope of the
+asperities, into square pixels of uniform pressure on an elastic half-space. The contact law then
+holds at each pixel:
 
     p >= 0,    g = K p - h >= 0,    p g = 0,
 
-where h is how far the undeformed bodies would overlap at this approach and K is the half-space.
-Pressure only ever pushes the surfaces apart, so a pixel with h <= 0 stays open.
+with the pressures p, the gaps g, the overlap h of the undeformed bodies at the given approach, and
+the compliance K of the half-space. A pixel with h <= 0 stays open, because pressure only pushes the
+surfaces apart.
 
     python examples/boundary_elements.py --pixels 1024
 
-On the source paper's scene the load converges to 3.59667e-7. From it the "closest" geometry differs
-by -0.016 %, and by +0.25 % in the worst ring; the "summit" geometry by +0.33 %, and by -7.6 %.
-Coarse pixels scatter the ring loads: 512 pixels give that 0.25 % as 0.29 %, 384 as 0.36 %.
+For the scene of Dini and Hills (2009) the load converges to 3.59667e-7. The total load of the
+geometry "closest" differs from it by -0.016 %, and the worst ring by +0.25 %. For the geometry
+"summit" these are +0.33 % and -7.6 %. Coarse pixels change the loads of rings: with 512 pixels the
++0.25 % becomes 0.29 %, with 384 0.36 %.
 """
 
 from __future__ import annotations
@@ -30,14 +33,14 @@ import convexrough as cr
 from convexrough.surface.boundary_elements import HalfSpace, touch
 
 Array = NDArray[np.float64]
-Owner = NDArray[np.intp]  # which contact a pixel belongs to
-Shape = Callable[[Array, Array], tuple[Array, Owner]]  # overlap and owner at pixels x, y
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Owner = NDArray[np.intp]  # index of the contact of each pixel
+Shape = Callable[[Array, Array], tuple[Array, Owner]]  # overlap and owner at the pixels x, y
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
 SPHERE_RADIUS, APPROACH, CONTACT_MODULUS = 1.0, 5e-5, 1.0
 #: Outside this circle the sphere stays above a plane through the tips, so nothing can touch.
 HALF_WIDTH = np.sqrt(2 * SPHERE_RADIUS * APPROACH)
-RINGS = "FEDCBA"  # the paper's names, from the axis outwards
+RINGS = "FEDCBA"  # names of the rings in the paper, from the axis outwards
 
 
 def smooth_sphere(x: Array, y: Array, x0: float = 0.0, y0: float = 0.0) -> tuple[Array, Owner]:
@@ -47,15 +50,16 @@ def smooth_sphere(x: Array, y: Array, x0: float = 0.0, y0: float = 0.0) -> tuple
 
 
 def rough_sphere(x: Array, y: Array, asperities: cr.Asperities) -> tuple[Array, Owner]:
-    """Overlap of the sphere with the envelope of the asperities, and whose surface a pixel is on.
+    """Overlap of the sphere with the envelope of the asperities, and the asperity at each pixel.
 
-    h = D0 - r^2 / (2 R) + max_i (z_i - |r - r_i|^2 / (2 rho_i)): asperities and nothing between.
+    h = D0 - r^2 / (2 R) + max_i (z_i - |r - r_i|^2 / (2 rho_i)). Between asperities there is no
+    surface.
     """
     envelope = np.full((len(x), len(y)), -np.inf)
     owner = np.zeros(envelope.shape, dtype=np.intp)
     shapes = zip(asperities.positions, asperities.tip_radii, asperities.heights, strict=True)
     for i, ((x_i, y_i), rho, z) in enumerate(shapes):
-        width = np.sqrt(2 * rho * (APPROACH + z))  # further out it overlaps nothing
+        width = np.sqrt(2 * rho * (APPROACH + z))  # beyond this it overlaps nothing
         near_x = slice(*np.searchsorted(x, (x_i - width, x_i + width)))
         near_y = slice(*np.searchsorted(y, (y_i - width, y_i + width)))
         near = near_x, near_y
@@ -66,7 +70,7 @@ def rough_sphere(x: Array, y: Array, asperities: cr.Asperities) -> tuple[Array, 
 
 
 def loads_by_level(shape: Shape, contacts: int, levels: list[int]) -> Array:
-    """Load of each contact at each number of pixels; every level halves the pixels of the last."""
+    """Load of each contact at each level. A level has half the pixel size of the one before."""
     loads: list[Array] = []
     pressure = np.empty((0, 0))
     for n in levels:
@@ -82,10 +86,10 @@ def loads_by_level(shape: Shape, contacts: int, levels: list[int]) -> Array:
 
 
 def check_smooth_sphere() -> list[Pair]:
-    """Against Hertz, P = (4/3) E* sqrt(R) D0^(3/2): the error falls as the pixel size squared.
+    """Compare with Hertz, P = (4/3) E* sqrt(R) D0^(3/2): the error falls as the pixel size squared.
 
-    How the pixels lie under the edge of contact scatters the error by a third of itself on coarse
-    grids: it is averaged over eight places of the axis.
+    On coarse grids the error varies by a third of itself with the position of the edge of the
+    contact relative to the pixels. It is therefore averaged over eight positions of the axis.
     """
     hertz = 4 / 3 * CONTACT_MODULUS * np.sqrt(SPHERE_RADIUS) * APPROACH**1.5
     levels = [16, 32, 64, 128]
@@ -98,9 +102,9 @@ def check_smooth_sphere() -> list[Pair]:
 
 
 def compare(pixels: int = 512) -> list[Pair]:
-    """Boundary elements against Hertz, then the asperity model against boundary elements.
+    """Compare boundary elements with Hertz, then the asperity model with boundary elements.
 
-    pixels : across the circle that could touch, on the finest of three levels
+    pixels : number across the circle that could touch, on the finest of three levels
     """
     pairs = check_smooth_sphere()
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
@@ -125,7 +129,7 @@ def compare(pixels: int = 512) -> list[Pair]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="the asperity model against boundary elements")
-    parser.add_argument("--pixels", type=int, default=512, help="across what could touch")
+    parser.add_argument("--pixels", type=int, default=512, help="number across the circle")
     pixels: int = parser.parse_args().pixels
     print(f"{'':28}{'computed':>16}{'reference':>16}{'difference':>13}")
     for name, computed, reference in compare(pixels):

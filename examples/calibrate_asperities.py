@@ -1,13 +1,14 @@
-"""Tip radius and spacing from a curve of load against approach: what can be told, and what cannot.
+"""Fit tip radius and spacing to a curve of load against approach.
 
-Somebody measured the load at twelve approaches. The asperities are known to stand on a hexagonal
-lattice, but neither their tip radius nor their spacing is known. Least squares needs the derivative
-of each load by both: one gradient for each point of the curve, where differences would take three
-pressings. The same derivatives say how sure the answer is: the two are strongly correlated, as
-sharper tips that stand more densely carry nearly the same load.
+Suppose the load was measured at twelve approaches. The asperities are known to be on a hexagonal
+lattice, but neither their tip radius nor their spacing is known. A least-squares fit needs the
+derivatives of each load by both parameters. One gradient per point of the curve gives them; finite
+differences would need three solutions per point. The same derivatives give the accuracy of the fit.
+The two parameters are strongly correlated, because sharper tips at a smaller spacing carry nearly
+the same load.
 
-Rings of asperities make contact one after the other, so the curve has features, and least squares
-has local minima: from some starts it ends in one. What is left of the loads then says so.
+Rings of asperities make contact one after the other. So the sum of squares has local minima, and
+from some starting values the fit ends in one. A large residual shows this.
 
     python examples/calibrate_asperities.py
 """
@@ -21,17 +22,18 @@ from scipy.optimize import least_squares
 import convexrough as cr
 
 Array = NDArray[np.float64]
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
-TIP, SPACING = 0.02, 0.0025  # what is to be found
+TIP, SPACING = 0.02, 0.0025  # the values to be found
 APPROACHES = np.linspace(1e-5, 5e-5, 12)
-NOISE = 1e-3  # of each load
+NOISE = 1e-3  # relative, of each load
 
 
 def curve(parameters: Array) -> tuple[Array, Array]:
     """The logarithm of the load at each approach, and its derivatives by those of both parameters.
 
-    Tips grow together and positions stretch together: derivatives add up.
+    All tip radii change together, and so do all positions; so the derivatives of single asperities
+    add up.
     """
     tip, spacing = np.exp(parameters)
     asperities = cr.Asperities.hexagonal(spacing=SPACING, tip_radius=tip, within=0.0125)
@@ -48,8 +50,8 @@ def curve(parameters: Array) -> tuple[Array, Array]:
 
 
 def calibrate(measured: Array, start: Array) -> tuple[Array, Array]:
-    """log tip radius and log spacing, and their covariance for noise of one part in all loads."""
-    kept: dict[bytes, tuple[Array, Array]] = {}  # a curve gives both
+    """Fitted log tip radius and log spacing, and their covariance for a relative noise of 1."""
+    kept: dict[bytes, tuple[Array, Array]] = {}  # loads and their derivatives
 
     def both(parameters: Array) -> tuple[Array, Array]:
         if (key := parameters.tobytes()) not in kept:
@@ -68,7 +70,7 @@ def calibrate(measured: Array, start: Array) -> tuple[Array, Array]:
 
 
 def compare() -> list[Pair]:
-    """Exact loads give both back; noisy ones give them within what the derivatives foretell."""
+    """Fit exact loads, then noisy ones: the errors agree with what the derivatives predict."""
     true = np.log([TIP, SPACING])
     exact, _ = curve(true)
     found, covariance = calibrate(exact, true + np.log([0.5, 1.3]))
@@ -76,11 +78,11 @@ def compare() -> list[Pair]:
     correlation = covariance[0, 1] / spread.prod()
     noisy = exact + NOISE * np.random.default_rng(0).normal(size=len(exact))
     near, _ = calibrate(noisy, found)
-    off = np.abs(near - true) / (NOISE * spread)
+    errors = np.abs(near - true) / (NOISE * spread)
     return [
         ("tip radius", float(np.exp(found[0])), TIP),
         ("spacing", float(np.exp(found[1])), SPACING),
-        ("noisy: within three deviations", float((off < 3.0).all()), 1.0),
+        ("noisy: within three standard deviations", float((errors < 3.0).all()), 1.0),
         ("strongly correlated", float(abs(correlation) > 0.9), 1.0),
     ]
 
@@ -91,7 +93,7 @@ def main() -> None:
     found, covariance = calibrate(measured, true + np.log([0.5, 1.3]))
     spread = np.sqrt(np.diag(covariance))
     for name, value, deviation in zip(("tip radius", "spacing"), found, spread, strict=True):
-        print(f"{name:12}{np.exp(value):12.6g}  off by about {NOISE * deviation:.2%}")
+        print(f"{name:12}{np.exp(value):12.6g}  standard error {NOISE * deviation:.2%}")
     print(f"correlation {covariance[0, 1] / spread.prod():12.3f}")
     for name, computed, reference in compare():
         print(f"{name:32}{computed:16.9g}{reference:16.9g}")

@@ -1,10 +1,11 @@
-"""How rough must a rough sphere be?  From 61 asperities to Hertz, by refinement.
+"""Refine a rough sphere until it behaves as a smooth one.
 
-The source paper's lattice is refined k times: spacing and tip radii shrink together, the sphere and
-its approach stay. Each asperity is softer than the solid it stands for, by a layer as thick as the
-spacing b, so the sphere carries less than a smooth one; the difference fades with b. Richardson's
-extrapolation of four loads to b = 0 meets Hertz's load, (4/3) E* sqrt(R) D0^(3/2), and friction
-follows: the displacement at half the limiting shear force meets Mindlin's.
+The lattice of Dini and Hills (2009) is refined k times: spacing and tip radii become smaller in
+proportion, while the sphere and its approach stay the same. An asperity is more compliant than the
+solid material in its place, as if there were a soft layer of the thickness of the spacing b. So the
+rough sphere carries less load than a smooth one, and the difference vanishes with b. Richardson's
+extrapolation of four loads to b = 0 gives Hertz's load, (4/3) E* sqrt(R) D0^(3/2). Likewise the
+displacement at half the limiting shear force tends to Mindlin's.
 
     python examples/continuum_limit.py
 
@@ -19,14 +20,14 @@ from numpy.typing import NDArray
 import convexrough as cr
 
 Array = NDArray[np.float64]
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
 RADIUS, APPROACH, SPACING, FRICTION = 1.0, 5e-5, 0.0025, 0.5
 REFINEMENTS = (8, 16, 32, 64)
 
 
 def refined(k: float) -> cr.Scene:
-    """The paper's lattice with k times as many asperities along each line."""
+    """The lattice of Dini and Hills with k times as many asperities along each line."""
     asperities = cr.Asperities.hexagonal(
         spacing=SPACING / k, tip_radius=8 * SPACING / k, within=np.sqrt(2 * RADIUS * APPROACH)
     )
@@ -35,7 +36,7 @@ def refined(k: float) -> cr.Scene:
 
 
 def at_zero_spacing(values: list[float]) -> float:
-    """Richardson's extrapolation: errors in powers of b, each refinement halving b."""
+    """Richardson's extrapolation for an error in powers of b, where each refinement halves b."""
     table = np.array(values)
     for power in range(1, len(values)):
         table = table[1:] + (table[1:] - table[:-1]) / (2**power - 1)
@@ -43,7 +44,7 @@ def at_zero_spacing(values: list[float]) -> float:
 
 
 def compare() -> list[Pair]:
-    """Extrapolated load and compliance against the smooth sphere's."""
+    """Compare extrapolated load and displacement with those of the smooth sphere."""
     loads, ratios, proved = [], [], 0
     for k in REFINEMENTS:
         scene = refined(k)

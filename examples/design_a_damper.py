@@ -1,16 +1,16 @@
-"""Which roughness loses most, and which least?  A damper designed by gradients.
+"""Find the heights with the largest and the smallest energy loss by gradients.
 
-A joint under a load takes a shear force to and fro. Sixty-one asperities may be taller or lower by
-2 % of the approach, and no more on average: which heights make the cycle lose most? The loss has a
-gradient by every height, for the price of two linear systems, so any optimiser can ask. Equal
-heights are neither best nor worst.
+A joint under a constant load takes an alternating shear force. Each of its sixty-one asperities may
+be up to 2 % of the approach taller or shorter; their mean height is fixed. Which heights make a
+cycle lose the most energy? The derivatives of the loss by all heights cost two linear systems, so
+any gradient-based optimiser can be used. Equal heights are neither the best nor the worst.
 
     python examples/design_a_damper.py --draw design.png
     python examples/design_a_damper.py --finer 4          # 955 asperities, ten seconds
 
-Loads have a kink of second order wherever an asperity makes contact, and an open asperity has a
-gradient of zero: no optimiser lifts it. So start from random heights, and more than once. Second
-derivatives do not exist, and methods that want them should not be given any.
+The gradient with respect to an open asperity is zero, so no optimiser raises it: start from random
+heights, several times. Where an asperity makes contact the gradient has a kink, so second
+derivatives do not exist there: use a first-order method.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 import convexrough as cr
 
 Array = NDArray[np.float64]
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
 LOAD, FRICTION, FRACTION = 3.60853389e-7, 0.5, 0.5
 FARTHEST = 1e-6  # [length] 2 % of the approach
@@ -33,7 +33,7 @@ SEEDS = (0, 2)
 
 
 def scene(finer: int = 1) -> cr.Scene:
-    """The source paper's, equal heights; or on a finer lattice, as crowded."""
+    """The scene of Dini and Hills (2009), or a finer lattice with the same crowding."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025 / finer, tip_radius=0.02 / finer, within=0.0102
     )
@@ -41,10 +41,11 @@ def scene(finer: int = 1) -> cr.Scene:
 
 
 def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]:
-    """Heights of most (1) or least (-1) loss, that loss and what is left of the gradient.
+    """Heights of the largest (sign 1) or smallest (-1) loss, this loss, and the possible gain.
 
-    The loss is over that of equal heights, heights are in units of the farthest: optimisers stop by
-    numbers that mean something at about 1. What is left: the best that any direction could gain.
+    The loss is relative to that of equal heights, and the unknowns are heights divided by FARTHEST,
+    because optimisers need numbers of about 1. The possible gain is the first-order gain of the
+    best further step.
     """
     force = FRACTION * FRICTION * LOAD
     loss = cr.Objective(scene=scene(finer), of="loss", load=LOAD, force=force)
@@ -57,14 +58,14 @@ def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]
     n = len(loss.start)
     start = np.random.default_rng(seed).uniform(-0.5, 0.5, n)
     bounds = [(-1.0, 1.0)] * n
-    search: Any = minimize  # whose types know no such constraints
+    search: Any = minimize  # the type of `minimize` does not accept these constraints
     if finer == 1:
         level = {"type": "eq", "fun": np.mean, "jac": lambda z: np.full(n, 1 / n)}
         options: dict[str, float] = {"ftol": 1e-8, "maxiter": 60}
         found = search(
             cost, start, jac=True, method="SLSQP", bounds=bounds, constraints=level, options=options
         )
-    else:  # the mean is free: a shift of all heights changes nothing under a load
+    else:  # the mean is free: under a prescribed load a shift of all heights changes nothing
         options = {"maxiter": 200, "ftol": 1e-9}
         found = search(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     z = np.clip(found.x, -1.0, 1.0)
@@ -73,16 +74,16 @@ def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]
 
 
 def gain(z: Array, slopes: Array) -> float:
-    """First-order gain of the best feasible step: raise what gains most, lower what gains least.
+    """First-order gain of the best feasible step: raise one height and lower another.
 
-    Of heights within bounds, whose mean is held by a shift that every height shares.
+    Heights stay within their bounds, and their mean is fixed by a shift of all heights.
     """
     low, high = slopes[z > -1 + 1e-9], slopes[z < 1 - 1e-9]
     return max(float(high.max() - low.min()), 0.0)
 
 
 def compare() -> list[Pair]:
-    """Most and least of several starts; the gradient at the best against a difference."""
+    """Largest and smallest loss from several starts; the gradient against a finite difference."""
     most = [design(1.0, seed) for seed in SEEDS]
     least = [design(-1.0, seed) for seed in SEEDS]
     pairs = [
@@ -101,7 +102,7 @@ def compare() -> list[Pair]:
 
 
 def draw(path: str, finer: int = 1) -> None:
-    """Heights of most and of least loss, on the array."""
+    """Draw the heights of the largest and the smallest loss as maps of the array."""
     import matplotlib.pyplot as plt
 
     figure, panels = plt.subplots(1, 2, figsize=(7.0, 3.3), layout="constrained", sharey=True)
@@ -114,7 +115,7 @@ def draw(path: str, finer: int = 1) -> None:
         touch = loss.gradient(best[0]).contact.loads > 0
         dots = axes.scatter(*points[touch].T, c=best[0][touch] / FARTHEST, **look)
         rings = {name: look[name] for name in ("edgecolors", "linewidths", "s")}
-        axes.scatter(*points[~touch].T, facecolors="none", **rings)  # these may have any height
+        axes.scatter(*points[~touch].T, facecolors="none", **rings)  # open asperities
         axes.set(
             title=f"{word}: {best[1]:.3f} of equal heights", aspect="equal", xlabel="x / (R / 1000)"
         )
@@ -124,7 +125,7 @@ def draw(path: str, finer: int = 1) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="heights of most and least loss")
+    parser = argparse.ArgumentParser(description="heights of the largest and smallest loss")
     parser.add_argument("--draw", metavar="FILE", help="draw the heights")
     parser.add_argument("--finer", type=int, default=1, help="how many times finer the lattice is")
     given = parser.parse_args()

@@ -1,10 +1,13 @@
-"""How far a load may swing until sliding goes on for ever: the exact limit, and Melan's.
+"""Compute how far a load path may be scaled before sliding never ends, and compare two models.
 
-An asperity slides in every cycle once the level that sticks for ever falls below the load at which
-it first touched. Melan's theorem, for asperities that stick elastically until they slide, puts the
-limit lower: the share of a light contact is that of its whole area, while in truth its edge gives
-way first. Run by hand it also draws maps, shakedown.png and shakedown_map.png.
-`python examples/limits_of_shakedown.py`
+In the exact model an asperity slides in every cycle if the part of the contact that sticks for ever
+is smaller than the contact at which the asperity first touched. Melan's theorem assumes that
+asperities stick elastically until they slide as a whole. Its limit is lower, because it lets a
+lightly loaded asperity take a shear force in proportion to its whole contact area, although in fact
+the edge of its contact slips first. The script also draws the maps shakedown.png and
+shakedown_map.png.
+
+    python examples/limits_of_shakedown.py
 """
 
 import numpy as np
@@ -18,7 +21,7 @@ FRICTION = 0.5
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.0)
     scene = cr.Scene(1.0, asperities, material, friction=FRICTION, geometry="summit")
@@ -31,19 +34,19 @@ def compare() -> Pairs:
     across = np.column_stack((0 * swing, swing))
     vector = cr.shakedown(scene, loads=P, force_amplitudes=across, kind="vector")
 
-    # On first loading the same asperity slides first, and at the same force.
+    # On first loading the same asperity slides first, at the same force.
     onset = cr.onset_of_sliding(contact, which=[last])[0] / (FRICTION * P)
 
-    # Why Melan's limit is lower: P_i (P) <= (P - sigma) P_i'(P), as P_i(s) is convex.
+    # Melan's limit is lower because P_i(P) <= (P - sigma) P_i'(P): P_i(s) is convex.
     step = 1e-4 * P
     ahead, behind = (cr.press(scene, load=P + s).loads[last] for s in (step, -step))
     sigma = P * (1 - exact.factor)
     tangent = contact.loads[last] / ((ahead - behind) / (2 * step))
 
-    # An ellipse about 0.9 P takes L* down by its factor times the root of 0.1^2 + 0.2^2.
+    # An ellipse about 0.9 P lowers L* by its factor times sqrt(0.1^2 + 0.2^2) times 0.9 P.
     ellipse = (1 - sigma / (0.9 * P)) / np.hypot(0.1, 0.2)
 
-    # A cycle 1 % above the limit: ring A slides by what is missing; below, none does.
+    # In a cycle 1 % above the limit ring A slides; 1 % below it no asperity does.
     above = cr.steady(scene, loads=[P, P], forces=1.01 * exact.factor * swing)
     below = cr.steady(scene, loads=[P, P], forces=0.99 * exact.factor * swing)
     return [
@@ -58,7 +61,7 @@ def compare() -> Pairs:
 
 
 def over_both_amplitudes() -> cr.Shakedown:
-    """The same array where load and shear swing, a quarter of a cycle apart."""
+    """Shakedown of the same array if load and shear force vary, a quarter of a cycle apart."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.0), friction=FRICTION, geometry="summit")
     P = 0.9 * cr.press(scene, approach=5e-5).load

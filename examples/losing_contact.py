@@ -1,16 +1,20 @@
-"""An asperity that loses contact as the load rises, though no contact discs overlap.
+"""An asperity that loses contact as the load rises, although no contact discs overlap.
 
-More load brings two rough bodies together, so one expects contacts to be made, not lost. But a
-short asperity amid tall ones is also carried down by them. With all contacts at contact radii a and
-its own still open, its indentation changes with the approach at the rate
+A larger load brings two rough bodies closer together, so one expects asperities to make contact and
+not to lose it. But tall neighbours also displace a short asperity between them. If the neighbours
+have contact radii a_i and the short asperity is open, the derivative of its indentation by the
+approach is
 
     1 - sum_i x_i / r_i,    sum_j K_ij x_j = 1,    K_ii = pi / (2 a_i),  K_ij = 1 / r_ij,
 
-the derivative of w_i(P) = D_i (docs/theory/convexity.md, (1)), r_i its distance from contact i.
-For three equal contacts at distance r it is negative from a = pi r / (2 (3 - 2 / sqrt(3))) on, or
-0.851 r, and their discs first overlap at 0.866 r. Random searches over places and sizes of up to
-seven contacts found no rate below -0.03; a short one is repeated here. So the window is narrow:
-contact is lost only where the model is about to end. `python examples/losing_contact.py`
+the derivative of w_i(P) = D_i (docs/theory/convexity.md, (1)), where r_i is the distance of the
+short asperity from neighbour i. For three equal neighbours at the distance r it is negative if a
+exceeds pi r / (2 (3 - 2 / sqrt(3))) = 0.851 r. Their discs overlap above 0.866 r. Random searches
+over positions and sizes of up to seven neighbours found no derivative below -0.03; this script
+repeats a short one. So an asperity loses contact only if contact discs nearly overlap, where the
+model ends.
+
+    python examples/losing_contact.py
 """
 
 import numpy as np
@@ -24,7 +28,7 @@ Pairs = list[tuple[str, float, float]]
 
 
 def rate(points: Array, radii: Array) -> float:
-    """Of the indentation of an open asperity at the origin, over that of the approach."""
+    """Derivative of the indentation of an open asperity at the origin by the approach."""
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, 2 * radii / np.pi)
     return float(
@@ -33,7 +37,7 @@ def rate(points: Array, radii: Array) -> float:
 
 
 def fits(points: Array, radii: Array) -> bool:
-    """No disc overlaps another, or covers the open asperity."""
+    """True if no disc overlaps another or covers the open asperity."""
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
     near = radii[:, None] + radii[None] <= apart
@@ -41,7 +45,7 @@ def fits(points: Array, radii: Array) -> bool:
 
 
 def least_rate(contacts: int, starts: int = 8, steps: int = 1500) -> float:
-    """The least that a random local search finds for so many contacts."""
+    """The smallest derivative that a random local search finds for this number of contacts."""
     random = np.random.default_rng(contacts)
     least = 1.0
     for _ in range(starts):
@@ -61,7 +65,7 @@ def least_rate(contacts: int, starts: int = 8, steps: int = 1500) -> float:
 
 
 def radius_of_least_gap() -> float:
-    """Contact radius over distance at which the asperity is nearest to touching, from solutions."""
+    """Contact radius over distance at which the gap of the asperity is smallest, from solutions."""
     case = cr.gallery.case("losing-contact-touching")
     asperities, load = case.scene.asperities, float(case.exact_load)
     lower = asperities.heights - 1e-6 * np.array([1.0, 0.0, 0.0, 0.0])
@@ -77,7 +81,7 @@ def radius_of_least_gap() -> float:
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     pairs: Pairs = []
     for stage, touching in (("before", 3), ("touching", 4), ("after", 3)):
         case = cr.gallery.case(f"losing-contact-{stage}")

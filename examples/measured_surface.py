@@ -1,17 +1,18 @@
-"""How good are summits?  A self-affine surface pressed whole, and as its asperities.
+"""Press a self-affine surface as asperities and, pixel by pixel, with boundary elements.
 
-A map of heights becomes asperities: hills that stand out, each a sphere at its top. Boundary
-elements know the map itself, with its ridges, shoulders and valleys. The same sphere presses both
-to the same approach. `convexrough summits MAP --whole` does this for a map of your own.
+The asperity model replaces a map of heights by spheres at its summits. Boundary elements use the
+map itself, with its ridges, shoulders and valleys. The same sphere is pressed on both to the same
+approach. `convexrough summits MAP --whole` does this for a map of your own.
 
     python examples/measured_surface.py --seeds 8
 
-Over eight surfaces at the default pruning the asperities carry 7 to 10 % less at the same approach.
-A single surface is off from that by 6 % (standard deviation, some 5 contacts) to 2 % (some 30).
-They touch on a quarter to a third less area, as shoulders and what was pruned carry, too; the
-heaviest carries 7 to 16 % less. For the same load they need more approach, by 3 to 11 % of the rms
-height. Pixels touch whole or not at all: those of half the width lower the area by a tenth of
-itself, and the load by 1 %.
+Over eight surfaces, at the default pruning, the asperities carry on average 7 to 10 % less load at
+the same approach. The standard deviation between surfaces is 6 % with about 5 contacts and 2 % with
+about 30. The contact area is a quarter to a third smaller, because shoulders and pruned summits
+carry load, too. The largest load is 7 to 16 % smaller. For the same load the asperities need an
+approach that is larger by 3 to 11 % of the rms height. Part of the difference in area is an error
+of the boundary elements, in which a pixel touches as a whole or not at all: with pixels of half the
+width the area is a tenth smaller, and the load 1 % smaller.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ import numpy as np
 
 import convexrough as cr
 
-RADIUS = 1e4  # of the sphere; lengths are in pixels of the scan, and E* = 1
-LOADS = (3.0, 10.0, 30.0)  # on a smooth surface contact would be 56 to 122 pixels wide
+RADIUS = 1e4  # of the sphere; lengths are in pixels, and E* = 1
+LOADS = (3.0, 10.0, 30.0)  # the contact of a smooth surface would be 56 to 122 pixels wide
 
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
 
 class Picture(NamedTuple):
-    """What is asked of both."""
+    """What is compared."""
 
     load: float
     area: float
@@ -40,15 +41,15 @@ class Picture(NamedTuple):
 
 
 def scan(seed: int) -> cr.surface.Surface:
-    """A surface of rms slope 0.1, its shortest wave 8 pixels."""
+    """A surface with an rms slope of 0.1 and a shortest wavelength of 8 pixels."""
     return cr.surface.self_affine(0.8, 0.1, 32.0, seed)
 
 
 def both(seed: int, prune: float) -> list[tuple[Picture, Picture, float]]:
-    """Of one surface at each load: as asperities, whole, and by how much the asperities lag.
+    """The asperity model and the boundary elements of one surface at each load, and the lag.
 
-    The last is the approach that they need for the whole surface's load, less that which it needs,
-    over the rms height.
+    The lag is the additional approach that the asperities need for the load of the whole surface,
+    divided by the rms height.
     """
     surface = scan(seed)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
@@ -64,7 +65,7 @@ def both(seed: int, prune: float) -> list[tuple[Picture, Picture, float]]:
 
 
 def compare(seeds: Sequence[int] = (1, 2, 3)) -> list[Pair]:
-    """Sums over some surfaces at the default pruning: as asperities, and by boundary elements."""
+    """Sums over some surfaces at the default pruning, of asperities and of boundary elements."""
     pictures = np.array([[pair[:2] for pair in both(seed, 0.05)] for seed in seeds])
     pairs = []
     for load, (asperities, exact) in zip(LOADS, pictures.sum(axis=0), strict=True):

@@ -1,8 +1,10 @@
-"""A history with nested loops: what the contact remembers, and what it forgets.
+"""A history with nested loops: which turning points the contact remembers, and which it forgets.
 
-A small loop inside a large one closes on itself; once the force passes the point where it began,
-the contact behaves as if it had never been (return-point memory, wiping out). The energy is the sum
-of the loops. `python examples/nested_loops.py`
+A small loop inside a large one closes. Once the force passes the point where the small loop began,
+the contact behaves as if the small loop had never been (return-point memory). The total energy loss
+is the sum over the loops.
+
+    python examples/nested_loops.py
 """
 
 import numpy as np
@@ -13,7 +15,7 @@ Pairs = list[tuple[str, float, float]]
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025, tip_radius=0.02, within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7
     )
@@ -26,7 +28,7 @@ def compare() -> Pairs:
     plain = cr.history(contact, forces=np.array([0.6, -0.6, 0.6]) * limit)
     nested = cr.history(contact, forces=np.array([0.6, -0.2, 0.3, -0.1, 0.3, -0.6, 0.6]) * limit)
 
-    # Loops inside loops: 0.3 to -0.1 and back inside -0.2 to 0.3, inside 0.6 to -0.6.
+    # The loop from 0.3 to -0.1 is inside that from -0.2 to 0.3, which is inside 0.6 to -0.6.
     outer = cr.cycle(contact, maximum=0.6 * limit).loss
     middle = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.2 * limit).loss
     inner = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.1 * limit).loss

@@ -1,10 +1,13 @@
-"""Normal load and shear that move together: what the order and the phase of loads cost.
+"""Vary normal load and shear force together: how the energy loss depends on their phase.
 
-One smooth sphere first, against the increments of Mindlin and Deresiewicz as Thornton and Yin write
-them, integrated. Then the rough contact: shear in phase with the normal load, and a quarter of a
-cycle behind. A straight line that follows the load costs nothing, a steeper one what a divided
-difference of the energy says. In the end the loss at every phase, with the smooth sphere's beside
-it, which is drawn to phase_losses.png. `python examples/normal_and_shear_together.py`
+First, one smooth sphere is compared with the incremental law of Mindlin and Deresiewicz in the form
+of Thornton and Yin, integrated numerically. Then a rough contact goes through cycles with the shear
+force in phase with the normal load, and a quarter of a cycle behind it. On a straight path with a
+slope below that of friction no energy is lost. On a steeper one the loss has a closed form with
+mean values of D0. At the end, the loss is computed for several phases, together with that of a
+smooth sphere, and drawn to phase_losses.png.
+
+    python examples/normal_and_shear_together.py
 """
 
 import numpy as np
@@ -16,28 +19,28 @@ Pairs = list[tuple[str, float, float]]
 
 FRICTION = 0.5
 MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-RATIO = (2 - 0.3) / (2 * (1 - 0.3))  # tangential over normal compliance
+RATIO = (2 - 0.3) / (2 * (1 - 0.3))  # ratio of tangential to normal compliance
 
 
 def one_sphere() -> Pairs:
-    """Shear that grows twice as fast as friction, on a load that grows too."""
+    """A shear force over f that grows twice as fast as the load, which grows, too."""
     asperity = cr.Asperities(positions=[[0.0, 0.0]], tip_radii=1.0)
     scene = cr.Scene(1.0, asperity, MATERIAL, friction=FRICTION, geometry="summit")
-    first, last, shear = 1e-6, 1.4e-6, 0.8e-6  # P from, P to; T = Q / f in the end
+    first, last, shear = 1e-6, 1.4e-6, 0.8e-6  # first and last P; last T = Q / f
     path = cr.load_path(scene, loads=[first, last], forces=[0.0, FRICTION * shear])
 
-    # dX = (dQ - f dP (1 - th)) / (8 G* a th), th = (L / P)^(1/3), L = P - T the front.
+    # dX = (dQ - f dP (1 - th)) / (8 G* a th), th = (L / P)^(1/3), with the front L = P - T.
     nodes, weights = np.polynomial.legendre.leggauss(60)
     part, weights = (nodes + 1) / 2, weights / 2
     P, T = first + part * (last - first), part * shear
-    radius = np.cbrt(3 * P * 0.5 / 4)  # of contact; the relative radius is 1/2
+    radius = np.cbrt(3 * P * 0.5 / 4)  # contact radius; the relative radius is 1/2
     th = np.cbrt((P - T) / P)
     rate = FRICTION * (shear - (last - first) * (1 - th)) / (2 * radius / RATIO * th)
     return [("one sphere, X by increments", float(path.displacements[-1]), float(rate @ weights))]
 
 
 def rough() -> Pairs:
-    """Three cycles between the same loads and the same shear forces, in different phase."""
+    """Three cycles between the same loads: a steep line, a gentle line, and an ellipse."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
     P = cr.press(scene, approach=4e-5).load
@@ -52,7 +55,7 @@ def rough() -> Pairs:
     )
     behind = cr.steady(scene, loads=loads, forces=forces)
 
-    # The line, in closed form: mean slopes of V, which are means of D0.
+    # The closed form for a straight path has means of D0.
     def mean(low: float, high: float, panels: int = 12) -> float:
         nodes, weights = np.polynomial.legendre.leggauss(4)
         ends = np.linspace(low, high, panels + 1)
@@ -71,7 +74,7 @@ def rough() -> Pairs:
 
 
 def against_phase() -> cr.PhaseLosses:
-    """The same cycle at every phase, of three sizes, and the smooth sphere's beside it."""
+    """Losses of the cycle for several phases and two sizes, and those of a smooth sphere."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
     P = cr.press(scene, approach=4e-5).load
@@ -87,11 +90,11 @@ def against_phase() -> cr.PhaseLosses:
 
 
 def phases() -> Pairs:
-    """Phase matters more than roughness: in step a cycle costs a fraction of what it can cost."""
+    """Phase matters more than roughness: in phase, a cycle loses a fraction of the largest loss."""
     losses = against_phase()
     P, p, t = losses.load, losses.load_amplitude, losses.force_amplitude / FRICTION
 
-    def mean(low: float, high: float) -> float:  # of D0 = (3 L / 4)^(2/3), V = (3/5) L D0
+    def mean(low: float, high: float) -> float:  # mean of D0 = (3 L / 4)^(2/3); V = (3/5) L D0
         ends = np.array([low, high])
         return float(np.diff(0.6 * ends * (0.75 * ends) ** (2 / 3))[0] / (high - low))
 
@@ -103,12 +106,12 @@ def phases() -> Pairs:
         ("smooth sphere in step, loss / closed form", losses.smooth[whole][3] / in_step, 1.0),
         ("quarter behind, stuck level / P", losses.levels[whole][0] / P, 1 - reach[0]),
         ("30 degrees, stuck level / P", losses.levels[whole][1] / P, 1 - reach[1]),
-        ("costs more in step than 30 degrees off", float(losses.losses[10] > losses.losses[8]), 0),
+        ("in phase more loss than at 30 degrees", float(losses.losses[10] > losses.losses[8]), 0),
     ]
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     return one_sphere() + rough() + phases()
 
 

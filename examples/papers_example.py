@@ -1,8 +1,10 @@
-"""The source paper's example: press, shear, cycle, and its numbers beside ours.
+"""The example of Dini and Hills (2009): press, shear, cycle, and compare with their numbers.
 
-Dini and Hills (2009) press a sphere on a hexagonal array of asperities and shear it by half of what
-friction can bear. They solve it with a commercial nonlinear solver and a guessed active set; here
-nothing is guessed, and every word is proved. `python examples/papers_example.py`
+They press a sphere on a hexagonal array of asperities, and shear it by half of the limiting shear
+force. They solve the equations with a commercial nonlinear solver, starting from a guess of the
+asperities that touch. Here nothing is guessed, and every status is proved.
+
+    python examples/papers_example.py
 """
 
 import numpy as np
@@ -13,22 +15,22 @@ Pairs = list[tuple[str, float, float]]
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference): the paper's counts, and an independent computation."""
+    """Return (quantity, computed value, reference value), from the paper and independently."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     scene = cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")
 
-    # One convex program, solved; and its active set, proved by code that knows no solver.
+    # Solve the convex program. The certificate proves which asperities touch, for any solver.
     contact = cr.press(scene, approach=5e-5)
     assert contact.certificate.holds
 
-    # Half of gross sliding. The pressed state is the certified starting point.
+    # Shear by half of the limiting force.
     limit = 0.5 * contact.load
     half = cr.shear(contact, force=0.5 * limit)
     assert half.certificate.holds
     onsets = cr.onset_of_sliding(contact) / limit
 
-    # What a cycle of that amplitude costs, against a smooth sphere under the same load.
+    # The energy loss of a cycle of this amplitude, and that of a smooth sphere under this load.
     cycle = cr.cycle(contact, maximum=0.5 * limit)
     return [
         ("asperities in contact", float((contact.status == "contact").sum()), 37),

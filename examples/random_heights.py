@@ -1,12 +1,14 @@
-"""How the statistics of heights change the loss of a cycle, at equal load.
+"""Compute how random heights change the energy loss of a cycle at a given load.
 
-With equal heights the rough contact loses less than a smooth sphere at small amplitudes and more at
-large ones. Random heights put the load on fewer asperities and leave some with little; those slide
-early, and the loss rises at every amplitude, most at small ones. The means over eight surfaces for
-four spreads are printed by `python examples/random_heights.py`.
+With equal heights the rough contact loses less energy than a smooth sphere at small amplitudes, and
+more at large ones. With random heights fewer asperities carry the load, and some carry little.
+These slide at small forces, so the loss increases at every amplitude, most of all at small ones.
+The script prints means over eight surfaces for four standard deviations of the heights.
 
-Each loss is checked against the indentation curve of the same surface alone: eight c_t f^2 times
-the error of the trapezoid rule on it, which knows nothing of shear.
+    python examples/random_heights.py
+
+Each loss is checked against the indentation curve of the same surface: it must be 8 c_t f^2 times
+the error of the trapezoid rule on this curve, which is computed without shear.
 """
 
 import numpy as np
@@ -21,7 +23,7 @@ FRACTIONS = np.array([0.1, 0.3, 0.5, 0.8])
 
 
 def surface(height_std: float, seed: int) -> cr.Scene:
-    """Asperities of equal tips, at heights of this standard deviation."""
+    """A scene with equal tips and random heights of this standard deviation."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025, tip_radius=0.02, within=0.0152, height_std=height_std, seed=seed
     )
@@ -46,7 +48,7 @@ def loss_from_indentation(scene: cr.Scene, fraction: float) -> float:
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference): losses of single surfaces in both ways."""
+    """Return (quantity, computed value, reference value) of losses of single surfaces."""
     pairs = []
     for spread in SPREADS:
         scene = surface(spread, seed=0)
@@ -61,7 +63,7 @@ def compare() -> Pairs:
 
 
 def mean_losses(height_std: float, surfaces: int = 8) -> list[float]:
-    """Loss over that of the smooth sphere, at FRACTIONS of f P: the mean over some surfaces."""
+    """Mean over surfaces of the loss at FRACTIONS of f P, divided by that of the smooth sphere."""
     ratios = []
     for seed in range(surfaces):
         contact = cr.press(surface(height_std, seed), load=LOAD)

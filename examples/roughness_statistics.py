@@ -1,20 +1,22 @@
-"""What random heights and tip radii do to the loss of a cycle: statistics of many surfaces.
+"""Compute statistics of the energy loss of many surfaces with random heights and tip radii.
 
-With equal asperities the rough contact loses less than a smooth sphere at small shear forces and
-more at large ones; the two cross at one amplitude, which the source paper finds for its example.
-Its authors announce "variation in asperity heights and tip radii" as the next step: this is it.
-Each surface is drawn at random, pressed with one load and cycled at many amplitudes, all certified.
+With equal asperities a rough contact loses less energy than a smooth sphere at small shear forces,
+and more at large ones. The amplitude at which both lose the same is called the crossing here. Dini
+and Hills (2009) found it for their example, and named "variation in asperity heights and tip radii"
+as the next step. This script takes that step: each surface is random, pressed with one load, and
+cycled at many amplitudes; all states are certified.
 
-    python examples/roughness_statistics.py 10000 bands.png     # so many surfaces, and the figure
+    python examples/roughness_statistics.py 10000 bands.png     # number of surfaces, and the figure
 
-Found with 10,000 surfaces: the crossing of equal asperities, 0.385 of f P, hardly moves in the
-median, but it scatters: heights with a standard deviation of 1e-6 R (2 % of the approach) put 90 %
-of the surfaces between 0.32 and 0.49. From 2e-6 R on some surfaces have none, at 4e-6 R 45 % of
-them: their lightly loaded asperities slide early, and they lose more than the smooth sphere at
-every amplitude. Tip radii that scatter by 20 % alone move it between 0.37 and 0.42.
+With 10,000 surfaces the median of the crossing is near that of equal asperities, 0.385 of f P. But
+it varies between surfaces: with a standard deviation of the heights of 1e-6 R (2 % of the
+approach), 90 % of the surfaces have it between 0.32 and 0.49. From 2e-6 R on, some surfaces have no
+crossing, and at 4e-6 R 45 % have none: their lightly loaded asperities slide at small forces, and
+they lose more than the smooth sphere at every amplitude. With equal heights and tip radii that vary
+by 20 %, the crossing is between 0.37 and 0.42.
 
-References: the crossing of the array of equal asperities, by bisection; that of one random surface,
-likewise; and a loss from the indentation curve of one surface, which knows nothing of shear.
+The references are the crossings of the array of equal asperities and of one random surface, both by
+bisection, and a loss from the indentation curve of one surface, which is computed without shear.
 """
 
 import sys
@@ -39,7 +41,7 @@ LOSSES = [f"loss_over_smooth_{x!r}" for x in AMPLITUDES]
 
 
 def sweep_tables(surfaces: int) -> dict[str, Any]:
-    """About so many surfaces, as many for each spread of heights and of tip radii."""
+    """Tables of a sweep over about this number of surfaces, equally many for each spread."""
     return {
         "sphere": {"radius": 1.0},
         "material": {"contact_modulus": 1.0, "poisson_ratio": NU},
@@ -67,7 +69,8 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
 def crossings(ratios: Array) -> Array:
     """(n,) the amplitude at which each curve (n, m) of loss over smooth loss passes 1; nan if none.
 
-    The last one, by monotone cubics through the logarithms.
+    If there are several, it is the largest. Curves are interpolated by monotone cubics of the
+    logarithms.
     """
     found = np.full(len(ratios), np.nan)
     x = np.log(AMPLITUDES)
@@ -79,7 +82,7 @@ def crossings(ratios: Array) -> Array:
 
 
 def surface(height_std: float, tip_radius_cv: float, seed: int) -> cr.Contact:
-    """One of the surfaces, pressed."""
+    """The pressed contact of one of the surfaces."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025,
         tip_radius=0.02,
@@ -94,7 +97,7 @@ def surface(height_std: float, tip_radius_cv: float, seed: int) -> cr.Contact:
 
 
 def crossing_by_bisection(contact: cr.Contact) -> float:
-    """Where the loss of a cycle is that of the smooth sphere."""
+    """The amplitude at which the loss of a cycle equals that of the smooth sphere."""
 
     def beyond(amplitude: float) -> float:
         cycle = cr.cycle(contact, maximum=amplitude * FRICTION * contact.load)
@@ -121,8 +124,8 @@ def measured(surfaces: int, executor: Executor | None = None) -> cr.SweepTable:
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference), of few surfaces."""
-    with ThreadPoolExecutor(1) as here:  # in this process: processes cost more than 20 surfaces
+    """Return (quantity, computed value, reference value), from few surfaces."""
+    with ThreadPoolExecutor(1) as here:  # starting processes takes longer than 20 surfaces
         columns = measured(20, here).read()
     ratios = np.column_stack([columns[name] for name in LOSSES])
     pairs = []
@@ -140,7 +143,7 @@ def compare() -> Pairs:
 
 
 def draw(table: cr.SweepTable, path: str) -> None:
-    """Left: loss over that of the smooth sphere against amplitude. Right: where it passes 1."""
+    """Draw the loss over the smooth sphere's against amplitude (left), and the crossing (right)."""
     from matplotlib.figure import Figure
 
     columns = table.read()

@@ -1,10 +1,11 @@
-"""How sure is a loss whose heights are known to some digits?  First order, and where it fails.
+"""Estimate the scatter of a loss from its gradient, and find where the estimate fails.
 
-Heights scatter independently with a standard deviation. To first order the loss scatters by that
-times the length of its gradient: no sampling at all. This holds as long as the deviation is small
-beside the least gap and the least indentation. Beyond, asperities make and lose contact, and first
-order says too little; but it is still a good control variate: its mean is known, so subtract it
-from every sample and only what it does not explain is left to average.
+The heights vary independently with a standard deviation. To first order, the standard deviation of
+the loss is that of the heights times the length of the gradient of the loss. This needs no
+sampling. It holds as long as the deviation of the heights is small compared with the smallest gap
+and the smallest indentation. Above that, asperities make and lose contact, and the estimate is too
+small. But the first-order term is still a good control variate: its mean is known, so subtract it
+from every sample and average only the remainder.
 
     python examples/scatter_of_heights.py --samples 400
 """
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 import convexrough as cr
 
 Array = NDArray[np.float64]
-Pair = tuple[str, float, float]  # what it is, computed, reference
+Pair = tuple[str, float, float]  # name, computed value, reference value
 
 LOAD, FRICTION, FRACTION = 3.60853389e-7, 0.5, 0.5
 SMALL, LARGE = 1e-7, 1e-6  # [length] 0.2 % and 2 % of the approach
@@ -39,7 +40,7 @@ def loss(heights: Array) -> cr.Cycle:
 
 
 def sampled(deviation: float, samples: int) -> tuple[Array, Array]:
-    """Losses of random heights, and what first order says of each; over that of equal heights."""
+    """Losses for random heights, and first-order estimates, over the loss of equal heights."""
     equal = loss(np.zeros(61))
     slopes = equal.gradient(holding="load").heights
     rng = np.random.default_rng(0)
@@ -48,25 +49,25 @@ def sampled(deviation: float, samples: int) -> tuple[Array, Array]:
     return found / equal.loss, 1.0 + heights @ slopes / equal.loss
 
 
-def foretold(deviation: float) -> float:
-    """The standard deviation to first order."""
+def estimated(deviation: float) -> float:
+    """The standard deviation of the loss to first order."""
     equal = loss(np.zeros(61))
     length = np.linalg.norm(equal.gradient(holding="load").heights)
     return float(deviation * length / equal.loss)
 
 
 def unexplained(found: Array, first_order: Array) -> float:
-    """The part of the standard deviation that a control variate leaves."""
+    """The fraction of the standard deviation that remains with the control variate."""
     centred, known = found - found.mean(), first_order - first_order.mean()
     rest = centred - (centred @ known) / (known @ known) * known
     return float(rest.std() / centred.std())
 
 
 def compare(samples: int = 60) -> list[Pair]:
-    """First order holds for small scatter and not for large; as a control variate it helps both."""
+    """The first order is right for small deviations only; a control variate helps for both."""
     small, large = sampled(SMALL, samples), sampled(LARGE, samples)
     return [
-        ("small: deviation over foretold", small[0].std() / small[1].std(), 1.0),
+        ("small: deviation over estimate", small[0].std() / small[1].std(), 1.0),
         ("small: left by a control variate, below 0.1", float(unexplained(*small) < 0.1), 1.0),
         ("large: first order fails by a fifth", float(large[1].std() < 0.85 * large[0].std()), 1.0),
         ("large: left by a control variate, below 0.8", float(unexplained(*large) < 0.8), 1.0),
@@ -80,7 +81,7 @@ def main() -> None:
     for deviation in (SMALL, LARGE):
         found, first = sampled(deviation, samples)
         print(f"heights {deviation:g}: loss {found.mean():.4f} of that of equal ones")
-        print(f"  deviation  {found.std():.4f}, foretold {foretold(deviation):.4f}")
+        print(f"  deviation  {found.std():.4f}, estimate {estimated(deviation):.4f}")
         print(f"  left by a control variate  {unexplained(found, first):.2f} of it")
 
 

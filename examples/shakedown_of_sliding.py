@@ -1,9 +1,11 @@
-"""Partial reversal: sliding on first loading that never comes back.
+"""Shakedown: asperities that slide on first loading and never again.
 
-Load to 0.6 of gross sliding: the outer asperities slide. Then let the force swing by less than
-twice the force at which the first of them slid. From the first reversal on all of them stick in
-part: the sliding has shaken down, though the force at its maximum is as large as before.
-`python examples/shakedown_of_sliding.py`
+Shear the contact to 0.6 of the limiting force: the outer asperities slide. Then let the force
+alternate with a range below twice the force at which the first of them slid. From the first
+reversal on, all of them stick in part. The sliding has ended, although the largest force is as
+large as before.
+
+    python examples/shakedown_of_sliding.py
 """
 
 import numpy as np
@@ -14,7 +16,7 @@ Pairs = list[tuple[str, float, float]]
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     contact = cr.press(
@@ -27,10 +29,10 @@ def compare() -> Pairs:
     below = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 1.99 * amplitude)
     above = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 2.01 * amplitude)
 
-    # Only the range matters once the cycle is steady, not the mean.
+    # In a steady cycle only the range of the force matters, not its mean.
     centred = cr.cycle(contact, maximum=0.995 * amplitude)
 
-    # The same from the history: between visits of the maximum, slips do not change.
+    # The history agrees: from one maximum to the next, slips do not change.
     low = 0.6 * limit - 1.99 * amplitude
     history = cr.history(contact, forces=[0.6 * limit, low, 0.6 * limit, low])
     moved = np.abs(np.diff(history.slips, axis=0)).max() / history.slips.max()

@@ -1,7 +1,9 @@
-"""Judge loads from somewhere else: how wrong they are, and which of their claims hold.
+"""Check loads from another source: how large their errors are, and which claims are right.
 
-The loads of a colleague come with six digits, those of an old program with one asperity forgotten.
-The certificate needs to know nothing of either. `python examples/verify_anyones_loads.py`
+The first loads are rounded to six digits. In the second, the load of one asperity is missing. The
+certificate does not depend on how loads were computed.
+
+    python examples/verify_anyones_loads.py
 """
 
 import numpy as np
@@ -12,7 +14,7 @@ Pairs = list[tuple[str, float, float]]
 
 
 def compare() -> Pairs:
-    """(quantity, computed, reference)."""
+    """Return (quantity, computed value, reference value)."""
     material = cr.Material.from_youngs(210e9, 0.3)  # steel, SI units
     asperities = cr.Asperities.hexagonal(
         spacing=25e-6, tip_radius=2e-4, within=126e-6, height_std=1e-8, seed=1
@@ -20,11 +22,11 @@ def compare() -> Pairs:
     scene = cr.Scene(0.01, asperities, material, geometry="summit")
     contact = cr.press(scene, approach=0.5e-6)
 
-    # Six digits: every word can still be proved, and the bound is of the size of the rounding.
+    # Six digits: every status is proved, and the error bound has the size of the rounding.
     six = np.array([float(f"{load:.5e}") for load in contact.loads])
     rounded = cr.certify(scene, six, approach=0.5e-6)
 
-    # One asperity forgotten: it is proved to touch all the same, and the bound is what it carries.
+    # One load missing: its asperity is proved to touch, and its error bound is the missing load.
     forgotten = contact.loads.copy()
     forgotten[3] = 0.0
     caught = cr.certify(scene, forgotten, approach=0.5e-6)
@@ -41,8 +43,8 @@ def compare() -> Pairs:
             float(rounded.load_error < 1e-4 * six.max()),
             1.0,
         ),
-        ("one forgotten: noticed", float(missing), 1.0),
-        ("one forgotten: its bound", caught.load_errors[3], contact.loads[3]),
+        ("one load missing: detected", float(missing), 1.0),
+        ("one load missing: its bound", caught.load_errors[3], contact.loads[3]),
     ]
 
 

@@ -7,6 +7,7 @@ marked `sample(n)` only n of its cases run, drawn anew each time; `--full` runs 
 import os
 import random
 from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -90,3 +91,17 @@ def command(
         return Outcome(status, *capsys.readouterr())
 
     return call
+
+
+class Here(ThreadPoolExecutor):
+    """In place of processes, which need a second each to start; other tests start some."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        super().__init__(1)
+        self.workers = 1
+
+
+@pytest.fixture
+def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("pool", "sweep"):
+        monkeypatch.setattr(f"convexrough.sweeps.{module}.Processes", Here)

@@ -43,6 +43,8 @@ def runs(block: Block) -> bool:
     return block.why_not is None and block.language not in DIRECTIVES
 
 
+@pytest.mark.usefixtures("no_processes")
+@pytest.mark.sample(10)
 @pytest.mark.parametrize(
     "page",
     [page for page in PAGES if any(map(runs, blocks(page)))],
@@ -120,6 +122,7 @@ def test_every_test_that_the_guarantees_name_is_there() -> None:
     assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))
 
 
+LONG = {"design.png", "design-fine.png"}
 DRAWING = runpy.run_path(str(ROOT / "docs/figures.py"))["drawings"]()
 
 
@@ -129,13 +132,14 @@ def test_one_command_draws_the_figures_of_the_pages() -> None:
     assert {*DRAWING} | measured == {path.name for path in (ROOT / "docs/figures").iterdir()}
 
 
-@pytest.mark.parametrize("name", sorted(DRAWING.keys() - {"design-fine.png"}))
+@pytest.mark.parametrize("name", sorted(DRAWING.keys() - LONG))
 @pytest.mark.sample(1)
 def test_each_figure_is_drawn(name: str, tmp_path: Path) -> None:
     DRAWING[name](tmp_path / name)
     assert (tmp_path / name).stat().st_size > 10_000
 
 
-@pytest.mark.sample(0)  # a minute, of Python's: only with --full
-def test_the_finest_design_is_drawn(tmp_path: Path) -> None:
-    test_each_figure_is_drawn("design-fine.png", tmp_path)
+@pytest.mark.sample(0)  # a minute and ten seconds: only with --full
+@pytest.mark.parametrize("name", sorted(LONG))
+def test_long_figures_are_drawn(name: str, tmp_path: Path) -> None:
+    test_each_figure_is_drawn(name, tmp_path)

@@ -53,6 +53,7 @@ def wrong(call: str) -> Any:
         ("cr.press(scene, load='1')", "load: found '1', expected a positive number"),
         ("cr.press(scene, approach=5e-5, solver=cr.solvers.Newton)", "found the class Newton"),
         ("cr.press(scene, approach=5e-5, solver='connic')", 'expected one of "newton", "conic"'),
+        ("cr.verify([0.0], scene, approach=5e-5)", "scene: found type list, expected a Scene"),
         ("cr.certify(scene.asperities, [1.0], approach=5e-5)", "expected a Scene"),
         ("cr.certify(scene, ['1'] * 61, approach=5e-5)", r"loads: found \['1'.*expected numbers"),
         ("cr.Scene(1.0, scene.asperities, cr.Material)", "found the class Material, expected a M"),

@@ -184,16 +184,6 @@ def test_errors_pass_between_processes(error: cr.ConvexroughError) -> None:
     assert repr(vars(again)) == repr(vars(error))
 
 
-def test_a_pickled_contact_goes_on() -> None:
-    contact = results()["Contact"]
-    again = pickle.loads(pickle.dumps(contact))
-    assert "_cache" in vars(contact)
-    assert "_cache" not in vars(again)  # what is made from a contact is made again, not carried
-    force = 0.25 * contact.load
-    state = cr.shear(again, force=force)
-    np.testing.assert_array_equal(state.forces, results()["ShearState"].forces)
-
-
 def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
     """Every array that a result says it has, by the name of one value."""
     arrays = result._along.values() if hasattr(result, "_along") else ()
@@ -230,23 +220,6 @@ def test_data_frames_and_data_sets_have_the_arrays() -> None:
             held["load"][0] = -1.0  # a copy: the result stays as it is
 
 
-def test_asperities_can_be_found_by_name() -> None:
-    contact, past = results()["Contact"], results()["LoadPath"]
-    x, y = contact.scene.asperities.positions.T
-    frame = contact.to_dataframe()
-    np.testing.assert_array_equal(frame["x"], x)
-    np.testing.assert_array_equal(frame["y"], y)
-    assert frame.query("status == 'contact'")["load"].sum() == pytest.approx(contact.load)
-    held = past.to_xarray()
-    assert dict(held.sizes) == {"point": 2, "asperity": 61}
-    np.testing.assert_array_equal(held["force"].sel(point=1), past.forces[1])
-    loop = results()["Loop"]
-    own = loop.to_xarray()["asperity_force"].sel(asperity=3)
-    np.testing.assert_array_equal(own, loop.asperity_forces[:, 1])
-    vector = results()["VectorShearState"]
-    np.testing.assert_array_equal(vector.to_xarray()["slip"].sel(direction="y"), vector.slips[:, 1])
-
-
 @pytest.mark.parametrize("extra", ["pandas", "xarray"])
 def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, extra, None)
@@ -278,9 +251,12 @@ PUBLIC = [name for name in cr.__all__ if hasattr(getattr(cr, name), "__module__"
 MODULES = sorted(
     {getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"}
     | {getattr(cr.surface, name).__module__ for name in cr.surface.__all__}
+    | {"convexrough.gallery.cases", "convexrough.gallery.any_size"}
 )
 
 
+@pytest.mark.usefixtures("no_processes")
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("module", MODULES)
 def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)
@@ -298,8 +274,3 @@ def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
         runner.run(test)
     assert runner.tries > 0
     assert runner.failures == 0
-
-
-def test_every_public_name_has_an_example() -> None:
-    for name in PUBLIC:
-        assert name.endswith("Error") or "\n    >>> " in (getattr(cr, name).__doc__ or ""), name

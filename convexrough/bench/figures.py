@@ -14,7 +14,7 @@ from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.bench.scenes import FAMILIES, Family
 from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, UNSURE, label
 
-#: Marker, line, face and colour of each solver: no two alike in grey.
+#: Marker, line, face and colour of each solver, all different in grey.
 LOOKS: dict[str, dict[str, Any]] = {
     "newton": dict(marker="o", color=ROUGH, ms=7, mew=1.2, zorder=5),
     "newton, dense": dict(marker="o", color="0.35", mfc="white", ms=6, zorder=4),
@@ -33,7 +33,7 @@ MARKERS: dict[Family, str] = {"lattice": "o", "rough": "^", "scattered": "s"}
 
 COLUMNS = 3
 
-#: Smaller errors, such as 0, are shown as this on the logarithmic axis.
+#: Smaller errors, such as 0, are drawn at this value of the logarithmic axis.
 EXACT = 1e-17
 
 
@@ -41,7 +41,7 @@ def bench_figures(bench: Bench) -> dict[str, Figure]:
     """The figures of the measurements, by file name without extension.
 
     "work-precision" : time against true error, a panel for each scene, the frontier in grey
-    "cost"           : time of a press against the number of asperities
+    "cost"           : time to press a scene against the number of asperities
     """
     return {"work-precision": work_figure(bench), "cost": cost_figure(bench)}
 
@@ -92,7 +92,7 @@ def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
 
 
 def cost_figure(bench: Bench) -> Figure:
-    """Time of a press against size, on log-log axes, with the fitted exponent and slope 1."""
+    """Time to press a scene against size, on log-log axes, with the fitted exponent and slope 1."""
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log")

@@ -27,8 +27,7 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
 
-#: Largest proved error, relative to the largest load, of loads that serve as a reference: two
-#: roundoffs.
+#: Largest proved error of reference loads, over the largest load: two roundoffs.
 ACCURATE = 2.0**-52
 
 #: Least and largest number of runs, of which the fastest counts; `patience` [s] limits the number.
@@ -42,7 +41,7 @@ CORNERS = np.array(
     [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
 )
 
-#: Amplitudes of a loss curve, over f P.
+#: Amplitudes of a loss curve, over the friction limit.
 PARTS_OF_LIMIT = np.linspace(0.02, 0.98, 49)
 
 Make = Callable[[], Scene]
@@ -52,7 +51,7 @@ Make = Callable[[], Scene]
 class Attempt:
     """One point of the diagram of time against error.
 
-    solver    : name of the method;  setting : description of its settings
+    solver    : name of the method;  setting : description of the settings
     settings  : the solver;  influence : compliance operator; None for the cheapest
     most      : largest number of asperities for which it is run
     """
@@ -76,7 +75,7 @@ def _pressed(scene: Scene) -> Contact:
 
 
 def _bearable(contact: Contact) -> float:
-    """f P."""
+    """The friction limit f P."""
     return checks.friction(contact.scene.friction) * contact.load
 
 
@@ -111,12 +110,12 @@ class Reference(NamedTuple):
     bound: float
 
     def error(self, loads: Array) -> float:
-        """max |P - P_ref| / max P_ref, of loads (n,) [force]."""
+        """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
         return float(np.abs(loads - self.loads).max() / self.loads.max())
 
 
 def reference(scene: Scene, approach: float) -> Reference:
-    """The loads at an approach. Raises SolverError if the proof does not make them a reference."""
+    """Accurate loads at an approach. Raises SolverError if they are not proved accurate."""
     contact = press(scene, approach=approach)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
@@ -128,11 +127,11 @@ def reference(scene: Scene, approach: float) -> Reference:
 def measure_attempt(
     family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
 ) -> Row:
-    """The row of an attempt: least time of assembling and solving, in runs of `patience` [s]."""
+    """The row of an attempt: the least time to assemble and solve, from runs of `patience` [s]."""
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
-        """The solution of a newly assembled problem, because operators cache what they compute."""
+        """The solution of a new problem, because operators cache what they compute."""
         problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
         return problem, attempt.settings.solve(problem)
 
@@ -141,7 +140,7 @@ def measure_attempt(
         return row
     problem, solution = found
     loads = np.zeros(len(scene))
-    loads[problem.candidates] = solution.loads * problem.units.force  # a power of two
+    loads[problem.candidates] = solution.loads * problem.units.force  # exact, by a power of two
     return replace(
         row,
         touching=int(np.count_nonzero(loads)),
@@ -162,7 +161,7 @@ def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
 
 
 def measure_sweep(size: int, scenes: int, workers: int) -> Row:
-    """The row of a sweep over random heights with a cycle each; the time is that of one scene."""
+    """The row of a sweep over random heights, with a cycle each; the time is per scene."""
     from convexrough.sweeps.sweep import sweep
 
     a = 1.0 / REFINEMENTS[size]
@@ -186,7 +185,6 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
 def _timed(
     row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
 ) -> tuple[Row, Any]:
-    """The row with time and memory, and the first result; None where the work raises an error."""
     memory = MemoryRise()
     try:
         found = work(prepare())
@@ -214,8 +212,8 @@ def least(
 def plain_product(scene: Scene) -> float:
     """[s] the time of the Fourier transforms of one product with the lattice operator.
 
-    They are scipy's, in float64 on all cores, on the box of sites of the asperities, padded to
-    twice its size: the least of `PRODUCTS` times, after a first product. nan without a lattice.
+    It is the least of `PRODUCTS` times of scipy's transforms in float64 on all cores, on the box of
+    sites padded to twice its size; nan without a lattice.
     """
     from scipy import fft
 

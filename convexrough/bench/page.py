@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
-#: Tasks with a column of seconds, in addition to those of a press.
+#: Tasks with a column of seconds, in addition to "press".
 OTHERS = [task for task in TASKS if task not in ("press", "from nothing")]
 
 
@@ -61,7 +61,7 @@ def machine_line(bench: Bench) -> str:
 
 
 def size_table(bench: Bench) -> list[list[str]]:
-    """A heading and a row for each scene: seconds of each task; for a press also plain products."""
+    """A heading and a row for each scene: seconds of each task, and of a press also in products."""
     on = f"in products on {bench.machine['cores']} cores"
     heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *OTHERS]
     table = [[*heading, "MB", "proved error"]]
@@ -80,7 +80,6 @@ def size_table(bench: Bench) -> list[list[str]]:
 
 
 def _messages(bench: Bench) -> list[str]:
-    """Sentences: the conclusions, the time of a scene in sweeps, and the reasons of failures."""
     lines = bench.verdicts()
     for row in bench.rows:
         if row.task == "sweep":
@@ -93,7 +92,7 @@ def _messages(bench: Bench) -> list[str]:
 
 
 def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None) -> list[Path]:
-    """Write bench.json, rows.csv, the figures and the page, if one is given; return the paths.
+    """Write bench.json, rows.csv, the figures and, if given, the page; return the paths.
 
     Raises FileError; files already written remain.
     """
@@ -116,7 +115,6 @@ def _drawn(bench: Bench) -> dict[str, Figure]:
 
 
 def _renew(page: Path, bench: Bench) -> list[Path]:
-    """Write the figures, then the page that shows them; return the paths."""
     before, after = split_page(page)
     folder, written = page.parent / "figures", []
     with file_errors(folder, "be made"):

@@ -45,12 +45,12 @@ class Profile(Table):
         return ratios
 
     def part(self, factor: float) -> Array:
-        """(k,) part of the cases answered rightly within this factor of the least time."""
+        """(k,) part of the cases answered correctly within this factor of the least time."""
         part: Array = (self.ratios <= factor).mean(axis=1)
         return part
 
     def rows(self) -> list[list[str]]:
-        """A heading, and a line for each solver: outcomes, and parts within FACTORS."""
+        """A heading, and a line for each solver: outcomes, and parts within `FACTORS`."""
         outcomes = ("right", "wrong", "refused", "failed")
         parts = np.array([self.part(factor) for factor in FACTORS]).T
         heading = ["solver", *outcomes, *(f"within {factor}x" for factor in FACTORS)]
@@ -100,9 +100,9 @@ def profile_of(
 ) -> Profile:
     """Times and outcomes of solvers on the hard cases, run once each.
 
-    solvers : settings objects; default: every solver of `compare`. Newton's method is always first
+    solvers : solver objects; default: every solver of `compare`. Newton's method is always first
     cases   : names of cases or families; default: all
-    within  : largest error of right loads, over the largest load
+    within  : largest error of correct loads, over the largest load
     """
     others = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)

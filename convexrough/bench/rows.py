@@ -28,7 +28,7 @@ class Row:
     outcome : "refused": the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
     product : [s] the unit of `products`, from `measure.plain_product`; nan without a lattice
-    error   : max |P - P_ref| / max P_ref;  bound : proved bound on the largest relative error
+    error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
     memory  : [bytes] largest increase of the memory of the process; None where unknown
     """
 
@@ -82,13 +82,13 @@ class Bench:
         return found
 
     def presses(self, family: Family, least: int = 0) -> list[Row]:
-        """Answered presses of a family with at least so many asperities."""
+        """Rows of "press" with an answer, of a family and at least so many asperities."""
         wanted = "press", family, "answered"
         rows = [row for row in self.rows if (row.task, row.family, row.outcome) == wanted]
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """b if the time of a press grows as n^b with n asperities; nan for fewer than two sizes."""
+        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes."""
         large = self.presses(family, FITTED_FROM)
         return exponent([row.asperities for row in large], [row.seconds for row in large])
 
@@ -136,10 +136,7 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """The points at least as accurate as the default, and faster by more than `NOISE`.
-
-    If the default has no answer, all points.
-    """
+    """Points as accurate as the default and faster by more than `NOISE`; all without it."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:

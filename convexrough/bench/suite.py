@@ -25,7 +25,7 @@ from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 Sizes = tuple[tuple[Family, int], ...]
 
-#: How often the default solver and solvers that seem to be faster are timed again, alternately.
+#: Number of times that the default solver and apparently faster ones are timed again.
 ROUNDS = 4
 
 #: Compliance operators for Newton's method, with the largest number of asperities for each.
@@ -92,7 +92,7 @@ def run(*, quick: bool) -> Bench:
     """The measurements of the whole list, or of a quick run."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
-    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # so that imports are not timed
+    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # excludes imports from times
         with suppress(InputError, SolverError):  # `_panel` reports such errors
             press(scene("lattice", 1.0), approach=APPROACH, solver=solver)
     for family, size in WORK[:3] if quick else WORK:
@@ -109,11 +109,7 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """The rows of all attempts on one scene.
-
-    The default solver and the solvers that seem to be faster are timed again, alternately. Each
-    keeps its least time, so that a short load on the machine does not change the order.
-    """
+    """The rows of all attempts on one scene; apparently faster ones are timed again."""
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)

@@ -1,4 +1,4 @@
-"""`compare`: every solver on one scene."""
+"""`compare`: the results of every solver on one scene."""
 
 from __future__ import annotations
 

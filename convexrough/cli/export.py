@@ -1,4 +1,4 @@
-"""`export`: a scene as programs for other solvers."""
+"""`export`: optimisation problems of a scene for other solvers."""
 
 from __future__ import annotations
 

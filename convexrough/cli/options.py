@@ -14,7 +14,7 @@ PATH = click.Path(path_type=Path)
 proof_option = click.option(
     "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
 )
-#: What figures can be saved as.
+#: Formats of figures.
 FORMATS = ("png", "svg", "pdf")
 solver_option = click.option(
     "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
@@ -31,14 +31,14 @@ json_option = click.option(
 
 
 def _from_here(given: tuple[Any, ...]) -> Any:
-    """What was given for --solver; modules of this folder can then be imported."""
+    """The solvers of --solver; from here on modules of the current folder can be imported."""
     if given[-1] and "" not in sys.path:
         sys.path.insert(0, "")
     return given[-1]
 
 
 def figure_options(command: Command) -> Command:
-    """How figures are saved: `formats`, a tuple, and `dpi`."""
+    """Add the options for figures: `formats`, a tuple, and `dpi`."""
     for option in (
         click.option("--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
                      help="Pixels per inch of figures."),
@@ -58,7 +58,7 @@ def _formats(given: str) -> tuple[str, ...]:
 
 
 def output_options(command: Command) -> Command:
-    """The options of every command that writes a folder of results."""
+    """Add the options of every command that writes a folder of results."""
     for option in (
         json_option,
         force_option,

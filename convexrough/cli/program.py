@@ -38,7 +38,7 @@ from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError, WorkerError
 from convexrough.version import __version__
 
-#: What a shell sets that wants a script for completion, or the completions of a line.
+#: The variable that a shell sets to ask for a completion script or the completions of a line.
 COMPLETE = "_CONVEXROUGH_COMPLETE"
 
 
@@ -47,8 +47,8 @@ COMPLETE = "_CONVEXROUGH_COMPLETE"
 def program() -> None:
     """Compute rough frictional contact, with a proof of which asperities touch.
 
-    Exit status: 0 done, everything proved; 1 standard output closed or full; 2 wrong input; 3 done,
-    not everything proved; 4 a solver failed; 130 interrupted.
+    Exit status: 0 done, everything proved; 1 output closed or full, or a proof refused; 2 wrong
+    input; 3 done, not everything proved; 4 a solver failed; 130 interrupted.
     """
 
 
@@ -74,17 +74,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 say_aside("error", line)
             stopped = isinstance(error, (SolverError, WorkerError))
             return SOLVER_FAILED if stopped else WRONG_INPUT
-        except OSError as error:  # those of files are FileErrors
+        except OSError as error:  # from standard output, as files raise FileError
             return _unheard(error)
         except Exception:
             if not interrupts:
                 raise
-            say_aside("interrupted")  # in compiled code, which made another error of it
+            say_aside("interrupted")  # compiled code raised another error
             return INTERRUPTED
 
 
 def _status(arguments: Sequence[str] | None) -> int:
-    """Of one command, or of a shell that asks for completions."""
     if arguments is None and (asked := os.environ.get(COMPLETE)):
         return shell_complete(program, {}, "convexrough", COMPLETE, asked)
     given = sys.argv[1:] if arguments is None else list(arguments)
@@ -97,7 +96,7 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """Signals of Ctrl-C while the body runs; each also raises KeyboardInterrupt, as ever."""
+    """Signals of Ctrl-C while the body runs; each also raises KeyboardInterrupt as usual."""
     seen: list[int] = []
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or current_thread() is not main_thread():
@@ -116,10 +115,10 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _unheard(error: OSError) -> int:
-    """The exit status where standard output is closed or full; result files are complete."""
+    """The exit status if standard output is closed or full; result files are complete."""
     if error.errno != errno.EPIPE:
         say_aside("error", f"standard output: {error.strerror or error}")
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)  # so that what is left is not written when the interpreter ends
+    os.dup2(nowhere, 1)  # unwritten output is dropped at exit
     os.close(nowhere)
     return UNHEARD

@@ -1,4 +1,4 @@
-"""Output of commands, and their exit status."""
+"""Output of commands, and their exit statuses."""
 
 from __future__ import annotations
 

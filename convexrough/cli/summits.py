@@ -29,21 +29,21 @@ if TYPE_CHECKING:
 
 
 def map_options(command: Command) -> Command:
-    """Options for reading the file of a map."""
+    """Add the options for reading the file of a map."""
     for option in (
         click.option("--fill", is_flag=True, help="Fill holes in the map and report them."),
         click.option("--detrend", type=click.Choice(["plane", "sphere", "none"]), default="plane",
                      show_default=True, help="Form to remove before finding summits."),
         click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different."),
         click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ..."),
-        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file has none."),
+        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file states none."),
     ):  # fmt: skip
         command = option(command)
     return command
 
 
 def press_options(command: Command) -> Command:
-    """Options for pressing the summits."""
+    """Add the options for pressing the summits."""
     for option in (
         click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load."),
         click.option("--load", metavar="P", type=float, help="Prescribed load."),
@@ -138,7 +138,7 @@ def _claim(path: Path, force: bool) -> None:
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """Write the table that a scene file reads, the curve and the figures; return the paths."""
+    """Write the table of summits, the results against pruning and the figures; return paths."""
     from convexrough.run.results import write_figures, write_tables
     from convexrough.surface.report import curve_columns, summit_columns
 
@@ -199,7 +199,7 @@ def _pressing(
     load: float | None,
     modulus: float | None,
 ) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
-    """The surface in the scene's unit, and how to press on its summits; None for not at all."""
+    """The surface in the scene's unit, and a function that presses, or None without a sphere."""
     if scene is not None:
         from convexrough.run.scene_file import read_scene, read_units
 

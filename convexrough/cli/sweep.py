@@ -1,4 +1,4 @@
-"""`sweep`: many scenes, by processes here or workers anywhere; or what is known of them so far."""
+"""`sweep`: compute many scenes with local processes or Dask, or print a summary of the results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
-    """K/N: the K-th of N parts, from 1."""
+    """The pair (K, N) of K/N: the K-th of N shares of the scenes, from 1."""
     if value is None:
         return None
     k, _, n = value.partition("/")
@@ -39,9 +39,9 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
 @json_option
-@click.option("--part", metavar="K/N", callback=_part, help="Compute only the K-th of N parts.")
+@click.option("--part", metavar="K/N", callback=_part, help="Compute only the K-th of N shares.")
 @force_option
-@click.option("--resume", is_flag=True, help="Compute the missing parts.")
+@click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
 @click.option(
     "--scheduler", metavar="ADDRESS", help='Dask scheduler: tcp://..., a file, or "local".'
 )
@@ -66,11 +66,13 @@ def sweep(
 ) -> int:
     """Compute every scene of a sweep file.
 
-    Results go to the folder SWEEP-sweep unless --out names another. --summary DIR prints
-    quantiles of the results in DIR instead; with --out it also writes them, and figures.
+    Results go to a folder named after the file (rough.toml: rough-sweep) unless --out names
+    another. --summary DIR prints quantiles of the results in DIR instead; with --out it also writes
+    them, and figures.
 
-    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or a
-    worker died; 130 interrupted. Completed parts are kept, and --resume continues.
+    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or
+    workers died twice with the same scenes; 130 interrupted. Completed parts are kept, and --resume
+    continues.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 
 
 def claim_options(command: Command) -> Command:
-    """Options for the questions of `verify` and for reading files."""
+    """Add the options for the questions of `verify` and for reading files."""
     called = "Header or number (from 1) of the column with load, x, y, ..."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
         force_option,
         out_option,
         click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
-        click.option("--shear-force", metavar="Q", type=float, help="Prescribed shear force."),
+        click.option("--shear-force", metavar="Q", type=float, help="Prescribed total of FORCES."),
         click.option("--shear", metavar="FORCES", type=PATH,
                      help="Also check the shear forces in this file."),
         click.option("--nodes", is_flag=True,
@@ -70,7 +70,6 @@ def claim_options(command: Command) -> Command:
 
 
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
-    """The settings for reading files, from the options."""
     from convexrough.checks import finite
     from convexrough.tabular.table import KINDS, named_columns
     from convexrough.verdict.claims import Manner
@@ -140,7 +139,7 @@ def verify(
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
             raise FileError(f"{each}: exists already; --force replaces it")
-        each.unlink(missing_ok=True)  # so that no earlier proof stands beside a failure
+        each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
     with ExitStack() as stack:
         stack.enter_context(_reported(junit))
         file = read_scene(scene)
@@ -196,7 +195,6 @@ def _reported(path: Path | None) -> Iterator[None]:
 
 
 def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Path]:
-    """Write verdict.json, verdict.csv and the figures; return the paths."""
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
     from convexrough.run.results import write_figures, write_json, write_tables
     from convexrough.verdict.report import asperity_columns
@@ -210,7 +208,6 @@ def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Pat
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
-    """The proof of the claimed loads."""
     from convexrough.proof import prove
 
     verdict = found.verdict

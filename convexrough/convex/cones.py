@@ -1,20 +1,8 @@
 """Powers of a number between 0 and 1 as second-order cones.
 
-For t in [0, 1] a *lift* stands for the powers of t by linear variables
-
-    y2, y3, y4, y5 for t^2, ..., t^5    and    z for t^5 - t^6,
-
-(and y1 for t in the five-cone form), tied to each other by rotated cones x y >= w^2, x, y >= 0:
-
-    four cones                                     five cones
-    1 * y4              >= y2^2                    (1 - y1) * (y2 - y3)  >= (y1 - y2)^2
-    (y2 - y3)(y4 - y5)  >= (y3 - y4)^2             (y1 - y2)(y3 - y4)    >= (y2 - y3)^2
-    y3 * y5             >= y4^2                    and the last three of the four
-    (y3 - y4) * z       >= (y4 - y5)^2
-
-Over them, min (3/5 - S/3) y5 + (S/3) z at fixed y3 = t^3 is (3/5) t^5 - (S/3) t^6 exactly: for
-0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five.
-docs/theory/exact-cones.md, "Why it is exact".
+A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
+the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
+the four cones (1) and the five cones (2), and "Why it is exact" the limits of the number S.
 """
 
 from __future__ import annotations
@@ -29,7 +17,7 @@ from convexrough.arrays import Array, Indices
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-#: The largest S at which the four cones are exact, and the largest at which five are.
+#: The largest S for which four cones are exact, and the largest for which five cones are.
 FOUR_CONES_LIMIT, FIVE_CONES_LIMIT = 21 / 25, 1.0
 
 # Each cone x y >= w^2 as a row for x, y and w, in the columns 1, y1, y2, y3, y4, y5, z.
@@ -57,14 +45,14 @@ class ConeRows(NamedTuple):
 
 
 def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
-    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones; all lifts at once.
+    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones.
 
-    lifts : columns, (n,) each, of y2, y3, y4, y5, z (four-cone form), or of y1, y2, y3, y4, y5, z
-        (five-cone form), among all variables of the program
-    width : how many variables the program has
+    lifts : the columns of y2, y3, y4, y5 and z, (n,) each, for four cones; those of y1, ..., y5 and
+        z for five cones
+    width : number of variables of the program
     ones  : (n,) columns of variables that replace the constant 1 in the cones of each lift
 
-    Rows are grouped by lift: the cones of the first, three rows each, then those of the second.
+    Rows are grouped by lift, with three rows per cone.
     """
     from scipy.sparse import csc_array  # 0.1 s to import: only when solving
 

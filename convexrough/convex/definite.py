@@ -1,20 +1,9 @@
 """Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
 
-The proof (Demmel; Rump, BIT 46 (2006) 433). If the factorisation of a computed (n, n) matrix C
-with a positive diagonal succeeds, its factor R satisfies R'R = C + E with
-|E_ij| <= g / (1 - g) (C_ii C_jj)^(1/2), g = (n + 1) u / (1 - (n + 1) u) and u the roundoff. The
-right side is a matrix of rank one and norm g / (1 - g) trace C, and R'R >= 0. So
-
-    C >= -(n + 2) u trace C    where 2 (n + 1) (n + 2) u <= 1: for all n that fit into memory.
-
-Let C be M off the diagonal and 1 - mu - s on it, and let each computed entry of M have a relative
-error of at most e. The norm of the errors is at most their largest row sum. With trace C <= n,
-
-    s >= e max_i sum_j |M_ij| + (n + 2) n u    proves    I + M >= mu I.
-
-The code takes 1.1 s, which covers the rounding errors of the sums, of s and of the diagonal.
-Entries that are not finite, and overflow, make the diagonal of the factor nan or infinite. LAPACK
-need not report that, so the diagonal is checked.
+docs/theory/certificate.md, "Which box", 2, gives the proof for an (n, n) matrix in float64. It
+needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u, which is true if the matrix fits in memory.
+LAPACK need not report overflow or entries that are not finite. These make the diagonal of the
+factor nan or infinite, so the diagonal is checked.
 """
 
 from __future__ import annotations
@@ -29,7 +18,7 @@ from convexrough.roundoff import ROUNDOFF
 
 
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
-    """The largest of the margins (in increasing order) that is proved, by bisection; else 0."""
+    """The largest of the increasing margins for which `proved` is true, by bisection; else 0."""
     low, high = -1, len(margins)
     middle = 0  # first the smallest: if no margin is proved, one test is enough
     while high - low > 1:
@@ -42,7 +31,7 @@ def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
 
 
 def is_definite(matrix: Array) -> bool:
-    """True if Cholesky's factorisation of a symmetric matrix succeeds, which is no proof yet."""
+    """True if Cholesky's factorisation of a symmetric matrix succeeds; not a proof by itself."""
     from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only when asked
 
     # The transpose of a symmetric matrix is equal to it and has LAPACK's memory order.
@@ -53,9 +42,9 @@ def is_definite(matrix: Array) -> bool:
 def proved_margin(
     couplings: Array, margins: Sequence[float], entry_error: float, spare: float = 0.0
 ) -> float:
-    """The first margin mu for which  I + M >= (mu + spare) I  is proved as above; else 0.
+    """The first margin mu for which  I + M >= (mu + spare) I  is proved, else 0.
 
-    couplings   : (n, n) M as computed, symmetric, 0 on its diagonal
+    couplings   : (n, n) computed symmetric M, with 0 on the diagonal
     margins     : each from 0 to 1
     entry_error : e, bound on the relative error of each entry
     """
@@ -79,14 +68,15 @@ def proved_sparse_margin(
 ) -> float:
     """The largest margin mu for which  S >= mu I  is proved for a sparse symmetric S; else 0.
 
-    diagonal : (n,);  pairs, values, errors : indices of entries above the diagonal, the entries,
-        and bounds on their errors
+    diagonal : (n,)
+    pairs, values, errors : indices of entries above the diagonal, the entries, and bounds on their
+        errors
     margins  : in increasing order
 
-    By elimination without exchange of rows: the computed L and U satisfy S = L U + E with
-    |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3). If the
-    diagonal D of U is positive, S - L D L' = E + L (U - D L') is symmetric, so that its norm is at
-    most its largest row sum.
+    1. Elimination without exchange of rows gives L and U with S = L U + E and
+       |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3).
+    2. Let the diagonal D of U be positive. Then S - L D L' = E + L (U - D L') is symmetric, so its
+       norm is at most its largest row sum.
     """
     from scipy.sparse import coo_array
 
@@ -106,7 +96,7 @@ def proved_sparse_margin(
 
 
 def _elimination_slack(matrix: Any) -> float:
-    """e such that  matrix >= -e I  is proved; infinite if the elimination fails."""
+    """A number e for which  matrix >= -e I  is proved; infinite if the elimination fails."""
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 

@@ -1,14 +1,14 @@
-"""Newton's method on a normal map, with a line search on the energy, for every law of contact.
+"""Newton's method on a normal map, with a line search on the energy, for all laws of contact.
 
-Pressing, shear and vector friction lead to the same equation. Forces p(eta) are a monotone function
-of the local displacements eta of the asperities, and with the compliance operator A the law is
+Pressing, shear and vector friction lead to the same equation. The forces p(eta) are a monotone
+function of the local displacements eta of the asperities. With the compliance operator A and the
+prescribed displacements X, the law is
 
     F(eta) = eta + A p(eta) - X = 0.
 
 F is continuously differentiable, so no active set is guessed. F = 0 is the first-order condition of
-an energy Phi(p), convex in the convex range. A step d solves F + F' d = 0 to a given tolerance and
-is halved until Phi decreases enough (docs/theory/newton.md). A `Law` defines p, A and Phi; this
-module contains the stopping rule, the tolerance of each step and the line search.
+an energy Phi(p). A step d solves F + F' d = 0 to a given tolerance and is halved until Phi
+decreases enough (docs/theory/newton.md). A `Law` defines p, A and Phi.
 """
 
 from __future__ import annotations
@@ -40,8 +40,12 @@ SHORTEST = 1e-12
 class Iterate(Protocol):
     """A point of the iteration.
 
-    unknown  : eta;  forces : p(eta), moved onto the constraints;  defect : F
-    energy   : Phi(p);  residual : the largest |F|;  scale : residuals are relative to it
+    unknown  : eta
+    forces   : p(eta), projected onto the constraints
+    defect   : F
+    energy   : Phi(p)
+    residual : the largest |F|
+    scale    : the unit of residuals
     """
 
     @property
@@ -62,9 +66,9 @@ Point = TypeVar("Point", bound=Iterate)
 
 
 class Law(Protocol[Point]):
-    """What Newton's method needs of a law of contact.
+    """A law of contact, as Newton's method needs it.
 
-    solver : the solver that errors name;  unit : the name of the scale of residuals
+    solver, unit : names of the solver and of the unit of residuals, for error messages
     """
 
     @property
@@ -73,7 +77,7 @@ class Law(Protocol[Point]):
     def unit(self) -> str: ...
 
     def evaluate(self, unknown: Array) -> Point | None:
-        """The state at eta, moved onto the constraints; None where that fails."""
+        """The state at eta, projected onto the constraints; None if the projection fails."""
         ...
 
     def direction(self, state: Point, left: float) -> Array:
@@ -99,13 +103,13 @@ class Law(Protocol[Point]):
 
 @dataclass(frozen=True)
 class Stopping:
-    """When Newton's method ends.
+    """The conditions that end Newton's method. Residuals are relative to their scale.
 
-    accurate  : largest residual of an answer, over its scale, unless `tolerance` is larger
-    tolerance : residual, over its scale, at which the method ends at once; 0 for the least possible
+    accurate  : largest residual of an answer, unless `tolerance` is larger
+    tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
-    linear    : 2-norm of a defect: the method also ends, without the next step, if that step is
-        expected to leave no more than this, because one linear correction will do; 0 for never
+    linear    : the method also ends if the next step is expected to leave a defect of at most this
+        2-norm; the caller then makes one linear correction. 0: never
     """
 
     accurate: float
@@ -123,11 +127,12 @@ def solve(
 ) -> tuple[Point, int]:
     """The final state, and the number of steps.
 
-    before : 2-norm of an estimated defect one step before the start, to choose the first tolerance
+    before : 2-norm of an estimated defect one step before the start; it sets the first tolerance
 
-    The method ends if  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  if
-    the defect is below `noise` or a step does not halve the residual (the better of the two states
-    is returned); or by `Stopping.linear`. Raises SolverError after `most` steps.
+    The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
+    residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does
+    not halve the residual; then the better of the two states is returned. Raises SolverError after
+    `most` steps.
     """
     for step in range(1, stopping.most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
@@ -157,7 +162,6 @@ def solve(
 
 
 def _relative(state: Iterate) -> float:
-    """The residual over its scale."""
     return state.residual / state.scale if state.scale != 0 else np.inf
 
 

@@ -3,14 +3,12 @@
 The normal maps of pressing and of shear have the Jacobian I + A diag(c), c >= 0. With
 W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The normal map")
 
-    d = beta - F - A W y,     (I + W A W) y = W (beta - F),
+    d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-where beta is 0, or such that the loads keep their sum: sum W y = 0. The matrix is the Hessian of
-the energy, scaled by its local part. It is positive definite in the convex range, and its row is
-that of the identity where c is 0, so loads of 0 are allowed. Conjugate gradients also return A W y,
-and so the step d of every asperity, touching or not.
-
-If the matrix is not positive definite, the shells are added, which make it so for any layout.
+The number beta is 0, or the one for which the loads keep their sum: sum W y = 0. The matrix is
+positive definite where the energy is convex. Otherwise shells are added to the diagonal of A, which
+make it so. Conjugate gradients also return A W y, and so the step of every asperity, touching or
+not.
 """
 
 from __future__ import annotations
@@ -24,15 +22,15 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
-#: Number of touching asperities up to which a Cholesky factor is cheapest, with a stored matrix and
-#: without. Heuristics, from timings.
+#: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with a
+#: stored matrix and without. Heuristics, from timings.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
 #: Least relative residual that conjugate gradients reach in single and in double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
-#: Conjugate gradients also end if (r'M r)^(1/2) falls by this factor times the limit. The factor is
-#: below 1 because r consists mostly of short waves, which contribute little to A W r.
+#: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, has
+#: decreased by this factor times the limit.
 ENERGY = 1e-2
 
 MOST_ITERATIONS = 500
@@ -49,11 +47,12 @@ def correct(
     balanced: bool,
     tolerance: float,
 ) -> Array:
-    """(n,) d, one Newton step: (1) of docs/theory/newton.md.
+    """(n,) the Newton step d: (1) of docs/theory/newton.md.
 
-    root      : (n,) W, 0 where open;  defect : (n,) F
-    balanced  : keep the sum of the loads
-    tolerance : largest 2-norm of F + F' d over that of F, unless the system is factorised
+    root      : (n,) diagonal of W, 0 where open
+    defect    : (n,) F
+    balanced  : True to keep the sum of the loads
+    tolerance : largest 2-norm of F + F' d, divided by that of F; a factorisation ignores it
 
     Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
@@ -151,8 +150,8 @@ def _iterate(
 class _Smoothed:
     """The preconditioner M; if balanced, projected onto the plane sum W y = 0.
 
-    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is projected as
-    well, and `shift` sums its corrections, so that single precision does not lose small residuals.
+    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. The residual is
+    projected, too, and `shift` is the sum of its corrections, so that single precision is enough.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
@@ -161,7 +160,7 @@ class _Smoothed:
         self.weight = 0.0 if self.border is None else float(w @ self.border)
 
     def __call__(self, residual: Values) -> tuple[Values, float, float]:
-        """M r of the projected r, and for the given r the 2-norm of A W r, and r' M r."""
+        """M r of the projected residual, and |A W r| and r' M r of the given residual r."""
         z, left = self.smooth(residual)
         whole = float(residual @ z)
         if self.border is not None:

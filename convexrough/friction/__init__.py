@@ -1,1 +1,1 @@
-"""Friction in one direction: all of it is normal solutions at two or more total loads."""
+"""Friction in one direction, computed from normal solutions at two or more total loads."""

@@ -1,8 +1,9 @@
 """The elastic energy of one asperity after a step, in pieces that cones represent exactly.
 
-W(T), the integral of the asperity's deflection over its shear force T, is convex. It consists of a
-stuck piece, and of a slipping piece for each sign and each old layer in which the slip front may
-end: docs/theory/without-order.md, "The step as one cone program".
+The energy W(T) is the integral of the deflection of the asperity over its shear force T. It is
+convex and consists of one stuck piece, and of a slipping piece for each direction of slip and each
+old layer in which the slip front may end: docs/theory/without-order.md, "The step as one cone
+program".
 """
 
 from __future__ import annotations
@@ -15,17 +16,17 @@ from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.sphere import hertz
 
-#: A piece has LIFT variables: its weight, y1, ..., y5 and z. The others are positions among them.
+#: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5 and Z are their positions.
 LIFT, Y3, Y5, Z = 7, 3, 5, 6
 
-#: Layers thinner than this part of the load are left out: they carry less than the solver's error.
+#: Layers thinner than this fraction of the load are omitted: the solver's error is larger.
 THIN = 1e-9
 
 
 class ConePiece(NamedTuple):
-    """A piece of W. Forces are in units of the asperity's load N_b, displacements of k N_b^(2/3).
+    """A piece of W. The unit of forces is the load N of the asperity, of lengths k N^(2/3).
 
-    A slipping piece has L = N / N_b from low to high,  T = force - rate L,  the deflection
+    A slipping piece has the front L from low to high,  T = force - rate L,  the deflection
     own - rate L^(2/3)  and  W = own T + (3/5) rate^2 L^(5/3) + energy. A stuck piece has rate 0,
     |T - force| <= high  and  W = own (T - force) + (T - force)^2 softness / 2 + energy.
     """
@@ -52,12 +53,12 @@ class ConePiece(NamedTuple):
         return self.own - self.rate * float(np.cbrt(level)) ** 2
 
     def distance(self, force: float) -> float:
-        """The distance of a force from the piece; 0 on it."""
+        """The distance of a force from the range of forces of the piece."""
         low, high = self.forces()
         return max(low - force, force - high, 0.0)
 
     def objective(self, shift: float) -> Array:
-        """(LIFT,) coefficients of W - shift T^2 / 2 in the variables of a piece; t^6 = y5 - z."""
+        """(LIFT,) coefficients of W - shift T^2 / 2 in the variables of a piece."""
         found = np.zeros(LIFT)
         found[0] = self.energy - shift * self.force**2 / 2.0
         if self.rate == 0.0:
@@ -79,7 +80,11 @@ class ConePiece(NamedTuple):
 
 
 def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
-    """The pieces of an asperity with this old curve, at its new indentation `own` > 0."""
+    """The pieces of an asperity with this memory curve before the step.
+
+    own : its indentation after the step, positive
+    k   : its coefficient of Hertz's law
+    """
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
     old, heights = ([float(each) for each in of] for of in (curve.levels, curve.heights))

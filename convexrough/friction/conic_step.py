@@ -1,10 +1,10 @@
 """The general step as one second-order cone program: a check of Newton's method and of the rules.
 
-The energy W(T) of each asperity consists of the pieces of `conic_pieces`. The cones of
-`convexrough.convex.cones` represent each piece exactly, and W is the convex hull of the pieces:
-piece j has a weight w_j, which replaces the 1 in its cones. The weights of an asperity add up to 1,
-and the forces and energies of its pieces to those of the asperity. Displacements are in units of
-c_t f, forces of f: docs/theory/without-order.md, "The step as one cone program".
+The cones of `convexrough.convex.cones` represent each piece of the energy W(T) of an asperity
+(`conic_pieces`) exactly, and W is the convex hull of its pieces. Piece j has a weight w_j, which
+replaces the 1 in its cones. The weights of an asperity add up to 1, and the forces and energies of
+its pieces to those of the asperity. Displacements are in units of c_t f and forces in units of f:
+docs/theory/without-order.md, "The step as one cone program".
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from convexrough.sphere import hertz
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
-#: Tolerance of Clarabel, and the part of the way to the boundary of the cones that a step takes.
+#: Tolerance of Clarabel, and largest part of the way to the cones' boundary that one step takes.
 TOLERANCE, STEP = 1e-11, 0.9
 
 
@@ -50,13 +50,14 @@ class ConicStepper(Stepper):
 
 @dataclass(frozen=True, eq=False)
 class StepProgram:
-    """The cone program of one step, for the n asperities that touch after it.
+    """The cone program of one step, for the n asperities that touch after the step.
 
-    total  : sum of their shear forces;  which : (n,) their indices in the scene
-    loads, own : (n,) loads N_b and indentations after the step
+    total  : sum of the shear forces of these asperities
+    which  : (n,) indices of the asperities in the scene
+    loads, own : (n,) loads N_i and indentations after the step
     parts  : (n,) p_i, the fraction of the step during which the asperity touches
     shells : (n,) diagonal that makes the coupling positive semidefinite
-    pieces : position of the asperity among the n, and a piece of its energy
+    pieces : pairs of an asperity (its index among the n) and a piece of its energy
     """
 
     stepper: Stepper
@@ -99,19 +100,19 @@ class StepProgram:
 
     @property
     def energies(self) -> Array:
-        """(n,) the units of W_i / p_i."""
+        """(n,) the unit of W_i / p_i."""
         return np.asarray(self.loads * self.own / self.parts)
 
     @property
     def shifts(self) -> Array:
-        """(n,) D_i in the units of the pieces: two thirds of S_i."""
+        """(n,) the shells in the units of the pieces."""
         return np.asarray(self.shells * self.loads * self.parts / self.own)
 
     def apply(self) -> ConeProgram:
         """The program for Clarabel, in T_i / N_i and the variables of each piece.
 
-        Of these a stuck piece uses three: its weight, y3 for the difference of the force from the
-        middle of the piece, and y5 for the square of this difference over the weight.
+        A stuck piece uses three of its variables: the weight; y3, the force minus the force in the
+        middle of the piece; and y5, the square of y3 divided by the weight.
         """
         from scipy import sparse  # 0.1 s to import: only when solving
 
@@ -140,7 +141,7 @@ class StepProgram:
         )
 
     def _equalities(self, width: int) -> csc_matrix:
-        """Rows for the total force, and for the sums of weights and of forces of each asperity."""
+        """Rows for the total force, then for the sums of weights and of forces of each asperity."""
         from scipy.sparse import csc_matrix
 
         n = len(self.which)
@@ -187,7 +188,7 @@ class StepProgram:
         return forces, float(-raw.multipliers[0]) * unit / float(self.loads.sum())
 
     def deflections(self, forces: Array) -> Array:
-        """(N,) own deflections under these forces, each from the nearest piece."""
+        """(N,) own deflections of all asperities under these forces, from the nearest pieces."""
         found = np.zeros(len(forces))
         for place, i in enumerate(self.which):
             part = float(forces[i] / self.loads[place])

@@ -1,17 +1,10 @@
 """The memory curve: the tangential state under varying normal load, as plane geometry.
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
-after any path of (P, T) is one polygon from (0, 0) to the present point, no steeper than 45
-degrees: heights Th(s) over levels 0 <= s <= P. A contact loaded along this polygon would reach the
-same state without slip. A straight segment of the path changes the polygon by one of three rules:
-
-- if P rises and T changes no faster, everything sticks: the segment is appended;
-- if the path runs back along the curve, nothing slips: the curve gets shorter;
-- else the contact slips, with sign c = +-1, from the top down to the *front* L: below L the curve
-  is kept, and a straight line of slope c joins it to the new point.
-
-Derived in docs/theory/paths.md, "The rules". The rules do not depend on elasticity. All numbers are
-rational, as float64 numbers are, and every rule is exact.
+after any path of (P, T) is a polygon: heights Th(s) over load levels 0 <= s <= P, from (0, 0) to
+the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes it by one
+of the three rules of docs/theory/paths.md, "The rules". The rules do not depend on elasticity. All
+numbers are rational, as float64 numbers are, and every rule is exact.
 """
 
 from __future__ import annotations
@@ -31,10 +24,12 @@ from convexrough.record import Along, Table, in_text
 
 
 class Piece(NamedTuple):
-    """The way of the slip front down through one old layer; the load changes linearly on it.
+    """A part of a segment on which the slip front falls through one layer (segment) of the curve.
 
-    sign   : c of the slip;  slope : th of the layer; the loss is proportional to 1 - c th
-    top, bottom : levels L of the front before and after;  load_before, load_after : P
+    sign   : c of the slip
+    slope  : slope th of the layer; the loss is proportional to 1 - c th
+    top, bottom : [force] levels of the front before and after
+    load_before, load_after : [force] P before and after; it changes linearly with the level
     """
 
     sign: int
@@ -46,15 +41,16 @@ class Piece(NamedTuple):
 
     @property
     def load_constant(self) -> bool:
-        """True if P does not change."""
         return self.load_before == self.load_after
 
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Plottable):
-    """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
+    """A state after a path: a polygon over load levels, as in docs/theory/paths.md.
 
-    front : level L of the slip front at the end of the last segment; None if nothing slips there
+    levels, heights : (m + 1,) [force] coordinates s and Th of the vertices, from the origin
+    slopes : (m,) slope of each layer, between a vertex and the next
+    front  : [force] level of the slip front at the end of the last segment; None if nothing slips
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])
@@ -70,17 +66,17 @@ class MemoryCurve(Table, Plottable):
 
     @classmethod
     def pressed(cls, load: Fraction | float) -> MemoryCurve:
-        """The state of a contact pressed to a load without shear."""
+        """The state of a contact that was pressed to a load [force] without shear."""
         return cls().go(load, 0)[0]
 
     @property
     def load(self) -> Fraction:
-        """The load P, at the last vertex."""
+        """[force] the load P, at the last vertex."""
         return self.levels[-1]
 
     @property
     def height(self) -> Fraction:
-        """T = Q / f, at the last vertex."""
+        """[force] T = Q / f, at the last vertex."""
         return self.heights[-1]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
@@ -101,9 +97,10 @@ class MemoryCurve(Table, Plottable):
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:
-        """(s_k, th_(k-1) - th_k) at each vertex; below the origin and above the top the slope is 0.
+        """The level of each vertex, and the slope below it minus the slope above it.
 
-        The state is the sum of these bends times the normal solutions at their levels.
+        The slope is 0 below the first and above the last vertex. The state is the sum of the normal
+        solutions at the levels, multiplied by these bends.
         """
         slopes = (Fraction(0), *self.slopes, Fraction(0))
         bends = [below - above for below, above in pairwise(slopes)]
@@ -112,7 +109,7 @@ class MemoryCurve(Table, Plottable):
     def go(
         self, load: Fraction | float, height: Fraction | float
     ) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after a straight segment to (P, T), and the pieces of its loss.
+        """The state after a straight segment to (P, T) [force], and the pieces of its loss.
 
         Raises InputError if |T| > P, which friction does not allow.
         """
@@ -133,7 +130,7 @@ class MemoryCurve(Table, Plottable):
             return self._with(shear / added, load, height), []
         if added >= 0:
             return self._slip(1 if shear > 0 else -1, load, height)
-        lean = shear - self.slopes[-1] * added  # positive if the path leaves above the old curve
+        lean = shear - self.slopes[-1] * added  # positive if the path starts above the old curve
         sign = 1 if lean > 0 else -1
         if lean == 0:
             return self._run_back(load, height), []
@@ -148,10 +145,7 @@ class MemoryCurve(Table, Plottable):
         return below._with(self.slopes[last], load, height)
 
     def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
-        """The point where a falling segment meets the old curve again; else the segment's end.
-
-        The state forgets the curve above this point.
-        """
+        """The point where a segment of falling load meets the old curve again, or else its end."""
         direction = (height - self.height) / (load - self.load)
         over = Fraction(0)  # sign times (path - old curve)
         for k in reversed(range(len(self.slopes))):
@@ -166,10 +160,10 @@ class MemoryCurve(Table, Plottable):
         return load, height
 
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after slip of this sign on the segment, and the layers that the front crosses.
+        """The state after slip of this sign on the segment, and the pieces of its loss.
 
-        The line of slope c that ends at the moving point reaches the lower end of a layer after a
-        `part` of the segment, linear in the level. It passes layers of slope c at once.
+        The line of slope c through the moving point reaches the lower end of a layer after a `part`
+        of the segment, which is linear in the level. It passes layers of slope c at once.
         """
         added = load - self.load
         rate = (height - self.height) - sign * added
@@ -202,7 +196,7 @@ class MemoryCurve(Table, Plottable):
         return MemoryCurve(self.levels[part], self.heights[part], self.slopes[:vertex])
 
     def _with(self, slope: Fraction, load: Fraction, height: Fraction) -> MemoryCurve:
-        """The curve with one more layer, up to a point; layers of equal slope are merged."""
+        """The curve with one more layer, up to (load, height); layers of equal slope are merged."""
         count = len(self.slopes)
         if count and self.slopes[-1] == slope:
             count -= 1

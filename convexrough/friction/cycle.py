@@ -1,11 +1,10 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
-The load is P, the shear force Q, the coefficient of friction f, and T = Q / f. Let m+ and m- be the
-least P + T and the least P - T along the path. From the second cycle on, the memory curve passes
-through the point with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. At levels below L* nothing
-slips again; above it the state repeats and does not depend on the path before. At constant load the
-loss is a multiple of the error of the trapezoid rule on the curve of approach against load, between
-L* and P (docs/theory/losses.md).
+The path is a closed curve of the load P and the shear force Q. With the coefficient of friction f,
+let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. From the second
+cycle on, every memory curve (docs/theory/paths.md) passes through the point L* = (m+ + m-) / 2,
+T* = (m+ - m-) / 2. The curve below L* never changes again. Above L* it repeats in each cycle and
+does not depend on the start. docs/theory/losses.md derives the loss.
 """
 
 from __future__ import annotations
@@ -45,8 +44,8 @@ from convexrough.sphere.smooth import smooth_reference
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Number of cells into which the path of the slip fronts is divided where the load varies. The loss
-#: of each asperity is then accurate to about 0.1 %.
+#: Where the load varies, integrals over the slip front are cut into about this many cells in all.
+#: The loss of each asperity is then accurate to about 0.1 %.
 CELLS = 64
 
 
@@ -54,30 +53,33 @@ CELLS = 64
 class Cycle(Table, Plottable):
     """The steady state of a closed path of load and shear force that is repeated.
 
-    Arrays with one value per asperity are (n,), in the order of the scene.
+    Arrays with one value per asperity are (n,), in the order of the scene. An error bound is
+    infinite where nothing is proved. f is the coefficient of friction.
 
     contact          : the contact, pressed with the highest load of the path
     loads, forces    : (m,) [force] load P and shear force Q at the points of the path
     loss             : [force length] energy lost per cycle by both bodies, from the second cycle on
     loss_first       : [force length] energy lost from the unsheared start to the end of cycle 1
-    loss_error, loss_first_error : proved bounds on |loss - solution|; infinite without a proof
+    loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
         (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
         lost in the cycle), "open" (never loaded) or "undecided"
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on their errors
-    level, force_level : [force] L* and f T*, the point of the memory curve that no cycle changes
-    balance_defect   : relative error of the loss by the trapezoid rule; nan if P varies
+    level, force_level : [force] L* and f T* (docs/theory/paths.md): the part of the state that is
+        due to normal loads up to L* is the same in every cycle
+    balance_defect   : relative difference between `loss` and a second formula for it, the error of
+        the trapezoid rule (docs/theory/losses.md); a check of rounding; nan if P varies
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
         Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
-    smooth_normalised : the same for the smooth sphere; nan if P varies. Both are nan if nothing is
-        loaded or the base has no smooth reference
+    smooth_normalised : loss / W0 of the smooth sphere; nan if P varies. Both are nan if no asperity
+        is loaded, or no smooth solution is known for the shape
     displacement_amplitude : [length] half the range of the displacement at the points
-    displacement_error : [length] proved bound on its error; infinite without a proof
-    order            : "proved": no indentation decreases with the load between L* and P, so loss
-        and statuses are proved; "proved for one step": the loss is not proved; "fails": nothing
-        is proved, and Newton's method computes the results step by step
+    displacement_error : [length] proved bound on the error of the displacement amplitude
+    order            : "proved": no indentation falls as the load rises from L* to the highest P, so
+        loss and statuses are proved; "proved for one step": the loss is not proved; "fails":
+        nothing is proved, and a general step (docs/theory/without-order.md) gives the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 
@@ -120,7 +122,6 @@ class Cycle(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
-        """The scene of the contact."""
         return self.contact.scene
 
     @property
@@ -147,14 +148,15 @@ class Cycle(Table, Plottable):
     def asperity_losses(self) -> Array:
         """(n,) [force length] energy lost at each asperity per cycle; nan where `order` fails.
 
-        Where the load varies they are accurate to about 0.1 %, with bounds of some per cent, and
-        take two normal solutions for each of 64 cells.
+        Where the load varies, an integral over 64 intervals gives these losses, with two normal
+        solutions for each interval. They are accurate to about 0.1 %; their proved bounds are some
+        per cent.
         """
         return frozen(self.partial_slip_losses + self.sliding_losses)
 
     @property
     def asperity_loss_errors(self) -> Array:
-        """(n,) [force length] bounds on |`asperity_losses` - solution|; infinite unless proved."""
+        """(n,) [force length] proved bounds on the errors of `asperity_losses`."""
         return self._shares[2]
 
     @cached_property
@@ -170,7 +172,6 @@ class Cycle(Table, Plottable):
 
     @cached_property
     def _walk(self) -> _Closed:
-        """The closed path and its memory curves."""
         levels = self.contact.cached(FrictionLevels)
         pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
         points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
@@ -183,13 +184,13 @@ class Cycle(Table, Plottable):
 
     @property
     def secant_stiffness(self) -> float:
-        """[force / length] force amplitude over displacement amplitude; nan where nothing moves."""
+        """[force / length] force amplitude / displacement amplitude; nan if nothing moves."""
         moved = self.displacement_amplitude
         return self.force_amplitude / moved if moved > 0 else np.nan
 
     @property
     def loss_factor(self) -> float:
-        """loss / (2 pi U), U = force amplitude x displacement amplitude / 2; nan without motion.
+        """loss / (2 pi U), U = force amplitude x displacement amplitude / 2; nan if nothing moves.
 
         Source: Ungar and Kerwin, J. Acoust. Soc. Am. 34 (1962) 954.
         """
@@ -199,11 +200,11 @@ class Cycle(Table, Plottable):
     def gradient(self, *, holding: Holding | None = None) -> Gradient:
         """Derivatives of the loss with respect to the scene, at constant shear forces.
 
-        holding : quantity kept constant, as in `Contact.gradient`; for a load that varies, all its
-            values. `Gradient` says how to keep a prescribed displacement constant
+        holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
+            points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError in gross sliding if several asperities slide last or the approach is kept
-        constant: the loss has no derivative there.
+        Raises InputError if the loss has no derivative: in gross sliding, if several asperities
+        slide last or the approach is kept constant.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -218,7 +219,7 @@ class Cycle(Table, Plottable):
         points: int = 200,
         asperities: ArrayLike | None = None,
     ) -> Loop:
-        """The loop of force against displacement, with points denser at its ends.
+        """The loop of shear force against displacement, with points denser at its ends.
 
         points     : approximate number of points; half of them on each branch
         asperities : indices of the asperities whose own loops are returned; default all
@@ -236,7 +237,7 @@ class Loop(Table):
     forces        : (m,) [force] shear force
     displacements : (m,) [length] displacement of distant points, both bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] local deflection plus slip of each
+    asperity_displacements : (m, k) [length] local deflection plus slip of each asperity
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -274,7 +275,7 @@ def cycle(
     """The steady cycle between two shear forces at constant load.
 
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
-    displacement     : [length] amplitude of a symmetric cycle, in place of its forces
+    displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
 
     Raises InputError if the scene has no friction, the minimum exceeds the maximum, a force exceeds
     the friction limit f P, or the displacement exceeds that of gross sliding.
@@ -296,7 +297,7 @@ def cycles(
     *,
     displacement: ArrayLike | None = None,
 ) -> list[Cycle]:
-    """The steady cycles of many amplitudes, in one computation: `cycle` with (m,) arrays.
+    """The steady cycles of m amplitudes, computed together: `cycle` with (m,) arrays.
 
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
@@ -334,7 +335,7 @@ def _at_the_load(
     heights: Sequence[Sequence[Fraction]],
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
-    """The cycles at the load of the contact, each between two values of T."""
+    """The cycles at the load of the contact; each goes between two values of T = Q / f."""
     load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     load_twice = np.full(2, float(load))
@@ -349,10 +350,10 @@ def steady(
     forces: ArrayLike,
     influence: Kind | None = None,
 ) -> Cycle:
-    """The steady state of a closed path of load and shear force, repeated.
+    """The steady state of a closed path of load and shear force that is repeated.
 
-    loads, forces : (m,) [force] load P and shear force Q at its points, |Q| <= f P; the path is
-        straight between points and returns from the last to the first
+    loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
+        segments between points are straight, and the last one returns to the first point
     influence : compliance operator, as in `load_path`
 
     Raises the errors of `load_path`.
@@ -369,7 +370,7 @@ def steady(
 
 
 class _Closed(Walk):
-    """A closed path of m points that is followed twice: the second cycle is the steady one."""
+    """A closed path of m points, followed twice; the second cycle is the steady one."""
 
     @classmethod
     def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> _Closed:
@@ -377,34 +378,33 @@ class _Closed(Walk):
 
     @property
     def once(self) -> int:
-        """m, the number of points."""
+        """The number m of points of one cycle."""
         return len(self.points) // 2
 
     @property
     def steady(self) -> list[MemoryCurve]:
-        """The memory curves of the second cycle."""
+        """The memory curve at each point of the second cycle."""
         return self.curves[self.once + 1 :]
 
     @cached_property
     def first(self) -> list[Piece]:
-        """The layers that the slip front crosses before and in the first cycle."""
+        """The pieces of the loss (`curve.Piece`) up to the end of the first cycle."""
         return [piece for cost in self.pieces[: self.once + 1] for piece in cost]
 
     @cached_property
     def later(self) -> list[Piece]:
-        """The layers that the slip front crosses in every later cycle."""
+        """The pieces of the loss in every later cycle."""
         pieces = (piece for cost in self.pieces[self.once + 1 :] for piece in cost)
         return [piece for piece in pieces if piece.slope * piece.sign != 1]
 
     @cached_property
     def stuck(self) -> Point:
-        """(L*, T*), through which all later memory curves pass."""
+        """The point (L*, T*) of the module docstring."""
         plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
         return (plus + minus) / 2, (plus - minus) / 2
 
     @property
     def least(self) -> Fraction:
-        """The smallest load of the path."""
         return min(load for load, _ in self.points)
 
     @cached_property
@@ -417,7 +417,7 @@ class _Closed(Walk):
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
-    """The steady cycles of closed paths, each given by points, loads and forces, from one start."""
+    """The steady cycles of closed paths with one start, each given by points, loads and forces."""
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
@@ -435,7 +435,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """The cycle with the losses of the first and of a later cycle, and displacements at points."""
+    """The result for a path, from the losses of two cycles and the displacements of its points."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
@@ -473,7 +473,7 @@ def _cycle(
     doubtful = levels.to_scene(~(rest.touching | rest.open))
     slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # W0, and loss / W0
+    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # whole: W0
     if constant and reference:
         smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     found = Cycle(
@@ -509,7 +509,7 @@ def loops(
     points: int = 200,
     asperities: ArrayLike | None = None,
 ) -> list[Loop]:
-    """The loops of several cycles of one contact at constant load.
+    """The force-displacement loops of several cycles of one contact at constant load.
 
     points : approximate number of points of the widest loop; narrower ones have fewer
     asperities : as in `Cycle.loop`
@@ -532,7 +532,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop, with points where Q has fallen, and then risen, by twice the values `way`."""
+    """The loop with points where Q has fallen from its maximum, then risen, by 2 `way`."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

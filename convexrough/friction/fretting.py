@@ -1,15 +1,16 @@
 """Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
 
-f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. Slip in
-a contact disc with a stick disc of radius c grows with the distance r from the centre. Its
-amplitude in a steady cycle is  f c_t [g + (r^2/R) h(c/r)]  with
+f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. In a
+contact disc with a stick disc of radius c, the slip at the distance r from the centre has the
+amplitude  f c_t [g + (r^2/R) h(c/r)]  with
 
     h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
 
-f c_t g is the amplitude of gross slip, 0 if a disc sticks. (r^2/R) h(c/r) is the gap, at the
-distance r, of a Hertz contact of radius c. The formula holds inside the contact disc at the least
-load of the cycle; farther out contact is lost in each cycle and the slip is not known. The shear
-traction is a sum of Hertz pressures over the levels s_k of the memory curve with its bends b_k:
+f c_t g is the amplitude of gross slip, which is 0 if a disc sticks. (r^2/R) h(c/r) is the gap of a
+Hertz contact of radius c at the distance r. The formula holds inside the contact disc at the lowest
+load of the cycle. Outside this disc contact is lost in each cycle, and the slip is not known. The
+shear traction is a sum of Hertz pressures over the levels s_k of the memory curve with its bends
+b_k and the contact radii a(s_k):
 
     q(r) = f (2 E* / pi R) sum_k b_k sqrt(a(s_k)^2 - r^2).
 
@@ -35,20 +36,20 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: Number of distances from the centre, besides the kinks of the traction, at which the largest
-#: traction is sought. At constant load it lies at a kink; else the error is about 0.1 %.
+#: Number of distances from the centre, besides the kinks of the traction, that are tried for the
+#: largest traction. At constant load a kink has the largest; otherwise the error is about 0.1 %.
 DISTANCES = 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fretting(Table, Plottable):
-    """Fretting of each asperity in a steady cycle; arrays are (n,), 0 where open.
+    """Fretting of each asperity in a steady cycle. Arrays are (n,), and 0 where open.
 
     status           : `Cycle.status`
-    slip_amplitudes  : [length] half the range of slip at the rim of the contact disc at the least
-        load of the cycle; nan where "intermittent": slip between touches is not known
-    gross_slip_amplitudes : [length] half the range of slip of the whole disc, 0 if some of it
-        sticks; nan where "intermittent"
+    slip_amplitudes  : [length] half the range of slip at the rim that the contact disc has at the
+        lowest load of the cycle; nan where "intermittent", as slip between touches is not known
+    gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
+        sticks, nan where "intermittent"
     losses           : [force length] energy lost per cycle: `Cycle.asperity_losses`
     mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
@@ -117,10 +118,7 @@ def fretting(cycle: Cycle) -> Fretting:
 
 
 def _largest(bends: Array, radii: Sequence[Array]) -> Array:
-    """(n,) the largest |sum_k b_k sqrt(a_k^2 - r^2)| over r; radii : a_k, (n,) each, rising.
-
-    Between two of the radii the sum is smooth in sqrt(a_k^2 - r^2); some distances are tried there.
-    """
+    """(n,) the largest |sum_k b_k sqrt(a_k^2 - r^2)| over r; radii : a_k (n,), increasing."""
     squares = np.square(radii)
     parts = np.linspace(1.0, 0.0, max(4, DISTANCES // max(1, len(radii))), endpoint=False)
     largest = np.zeros(squares.shape[1:])
@@ -132,7 +130,7 @@ def _largest(bends: Array, radii: Sequence[Array]) -> Array:
 
 
 def rim_gap(x: Array) -> Array:
-    """h(x): the gap of a Hertz contact of radius x a at the distance a, in units of a^2 / R."""
+    """h(x): the gap of a Hertz contact of radius x r at the distance r, divided by r^2 / R."""
     root = np.sqrt((1.0 - x) * (1.0 + x))
     return np.maximum(0.5 - x**2 + ((2.0 * x**2 - 1.0) * np.arcsin(x) + x * root) / np.pi, 0.0)
 

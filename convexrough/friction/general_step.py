@@ -1,14 +1,10 @@
-"""The general step, for indentations that may fall as the load rises.
+"""The general step: a friction step for indentations that may fall as the load rises.
 
-Each asperity keeps its own memory curve, in the plane of its indentation and its deflection over
-c_t f. A straight step to (P, T) presses with the load P and then solves, by Newton's method,
-
-    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T.
-
-A is the influence matrix, x the displacement of the bodies in the step, and eta_i the part of x
-that asperity i takes up by deflection and slip. If no indentation falls as the load rises, one step
-per segment is exact; else the error is of second order in the step:
-docs/theory/without-order.md, "The general step".
+Each asperity i keeps its own memory curve, in the plane of its indentation and its deflection over
+c_t f. A straight step to the load P and the shear force f T computes the normal solution at P. Then
+Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i and x: the
+displacements of the asperities and of the bodies in the step. Shear forces are divided by f, and
+displacements by c_t f.
 """
 
 from __future__ import annotations
@@ -30,18 +26,18 @@ from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.sphere import hertz
 
-#: Newton's method stops at this residual, relative to the largest indentation. A thousand times as
-#: much is accepted where rounding prevents less.
+#: Newton's method stops at this residual, relative to the largest indentation. If rounding keeps
+#: the residual larger, up to a thousand times as much is accepted.
 ACCURATE = 1e-14
 
-#: The largest numbers of Newton steps, of halvings of each, and of halvings of the general step.
+#: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
 #: The smallest and the largest number of steps per segment.
 FEWEST, MOST = 4, 64
 
-#: Doubling of the steps ends at these relative changes of each loss and of the displacements.
-#: Losses below NEGLIGIBLE times the largest need not settle.
+#: The steps are doubled until each loss, and the displacements, change by less than these
+#: fractions. A loss below NEGLIGIBLE times the largest may change by more.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
 
@@ -49,10 +45,12 @@ SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 class Bundle:
     """The state of n asperities after a step.
 
-    load    : P, as it identifies a level;  height : T = Q / f
-    curves  : the memory curve of each asperity;  carried : (n,) T_i
-    positions : (n,) deflection plus drift, over c_t f
-    displacement : X / (c_t f);  work : work of the shear force along X, over c_t f^2
+    load, height : [force] P and T = Q / f
+    curves    : the memory curve of each asperity
+    carried   : (n,) T_i
+    positions : (n,) deflection plus drift, divided by c_t f
+    displacement : X / (c_t f), with the relative displacement X of the bodies
+    work      : work of the shear force along X, divided by c_t f^2
     """
 
     load: Fraction
@@ -71,7 +69,7 @@ class Bundle:
 
 
 class Stepper:
-    """Makes general steps of a scene that is small enough for its influence matrix."""
+    """Solver of general steps, for scenes whose compliance matrix fits in memory."""
 
     def __init__(self, levels: FrictionLevels) -> None:
         scene = levels.scene
@@ -92,7 +90,7 @@ class Stepper:
     def along(
         self, start: MemoryCurve, points: Sequence[tuple[Fraction, Fraction]], steps: int
     ) -> list[Bundle]:
-        """The state after each point, with this number of steps per segment."""
+        """The state at each point, with `steps` general steps per segment."""
         now, found = self.start(start), list[Bundle]()
         load, height = start.load, start.height
         for target, shear in points:
@@ -107,10 +105,15 @@ class Stepper:
         return found
 
     def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
-        """The state after one straight step; in two halves if Newton's method does not converge."""
+        """The state after one step, which is halved if Newton's method does not converge."""
         level = self.levels.snapshot(load)
         try:
-            found = self._solve(now, level, float(height)) if load else self.start(MemoryCurve())
+            if not load:
+                found = self.start(MemoryCurve())
+            elif abs(height) == load:
+                found = self._gross(now, level, 1 if height > 0 else -1)
+            else:
+                found = self._solve(now, level, float(height))
         except SolverError:
             if cuts == 0:
                 raise
@@ -118,6 +121,14 @@ class Stepper:
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
         mean, run = float(now.height + height) / 2, found.displacement - now.displacement
         return replace(found, load=load, height=height, work=now.work + mean * run)
+
+    def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
+        """The state in which all slide, with the least displacement at which they do."""
+        trial, on = _Trial.of(self, now, level), level.indentations > 0
+        coupled = self.A @ (sign * level.loads - now.carried)
+        taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]
+        x = sign * float((sign * (taken + coupled[on])).max())
+        return self._reached(now, level, trial.at(x - coupled, x, sign * level.load))
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
         trial = _Trial.of(self, now, level)
@@ -140,12 +151,15 @@ class Stepper:
         if iterate.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {iterate.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
+        return self._reached(now, level, iterate)
+
+    def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
         moved = now.positions + iterate.eta
         displacement = now.displacement + iterate.x
         return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement)
 
     def stored(self, state: Bundle) -> float:
-        """The elastic energy over c_t f^2: of own deflections along the curves, and of coupling."""
+        """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
         own = 0.0
         for curve, k in zip(state.curves, self.coefficients, strict=True):
             carried = 0.0
@@ -162,8 +176,9 @@ class Stepper:
 class SteppedPath(NamedTuple):
     """Results of general steps at m points, without proofs.
 
-    losses : (m,) [force length] since the start; nan if they do not settle;  status : (m, N)
-    fronts : (m, N) indentation at the slip front of each asperity; its own if it sticks
+    losses : (m,) [force length] energy lost since the start; nan if the doubling does not settle
+    status : (m, N) "open" or "undecided"
+    fronts : (m, N) indentation at the slip front of each asperity; the full one if it sticks
     """
 
     states: States
@@ -184,8 +199,8 @@ def followed(
     The loss W_n by n steps has an error of about e / n^2, with some constant e. The loss returned
     is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
 
-    steps : per segment, and the loss is then W_n; None doubles them until each loss changes by less
-        than SETTLED of itself and the displacements by less than SETTLED_MOTION of the largest
+    steps : number of steps per segment, with which the loss is W_n; None doubles the number until
+        losses and displacements settle
     """
     by = (stepper or Stepper)(levels)
 
@@ -236,18 +251,18 @@ class _Iterate(NamedTuple):
     curves: tuple[MemoryCurve, ...]
     carried: Array
     slopes: Array  # dT_i / deta_i
-    defect: Array  # (n,) of the first equations above
-    excess: float  # sum of T_i less T
+    defect: Array  # (n,) defects of the first equation of (1)
+    excess: float  # sum of T_i minus T
 
     @property
     def residual(self) -> float:
-        """The largest defect; the excess of the total counts as a displacement."""
+        """The largest defect of the equations; that of the total is converted to a displacement."""
         stiffness = float(self.slopes.sum())
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
         return max(float(np.abs(self.defect).max()), missing if self.excess else 0.0)
 
     def newton(self, A: Array) -> tuple[Array, float]:
-        """The Newton step of eta and of x."""
+        """The changes of eta and x in a Newton step."""
         n = len(self.eta)
         matrix = np.empty((n + 1, n + 1))
         matrix[:n, :n] = A * self.slopes
@@ -306,7 +321,7 @@ class _Trial(NamedTuple):
 
 
 def _slope(old: MemoryCurve, curve: MemoryCurve, k: float) -> float:
-    """The derivative of T_i by the deflection: along the appended segment, or at the front."""
+    """The derivative of T_i with respect to the deflection: by sticking, or at the slip front."""
     high = float(curve.load)
     if curve.front is None and curve.load > old.load:
         low = float(old.load)

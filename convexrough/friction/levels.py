@@ -1,10 +1,13 @@
-"""The normal solutions of a contact at rational total loads, and the units of friction.
+"""The normal solutions (levels) of a contact at rational total loads, and the units of friction.
 
-Shear forces are in units of f times the unit of loads, displacements in units of c_t f times the
-unit of lengths, with c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu. A rational number
-[force] identifies a level. If the load is prescribed, it is the total load of the level. If the
-approach is prescribed, the load P is computed, to thirty digits: the float64 number nearest to P
-identifies P, and a number smaller by d identifies the load P - d. 0 always means the load 0.
+Levels are in the scaled units of the normal problem (`normal.problem`). The unit of shear forces is
+f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
+coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
+
+A rational number [force] identifies a level. If the load is prescribed, this number is the total
+load of the level. If the approach is prescribed, the load P is only known to thirty digits. Then
+the float64 number nearest to P identifies P, and a number smaller by x identifies the load P - x.
+The number 0 always identifies the load 0.
 """
 
 from __future__ import annotations
@@ -38,9 +41,10 @@ Made = TypeVar("Made")
 
 
 class FrictionLevels:
-    """The levels of a contact by rational loads [force], made by `contact.cached(FrictionLevels)`.
+    """The levels of a contact by rational loads [force]; use `contact.cached(FrictionLevels)`.
 
-    scene : of N asperities, with friction;  load : P
+    scene : the scene, with N asperities and friction
+    load  : [force] the load P of the contact
     candidates : (n,) indices of the asperities that may touch at loads up to P
     """
 
@@ -73,7 +77,7 @@ class FrictionLevels:
 
     @cached_property
     def loss_unit(self) -> Ball:
-        """[force length] the unit of energy losses, c_t f^2 times the units of load and length."""
+        """[force length] the unit of energy losses."""
         return self.force_unit * self.travel_unit
 
     def height(self, force: float | Fraction) -> Fraction:
@@ -92,7 +96,7 @@ class FrictionLevels:
 
     @property
     def presses(self) -> int:
-        """The number of normal problems solved so far, including that at P."""
+        """The number of normal problems solved so far, including the one at P."""
         return 1 + self._levels.presses
 
     @property
@@ -121,9 +125,10 @@ class FrictionLevels:
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
-        """The load of the level with the approach D0(P) - X / (c_t f), for X >= 0 [length].
+        """[force] the load P - Q / f at which first loading reaches the displacement X >= 0.
 
-        It is P - Q / f of first loading to X. Raises InputError if X exceeds that of gross sliding.
+        The level there has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
+        exceeds the displacement of gross sliding.
         """
         if not displacement <= self.farthest * (1 + 1e-14):
             found = f"{displacement:.17g}: gross sliding"
@@ -150,7 +155,7 @@ class FrictionLevels:
         return float(far.value)
 
     def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
-        """Whether it is proved that no indentation falls as the load rises, from the least to P."""
+        """What is proved about order (`friction.order`) from the least of these loads up to P."""
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
@@ -180,12 +185,12 @@ class FrictionLevels:
         )
 
     def loads(self, level: Level) -> Ball:
-        """(N,) loads P_i in units of the levels."""
+        """(N,) loads P_i in scaled units."""
         found: Ball = of_rows(self.to_scene, level.loads)
         return found
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) indentations n_i in units of the levels, to float64 for those that cannot touch."""
+        """(N,) indentations n_i in scaled units; in float64 for asperities that cannot touch."""
         known, others = level.indentation, self._others
         if len(others) == 0:
             return known
@@ -217,18 +222,18 @@ class FrictionLevels:
         return self._levels.problem.influence.onto(points)
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(..., N) values of the candidates, and 0 for all other asperities."""
+        """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""
         return among_zeros(values, self.candidates, len(self.scene), axis=-1)
 
     def _balls(self, loads: Sequence[Fraction]) -> Ball:
-        """(k,) loads in units of the levels."""
+        """(k,) the loads in scaled units."""
         if self.by_load:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
-    """T = Q / f, exactly; P or -P if |T| differs from P by rounding only."""
+    """T = Q / f as an exact fraction; P or -P if |T| differs from P only by rounding."""
     height = Fraction(force) / Fraction(checks.friction(scene.friction))
     if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
         return height
@@ -239,12 +244,12 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """Whether it is proved that no indentation falls as the load rises from 0 to that of `contact`.
 
     The result is "proved", "proved for one step" or "fails", as in `Cycle.order`. Later results for
-    this contact reuse the proof. It may take a search for some asperities, mostly those at the edge
-    of the contact; without this call, the search is made for at most 1,000 asperities, and only if
-    at most 10,000 touch.
+    this contact reuse the proof. For some asperities, mostly at the edge of the contact, the proof
+    needs a search of some milliseconds. Without this call it is made for at most 1,000 asperities,
+    and only if at most 10,000 touch.
 
-    most : largest number of asperities for which the search is made, if at most ten times as many
-        touch; it takes some milliseconds for each
+    most : largest number of asperities for which the search is made; at most ten times as many may
+        touch
 
     >>> cr.prove_order(contact)
     'proved'
@@ -256,7 +261,8 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
 class Snapshot(NamedTuple):
     """A normal solution in the scene's units. Arrays are (N,).
 
-    load, loads : [force];  indentations : [length] minus the gap where open
+    load, loads    : [force] total load, and load of each asperity
+    indentations   : [length] indentations, or minus the gap where open
     touching, open : true where this is proved
     """
 

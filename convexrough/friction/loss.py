@@ -1,13 +1,9 @@
-"""The energy loss of slip, in units of c_t f^2: of asperities, of the whole contact, along a path.
+"""The energy loss by slip: of each asperity, of the whole contact, and along a path.
 
-While the load is P and the slip front falls through the level L, the loss grows by
-(1 - c th) (-dB/dL) per unit of L. Here th is the slope of the layer at L, c the sign of the slip,
-
-    B = sum_i (6/5) P_i delta_i e(1 - P_i(L) / P_i) + P_i g_i(L)
-      = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)],
-
-V the energy of the normal solution, and P_i, delta_i, g_i, D0 the loads, indentations, gaps and
-approach. This holds if no indentation falls as the load rises (docs/theory/losses.md).
+docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2. While the total load is P
+and the slip front falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th
+is the slope of the memory curve at L, c the direction of slip, and B the sum of B_i(P, L) in (2) of
+that page, or by (1) B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. This needs order.
 """
 
 from __future__ import annotations
@@ -33,7 +29,7 @@ Pair: TypeAlias = tuple[Fraction, Fraction]
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) the parts of B from partial slip and from sliding, for rows of levels P and L."""
+    """(k, n) two parts of B, due to partial slip and to sliding, for k pairs of levels P and L."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -51,13 +47,13 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B from the energy: twice the error of the trapezoid rule on D0 between two levels."""
+    """B by its second formula: twice the error of the trapezoid rule on D0 from L to P."""
     run = high.load - low.load
     return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
 
 
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
-    """(m,) the loss on each of m segments, from its pieces."""
+    """(m,) the loss on each of m segments, given the pieces of each."""
     pieces = [piece for each in costs for piece in each]
     found = exactly([1 - p.sign * p.slope for p in pieces]) * _integrals(levels, pieces)
     ends = np.cumsum([0, *map(len, costs)]).tolist()
@@ -85,7 +81,7 @@ def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball]:
-    """(k, n) `asperity_losses` for pairs of loads P and L."""
+    """`asperity_losses` for k pairs of loads P and L."""
     loads = sorted({load for pair in pairs for load in pair})
     rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
     high, low = (np.array([place[pair[end]] for pair in pairs]) for end in (0, 1))
@@ -93,16 +89,9 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball
 
 
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) integrals I of -dB/dL for a front from L0 down to L1 while the load goes from P0 to P1.
+    """(k,) integrals I of -dB/dL over pieces on which the load changes.
 
-    With run = L0 - L1, D = D0(L0) - D0(L1), and the means m of D0 on [L1, L0] and M of D0 on
-    [P1, P0], both less D0(L1),
-
-        I = (P0 - L0) D - (P0 - P1) m + run (2 m - M).
-
-    D0 rises and is concave. So m lies in [D/2, D], M between the mean and the larger of D0(P0) and
-    D0(P1), both less D0(L1), and D in [0, run / (2 E* a(L1))]. Where these intervals are smaller
-    than those of the sums they replace them, which keeps the digits of fronts that hardly move.
+    (4) of docs/theory/losses.md, with the intervals for D, m and M that follow it.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -133,7 +122,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _softest(level: Level) -> float:
-    """A lower bound on 2 E* a of the largest contact; the slope of D0 is at most 1 / (2 E* a)."""
+    """A lower bound on 2 E* a of the largest contact. The slope of D0 is at most 1 / (2 E* a)."""
     k = level.problem.exact.coefficients.upper
     softness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
     return float(softness.max(initial=0.0)) * (1 - SAFETY)
@@ -149,21 +138,18 @@ def _hull(a: Ball, b: Ball) -> Ball:
 
 
 def _sharper(a: Ball, b: Ball) -> Ball:
-    """The enclosure with the smaller radius, of two of the same numbers."""
+    """The one with the smaller radius, of two balls that enclose the same numbers."""
     return where(a.radius <= b.radius, a, b)
 
 
 def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
-    """(N,) [force length] losses at each asperity from partial slip and from sliding.
+    """(N,) [force length] losses at each asperity, due to partial slip and to sliding.
 
-    With n = n_i(L), N = n_i(P) and the local law P_i = p(n), the rates along a front are
+    cells : number of cells into which the pieces on which the load varies are cut, in all
 
-        p(N) - p(n) - p'(n) (N - n)  and, where open at L,  p(N),    times  dn/dL.
-
-    Neither falls as P rises, if no indentation does. So pieces on which the load varies are cut
-    into cells, as many in all as given, and the losses of a cell at the loads of its two ends
-    enclose its true loss. The returned means have relative errors of about cells^-2; the bounds are
-    about 1 / cells.
+    The loss in a cell lies between the losses for the loads at the two ends of the cell
+    (docs/theory/losses.md, "A front while the load changes"). The returned means have relative
+    errors of about cells^-2; their proved bounds are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends

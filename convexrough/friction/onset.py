@@ -20,13 +20,13 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.levels import FrictionLevels
 
-#: The largest number of onsets in one call where no influence matrix is stored.
+#: The largest number of onsets in one call if no compliance matrix is stored.
 MOST_ONSETS = 256
 
 #: Relative distances from the root at which proofs are tried, the closest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: Index of the distance in TRIED up to which levels that are known already are used.
+#: Levels that are known already are used if they are nearer than TRIED[ENOUGH] to the root.
 ENOUGH = 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, that ends them.
@@ -34,7 +34,10 @@ STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """The load of an onset [force], proved to be between two others if indentations never fall."""
+    """The load at which an asperity first touches, and two loads [force] that enclose it.
+
+    The enclosure is proved if no indentation falls as the load rises.
+    """
 
     load: Fraction
     lower: Fraction  # the asperity is proved open at this load
@@ -44,11 +47,14 @@ class Onset(NamedTuple):
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
-    In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds the same
+    In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds this
     force. The result is nan for an asperity without load.
 
-    which : indices of the asperities, in the order of the result; default all. Each needs some
-        normal solutions. Required for more than 256 loaded asperities without a stored matrix
+    which : indices of the asperities, in the order of the result; default all. Each asperity needs
+        several normal solutions
+
+    Raises InputError if more than 256 loaded asperities are chosen and no compliance matrix is
+    stored.
 
     >>> onsets = cr.onset_of_sliding(contact, which=[0, 36])
     >>> print((onsets / contact.load).round(3))
@@ -74,13 +80,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
-    """The onsets of asperities that touch at P; a bound without a proof is 0 or P."""
+    """The onsets of asperities that touch at P; a bound that is not proved is 0 or P."""
     depths = levels.top.indentation.value[np.searchsorted(levels.candidates, which)]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """The onset of one asperity, enclosed by known levels near the root or else by new ones."""
+    """The onset of one asperity, enclosed by levels near the root: known or else new ones."""
     place = int(np.searchsorted(levels.candidates, asperity))
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -93,7 +99,7 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
 
 
 def root(levels: FrictionLevels, place: int) -> Fraction:
-    """The load at which n_i of a candidate, given by its position, is 0."""
+    """The load at which the indentation of a candidate is 0; `place` is its index among them."""
 
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
@@ -121,13 +127,13 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def _short(load: Fraction) -> Fraction:
-    """The load rounded to a sum of two float64 numbers, a fraction with few digits."""
+    """The load rounded to a sum of two float64 numbers, so that the fraction has few digits."""
     high = Fraction(float(load))
     return high + Fraction(float(load - high))
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
-    """The asperity with the highest onset among those that touch at P, and this onset."""
+    """The index and the onset of the asperity that touches last, of those that touch at P."""
     touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
     depths = levels.top.indentation.value[touching]
     last = int(touching[np.argmin(depths)])
@@ -141,7 +147,7 @@ def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
 
 
 def indices(what: str, which: ArrayLike | None, n: int) -> Indices:
-    """The given indices of asperities of a scene of n, checked; by default all."""
+    """The checked indices of asperities of a scene with n asperities; all if None is given."""
     if which is None:
         return np.arange(n)
     asked = np.atleast_1d(np.asarray(which))

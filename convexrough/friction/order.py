@@ -1,46 +1,55 @@
-r"""Order: no indentation falls as the load rises, so friction states are sums of normal solutions.
+r"""Proof of order: no indentation falls as the load rises, which theorems on friction require.
 
-Let n_i(L) be the indentation of asperity i at the load L, or minus its gap where open; D0 the
-approach, d the offsets, A the influence matrix, and C = diag(dP_i / dn_i), 0 where open. As
-n = D0 + d - A P, the rates y = dn / dD0 solve (I + A C) y = 1. Levels from P down to the load L0
-have order if y_i >= 0 for every i that may touch at P, and all others stay open. The level at one
-load L1 proves this from L1 down to L0, as follows.
+Why friction needs it, and a simpler theorem: docs/theory/states.md, "Order".
 
-The *support* is the set of asperities not proved open at L1. Let C~ >= C(L1) be diagonal and 0 off
-the support, I + A C regular for all 0 <= C <= C~, and C >= C~ - delta. Let v_j be any numbers for
-the j on the support but i, of an asperity i, with w_j = v_j C~_j,
+A *level* is the normal solution at one total load L: the approach D0, loads P_i, and indentations
+n_i, which are minus the gap where asperity i is open. Let A be the compliance matrix, d the
+offsets, and C the diagonal matrix of c_i = dP_i / dn_i, which is 0 where i is open. By the contact
+law n + A P = D0 + d, the *rates* y = dn / dD0 solve (I + A C) y = 1. There is order from the load
+L1 down to L0 if at all loads between, y_i >= 0 for each asperity i that may touch at the highest
+load of the path, and all others are open. The level at L1 can prove it, with these symbols:
 
-    s_k = v_k + sum_j w_j A_jk,                                                                 (1)
+- The *support* is the set of asperities that are not proved open at L1.
+- C~ >= C(L1) is diagonal, 0 off the support, and I + A C is regular if 0 <= C <= C~ is diagonal.
+- delta is a diagonal matrix, 0 <= delta <= C~; C is any diagonal matrix, C~ - delta <= C <= C~.
+- v_k are the *weights* for asperity i: any numbers on the support, except v_i = 0. w_k = v_k C~_k.
+- s_k = v_k + sum_j w_j A_jk,                                                                   (1)
+  r_k = |A_ik - s_k| if k != i, and r_i = max(-s_i, 0). In (2), r_k = max(A_ik - s_k, 0) will do.
 
-and r_k = |A_ik - s_k| for k != i, r_i = max(-s_i, 0). In (2), r_k = max(A_ik - s_k, 0) will do. If
-0 <= y(C) <= m <= 1 on the support, then
+Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
 
     y_i >= 1 - sum_k (w_k + max(-v_k, 0) delta_k m_k + r_k C~_k),                               (2)
     y_i (1 - s_i C_i) <= 1 - sum_k (w_k - max(v_k, 0) delta_k m_k - r_k C~_k).                  (3)
 
-For let z = C y. By the rows of y + A z = 1, sum_k s_k z_k = sum_k w_k (z_k / C~_k + (A z)_k) is the
-sum of w_k - v_k (C~_k - C_k) y_k, and (A z)_i = 1 - y_i differs from it by s_i z_i and by at most
-sum_k r_k z_k over k != i. Without weights (2) is the row sum of A C~.
+1. Let z = C y. Then y + A z = 1, so sum_k s_k z_k = sum_k w_k - sum_k v_k (C~_k - C_k) y_k.
+2. Row i is 1 - y_i = (A z)_i, and differs from that sum by s_i z_i and at most sum_k r_k z_k.
+3. (2) and (3) follow from 0 <= z_k <= C~_k and 0 <= (C~_k - C_k) y_k <= delta_k m_k.
 
-(a) Let m follow from m = 1 by (3). If the right sides of (2) are positive on the support, so are
-the rates, for all C from C~ - delta to C~. For they are at C~: there (2) and (3) hold for |y| <= Y
-with Y r in place of r. If |1 - sum_k w_k| is at most twice 1 - s_i C~_i - sum_k r_k C~_k for all i,
-(3) gives Y <= 2. From there follow y(C~ - t D): until a rate is 0 they are at most 1, as
-y = 1 - A C y, hence at most m by (3), hence more than 0 by (2). With delta = C~, follow
-y(t C) from y(0) = 1.
+(a) Start from m = 1 and decrease m by (3). For all i on the support, let (2) with 2 r in place of r
+have a positive right side, and let |1 - sum_k w_k| <= 2 (1 - max(s_i, 0) C~_i - sum_k r_k C~_k).
+Then all rates on the support are positive.
 
-(b) Let delta_k >= C~_k - c_k(n_k(L1) - m_k (D0(L1) - D0(L0))), c_k(n) = dP_k / dn_k. Let each
-asperity outside the support have y_i >= -u_i by (2), and a gap g_i > u_i (D0(L1) - D0(L0)) at L1.
-Then y > 0 on the support down to L0, and the others stay open.
-Proof: dn / dD0 = y(C(n)) continues the solution downwards (implicit function theorem). C stays
-between C~ - delta and C~, as n_k falls, by less than m_k (D0(L1) - D0(L0)) before L0 is reached;
-and no gap closes, by the bounds on y_i. The load falls strictly with D0, and the solution stays in
-the box where it is the only one. For L0 = 0 all this holds down to every L > 0.
+1. If |y| <= Y, (2) and (3) hold for C = C~ and delta = 0, with Y r in place of r.
+2. So by the last condition Y = 2 is such a bound at C~, and by (2) the rates are positive there.
+3. Let C(t) = C~ - t D with 0 <= D <= delta, and let t rise from 0 to 1. As long as no rate is
+   negative, y = 1 - A C y <= 1, so y <= m by (3), and y exceeds a positive constant by (2).
+4. The rates are continuous in t, so none of them becomes 0.
+5. If delta = C~, the last condition is not needed: C(t) = t C starts from y = 1 instead.
 
-If a range of loads is proved in parts, asperities that touch at P but are open at L1 need u_i <= 0.
-The best weights, s_k = A_ik, follow from the inverse X of I + C~ A: v is (A X)_i, less so much of
-the row X_i that v_i = 0. If too many asperities touch for an inverse, `friction.sweeping` finds
-weights of near neighbours.
+(b) Let F = D0(L1) - D0(L0) and delta_k >= C~_k - c_k(n_k(L1) - m_k F), with c_k as a function of
+n_k. Outside the support let y_i >= -u_i by (2), and let the gap at L1 exceed u_i F. Then y > 0 on
+the support down to L0, and all other asperities stay open.
+
+1. By the implicit function theorem the solution continues downwards, with dn / dD0 = y.
+2. Until D0 has fallen by F, n_k falls by less than m_k F, so C~ - delta <= C <= C~ and (a) holds.
+3. No gap closes, as the bounds on y_i show.
+4. The load falls strictly with D0, and loads stay in the box in which the certificate of L1 proves
+   that there is one solution. So the continued solution is the level of each load.
+5. If L0 = 0, this holds down to every L > 0.
+
+Asperities that are open at L1 but touch at the highest load need u_i <= 0. Weights with s_k = A_ik
+follow from the inverse X of I + C~ A: the row v = (A X)_i - t X_i, with the t that makes v_i = 0.
+If too many asperities touch for an inverse, `friction.sweeping` finds weights of near neighbours.
 """
 
 from __future__ import annotations
@@ -64,36 +73,37 @@ from convexrough.normal.together import Rows
 from convexrough.numbers.balls import Ball
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: "proved": order holds at all loads between the levels used. "proved for one step": no load P_i
-#: is lower at a level used than at the next lower level, and no rate is negative at the tested
-#: levels; each state solves one general step (`general_step`). "fails": some indentation falls,
+#: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
+#: falls from a level in use to the next higher one, and no rate at the tested levels is negative;
+#: each state solves one step of `general_step`. "fails": some indentation falls as the load rises,
 #: or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
-#: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
+#: A computed rate below -RATE_ROUNDING counts as negative. SOLVED: tolerance of its linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Up to INVERTED touching asperities the inverse costs no more than the levels. If more touch,
-#: up to TOUCHING times MOST, weights of least total (`sweeping`) are sought for at most MOST.
+#: If at most INVERTED asperities touch, an inverse gives the weights and costs no more than the
+#: levels. If at most TOUCHING * MOST touch, `sweeping` finds weights for at most MOST of them.
 INVERTED, MOST, TOUCHING = 800, 1000, 10
 
-#: Largest numbers of intermediate levels of the bisection: with an inverse, and without one.
+#: Largest number of intermediate levels of the bisection, with an inverse and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
 
 #: Largest number of asperities of which rates are bounded by an inverse.
 MOST_BOUNDED = 4 * INVERTED
 
-#: Number of improvements of m. A heuristic.
+#: Number of times that (3) decreases m. A heuristic.
 IMPROVEMENTS = 4
 
 
 def order_between(
     at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
 ) -> Order:
-    """The order that is proved between the lowest and the highest of some loads, by bisection.
+    """What is proved about order between the lowest and the highest of some loads, by bisection.
 
-    at   : returns the level at a load
-    most : as in `swept_rates`
+    at    : function that returns the level at a load
+    loads : the loads of the levels in use
+    most  : largest number of asperities for which `swept_rates` finds weights
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -127,9 +137,10 @@ def order_between(
 
 
 def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """Whether the upper level proves order down to the lower one, by (a) and (b) above.
+    """Whether the upper level proves order down to the lower one, by (a) and (b).
 
     rising : (n,) true for asperities that may touch at the highest load of the path
+    most   : as in `order_between`
     """
     found, problem = upper.solution, upper.problem
     if found is None or (found.box.fixed_open & ~upper.open).any():
@@ -160,7 +171,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` for rows of levels, the upper ones at the highest load of a path."""
+    """(m,) `proved_between` for m pairs of levels, the upper ones at the highest load of a path."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
     entry_error = np.empty((len(span.c), 1))
     for some, problem in rows.coupled:
@@ -183,11 +194,14 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
 
 
 class _Span(NamedTuple):
-    """The quantities of the proof for m upper levels: (m, n) or (m, 1).
+    """The quantities of the proof for m pairs of levels, as arrays (m, n) or (m, 1).
 
-    support : as above;  c : diagonal of C~;  drop : D0(L1) - D0(L0)
-    depth   : least indentations at L1;  gaps : least gaps;  steep : k^(3/2)
-    regular : I + A C is regular for 0 <= C <= C~
+    support : true on the support
+    c       : diagonal of C~
+    drop    : F = D0(L1) - D0(L0)
+    depth, gaps : lower bounds on indentations and gaps at L1
+    steep   : k^(3/2), with the coefficient k of Hertz's law n = k P^(2/3)
+    regular : true if I + A C is regular for 0 <= C <= C~
     """
 
     support: NDArray[np.bool_]
@@ -212,35 +226,36 @@ class _Span(NamedTuple):
         return cls(support, c, drop, depth, gaps, steep, regular)
 
     def at(self, which: Indices) -> _Span:
-        """The same at some asperities (m, s) of each row."""
+        """The same quantities for only s asperities of each row, given by indices (m, s)."""
         wide = ("support", "c", "depth", "gaps", "steep")
         return self._replace(
             **{name: np.take_along_axis(getattr(self, name), which, axis=1) for name in wide}
         )
 
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(m, n) true where a rate may be negative and the asperity is not sure to stay open."""
+        """(m, n) true where order is not proved: the rate may be negative, or the gap may close."""
         return np.asarray(~((rates > 0) | (~rising & (rates > -self.spare))))
 
     @property
     def spare(self) -> Array:
-        """(m, n) u of (b): open asperities with rates above -u stay open."""
+        """(m, n) largest u of (b): open asperities with rates above -u stay open."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.nan_to_num(self.gaps / self.drop, posinf=np.inf) * (1 - SAFETY))
 
     def _delta(self, m: Array) -> Array:
-        """(m, s) delta for bounds m on the rates: bounds on C~ - c(n) for n >= depth - m drop."""
+        """(m, s) the smallest delta of (b), for bounds m on the rates."""
         fallen = np.maximum(self.depth - m * self.drop * (1 + SAFETY), 0.0)
         slopes = 1.5 * np.sqrt(fallen) / self.steep
         return np.asarray(np.clip(self.c - slopes * (1 - SAFETY) + SAFETY * self.c, 0.0, self.c))
 
     @np.errstate(all="ignore")
     def rates(self, entries: Array, entry_error: Array) -> Array:
-        """(m, r) lower bounds (2) on rates, by an inverse; -inf without a proof of (a).
+        """(m, r) lower bounds (2) on rates, with weights by an inverse; -inf where (a) fails.
 
-        The arrays are those of s asperities that include the support.
+        The arrays of this object must be for s asperities that include the support.
 
-        entries : (m, r, s) of A, between r asperities, these s first, and the s
+        entries     : (m, r, s) of A; columns are these asperities, rows are these and r - s more
+        entry_error : (m, 1) bound on the relative error of the entries
         """
         c, s = self.c[:, :, None], np.arange(self.c.shape[1])
         matrix = entries[:, s] * self.c[:, :, None]
@@ -271,7 +286,7 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if each asperity is proved open at `lower`, or rising and indented more at `upper`."""
+    """False if every asperity is proved open at `lower`, or is `rising` and deeper at `upper`."""
     if upper.solution is None:
         return True
     if lower.solution is None:

@@ -1,11 +1,11 @@
-"""Friction along sequences of load P and shear force Q, by the memory curve: docs/theory/paths.md.
+"""`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
 
-`load_path` follows any sequence of (P, Q), `history` any sequence of Q at constant P.
+docs/theory/paths.md derives the method, the memory curve.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
@@ -30,6 +30,9 @@ from convexrough.scene.scene import Scene
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
+#: The smallest ratio of two loads of a path; float64 numbers in units of the larger hold it.
+LEAST_PART = 1e-250
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadPath(Table, Plottable):
@@ -37,21 +40,21 @@ class LoadPath(Table, Plottable):
 
     loads, forces  : (m,) [force] load P and shear force Q
     displacements  : (m,) [length] relative tangential displacement X of distant points
-    approaches     : (m,) [length] approach D0; that of the first touch at a load of 0
-    losses         : (m,) [force length] energy lost since the start, both bodies
+    approaches     : (m,) [length] approach D0; at the load 0, the approach of the first touch
+    losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] own deflection plus drift
-    drifts         : (m, n) [length] slip of each asperity on its partner, also while open
+    asperity_displacements : (m, n) [length] own deflection of each asperity plus its drift
+    drifts         : (m, n) [length] tangential displacement of each asperity relative to the
+        opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
-        without a proof
-    fronts         : (m,) [force] level down to which the contact slips; nan where all sticks
+        where nothing is proved
+    fronts         : (m,) [force] the lowest normal-load level that the latest slip reached; nan
+        where nothing slips
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
-    curves         : the memory curve after each point. Curves and fronts need `order` not to fail
-    order          : "proved": no indentation falls with the load between the levels in use;
-        "proved for one step": statuses and bounds hold for the results of one general step per
-        segment, and no loss is proved; "fails": results of general steps, without a proof
+    curves         : the memory curve after each point; not valid if `order` is "fails"
+    order          : what is proved about order between the levels in use, as in `Cycle`
     presses        : number of normal problems that were solved
-    start          : [force] load of the pressed contact at the start; 0 without one
+    start          : [force] load of the contact at the start; 0 if the bodies are separate
 
     >>> path = cr.load_path(scene, loads=[contact.load], forces=[0.1 * contact.load])
     >>> path.order, path.status.shape, path.presses
@@ -91,12 +94,11 @@ class LoadPath(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
-        """The scene of the contact."""
         return self.contact.scene
 
     @property
     def load_constant(self) -> bool:
-        """True if the load stays that of the pressed contact at the start, as in a history."""
+        """True if the load of every point is the load at the start, as in a history."""
         return bool((self.loads == self.start).all())
 
     @property
@@ -113,7 +115,8 @@ class LoadPath(Table, Plottable):
     ) -> Gradient:
         """Derivatives of a weighted sum over the points with respect to the scene, P and Q.
 
-        losses, displacements : (m,) their weights; default: 1 for the last loss
+        losses, displacements : (m,) weights of the losses and displacements; by default the sum is
+            the last loss
         holding : quantity kept constant, as in `Contact.gradient`. The forces Q are constant, too
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
@@ -136,14 +139,15 @@ def load_path(
     influence: Kind | None = None,
     steps: int | None = None,
 ) -> LoadPath:
-    """The friction states along a path of load and shear force, straight between its points.
+    """The friction states along a path of load and shear force with straight segments.
 
-    loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; P = 0 is
-        separation
+    loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
+        separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : compliance operator; None for the cheapest that is exact
-    steps     : number of general steps per segment, whose results have no proof; None uses the
-        memory curve, or as many general steps as needed if an indentation falls with the load
+    steps     : number of general steps per segment (docs/theory/without-order.md); their results
+        are not proved. None uses the memory curve, or as many general steps as needed if an
+        indentation falls as the load rises
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.
@@ -184,7 +188,7 @@ def walk(
     steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
-    """`load_path` with a choice of the solver of general steps."""
+    """The result of `load_path`, with a choice of the solver of general steps."""
     points = points_of(scene, loads, forces)
     if steps is not None and (not isinstance(steps, int) or steps < 1):
         raise InputError("steps", found=steps, expected="a whole number, at least 1")
@@ -202,15 +206,18 @@ def walk(
     )
 
 
-def pressed_for(scene: Scene, loads: Iterable[Fraction], influence: Kind | None) -> Contact:
+def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
     """The contact at the highest of these loads; at the first touch if this load is 0."""
     if highest := float(max(loads)):
+        if (least := float(min(load for load in loads if load))) < LEAST_PART * highest:
+            expected = f"0, or at least {LEAST_PART:g} of the largest load, {highest:g}"
+            raise InputError("loads", found=least, expected=expected)
         return press(scene, load=highest, influence=influence)
     return press(scene, approach=-float(scene.offsets.max()))
 
 
 def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
-    """(P, T = Q / f) of each point, checked and exact."""
+    """The checked points (P, T = Q / f), as exact fractions."""
     f = checks.friction(scene.friction)
     P = checks.array("loads", loads, sign="not negative")
     Q = checks.array("forces", forces)

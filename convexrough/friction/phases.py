@@ -29,17 +29,19 @@ UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhaseLosses(Table, Plottable):
-    """Losses of elliptic paths.
+    """Energy losses of cycles along c ellipses.
 
         P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    Arrays have one value for each of c ellipses: all phases of the first factor, then of the next.
+    Arrays have one value for each ellipse: all phases of the first factor, then of the next.
 
     phases, factors : (c,) phase [rad], and factor of both amplitudes
-    losses  : (c,) [force length] energy lost per steady cycle by both bodies, on a path of chords
-    loss_errors : (c,) [force length] proved bounds on the errors of the losses on this path
-    smooth  : (c,) [force length] losses of the smooth sphere; nan without a smooth reference
-    levels  : (c,) [force] the load L* below which nothing slips in the steady cycle
+    losses  : (c,) [force length] energy lost by both bodies per steady cycle, if chords replace the
+        ellipse
+    loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
+        the chords
+    smooth  : (c,) [force length] losses of the smooth sphere; nan if no smooth solution is known
+    levels  : (c,) [force] L*, as in `Cycle.level`
     sliding : (c,) number of asperities that slide or lose contact in every cycle
     order   : the weakest `Cycle.order` of all cycles
 
@@ -84,14 +86,15 @@ def phase_losses(
     chords: int = 24,
     influence: Kind | None = None,
 ) -> PhaseLosses:
-    """The losses of elliptic paths with several phases and factors of the amplitudes.
+    """The energy losses of cycles along ellipses with several phases and amplitudes.
 
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
-    phases, factors : (m,) [rad] from -pi to pi, and (k,); each factor multiplies both amplitudes
-    chords : number per ellipse; the relative error of the loss is about chords^-2
+    phases  : (m,) [rad] from -pi to pi
+    factors : (k,) factors by which both amplitudes are multiplied
+    chords  : number of chords per ellipse; the relative error of the loss is about chords^-2
     influence : compliance operator, as in `load_path`
 
-    Raises what `elliptic_path` and `steady` raise.
+    Raises the errors of `elliptic_path` and `steady`.
 
     >>> P = contact.load
     >>> swing = dict(load=P, load_amplitude=0.2 * P, force_amplitude=0.05 * P)
@@ -146,7 +149,7 @@ def phase_losses(
 
 
 def _smooth_alone(scene: Scene, load: float) -> Scene | None:
-    """The smooth base, as a scene of one asperity with its relative radius; None without one."""
+    """The smooth contact as a scene with one asperity; None if no smooth solution is known."""
     if (reference := smooth_reference(scene, load)) is None:
         return None
     twice = 2.0 * reference.radius

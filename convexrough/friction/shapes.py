@@ -1,4 +1,4 @@
-"""Smooth paths as chords, with corners where the slip front starts, stops or turns."""
+"""Smooth load paths as chords, with corners where the slip front starts, stops or turns."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ def elliptic_path(
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase : [rad] from -pi to pi, 0 for a full ellipse, pi/2 for a straight line (P and Q in phase)
+    phase  : [rad] from -pi to pi; at 0 the axes of the ellipse are those of P and Q, at pi/2 it is
+        a straight line (P and Q in phase)
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
-        points of the path, so that L* of `Cycle.level` is exact
+        points of the path, so that `Cycle.level` is exact
     chords : approximate number of chords; the relative error of the loss is about chords^-2
 
     >>> loads, forces = cr.elliptic_path(

@@ -1,4 +1,4 @@
-"""`shear`: the friction state of a pressed contact under monotonic shear."""
+"""`shear`: the friction state of a pressed contact after monotonic shear at constant load."""
 
 from __future__ import annotations
 
@@ -29,27 +29,28 @@ if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: An asperity is taken to slide if the bound on the error of its given force is smaller than this
-#: fraction of its friction limit f P.
+#: A given force keeps the status "sliding" of its asperity if its error bound is smaller than this
+#: fraction of the friction limit f P_i.
 NEAR_SLIDING = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearCertificate(Table):
-    """What is proved of a friction state under a shear force Q, at the load P and friction f.
+    """What is proved about a friction state, independent of how it was computed.
 
     Arrays are (n,), in the order of the scene's asperities.
 
     scope  : scope of the certificate of the pressed contact; "none" where nothing is proved
-    order  : "proved": no indentation decreases as the load increases from P - Q/f to P, so statuses
-        and bounds hold for the true state; "proved for one step": they hold for the result of one
-        general step (docs/theory/without-order.md); "fails": nothing is proved
+    order  : "proved": no indentation falls as the load rises from P - Q/f to P (load P, shear force
+        Q, coefficient of friction f), so statuses and bounds hold for the true state; "proved for
+        one step": they hold for the result of one general step (docs/theory/without-order.md);
+        "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
     slip_errors, stick_radius_errors : [length] bounds on the errors of slips and stick radii
-    force_error, displacement_error : [force], [length] bounds on the errors of the shear force and
-        the displacement; 0 for the prescribed one
+    force_error : [force] bound on the error of the shear force; 0 if it is prescribed
+    displacement_error : [length] bound on the error of the displacement; 0 if it is prescribed
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
     >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
@@ -78,15 +79,14 @@ class ShearCertificate(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearState(Table, Plottable):
-    """A friction state. Arrays are (n,), in the order of the scene's asperities.
+    """A friction state after monotonic shear. Arrays are (n,), in the order of the asperities.
 
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
     displacements : [length] own deflection plus slip, without the deflection caused by others
-    slips         : [length] gross slip, 0 where not sliding
-    stick_radii   : [length] radii of the stick discs, 0 where sliding: the contact radii at the
-        load P - Q / f
+    slips         : [length] gross slip; 0 where the asperity does not slide
+    stick_radii   : [length] radii of the stick discs; 0 where the asperity slides
 
     >>> state = cr.shear(contact, displacement=9.88e-6)
     >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
@@ -114,7 +114,7 @@ class ShearState(Table, Plottable):
 
     @property
     def order(self) -> Order:
-        """`certificate.order`: how far the order of indentations is proved."""
+        """The order of the certificate."""
         return self.certificate.order
 
     def gradient(
@@ -132,8 +132,8 @@ class ShearState(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError in gross sliding if several asperities slide last or the approach is kept
-        constant: there is no derivative.
+        Raises InputError if there is no derivative: in gross sliding, if several asperities slide
+        last or the approach is kept constant.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -146,8 +146,6 @@ class ShearState(Table, Plottable):
 
     def change(self, direction: Direction) -> ShearChange:
         """First-order changes of forces, slips and displacement when the scene changes.
-
-        direction : the change of the scene
 
         Raises InputError in gross sliding.
         """
@@ -193,7 +191,7 @@ def shear(
 
 
 def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
-    """The shear force as a number, checked against the friction limit."""
+    """The shear force as a number, after a check that it does not exceed the friction limit."""
     given = checks.bearable(what, np.asarray(value), limit)
     if given.ndim:
         raise InputError(what, found=f"shape {given.shape}", expected="one number")
@@ -207,7 +205,7 @@ def _state(
     force: float | None,
     displacement: float | None,
 ) -> ShearState:
-    """The state at T = Q / f, from normal solutions; by general steps if an indentation falls."""
+    """The state at T = Q / f: by normal solutions, or by general steps if order fails."""
     start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
     walk = Walk(levels, start, [(levels.load, height)])
     if walk.general is not None and displacement is not None:
@@ -254,7 +252,7 @@ def _state(
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The value of T = Q / f at which general steps give this displacement."""
+    """The value of T = Q / f for which general steps give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     start = MemoryCurve.pressed(levels.load)
@@ -271,13 +269,13 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
     """The certificate of given shear forces after monotonic shear.
 
-    forces : (n,) [force] along the shear force, in the order of the scene's asperities
-    force  : [force] their prescribed sum
+    forces : (n,) [force] shear forces in the order of the scene's asperities
+    force  : [force] the prescribed sum of the shear forces
 
-    `force_errors` bound the differences of the given forces from the solution. An asperity keeps
-    the status of the solution if its bound is small enough: if it slides, smaller than 1 % of its
-    friction limit f P_i; if it sticks, smaller than f P_i - |Q_i| of the solution. Otherwise its
-    status is "undecided". The rest of the certificate is that of the solution.
+    `force_errors` are bounds on the differences between the given forces and the solution. An
+    asperity keeps its status in the solution if its bound is small enough: for a sliding asperity,
+    smaller than 1 % of the friction limit f P_i; for a sticking one, smaller than f P_i - |Q_i|.
+    Otherwise its status is "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.
@@ -293,7 +291,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
 
 def against(state: ShearState, given: Array) -> ShearCertificate:
-    """The certificate of given forces (n,) [force], compared with a proved state."""
+    """The certificate of given forces (n,) [force], from a comparison with a proved state."""
     contact = state.contact
     apart = np.abs(given - state.forces)
     errors = (apart + state.certificate.force_errors) * (1 + SAFETY)

@@ -1,9 +1,8 @@
 """Comparison of three methods for a load path: agreement and time.
 
-The memory curve is plane geometry. The general step does not assume monotonic indentations and
-solves equations by Newton's method; the conic step minimises the same energy as a cone program.
-Both take one step for each segment, which is exact where indentations are monotonic:
-docs/theory/without-order.md.
+The memory curve needs monotonic indentations. The general step, solved by Newton's method, does
+not; the conic step minimises the same energy as a cone program (docs/theory/without-order.md). Both
+take one step per segment, which is exact where indentations are monotonic.
 """
 
 from __future__ import annotations
@@ -34,14 +33,16 @@ Way = Literal["general step", "memory curve", "conic step"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathEntry(Record):
-    """The result of one method for a path of m points.
+    """The result of one method for a load path.
 
     way     : the method
     outcome : "answered"; "refused": the method does not apply to the scene; or "failed"
     message : the reason why there is no result; else ""
-    path    : the result; None without one
-    force_disagreement : largest difference of any Q_i from the first method that answered, over f
-        times the largest P_i;  displacement_disagreement : the same of X, over the largest |X|
+    path    : the result; None if there is none
+    force_disagreement : largest difference of a shear force Q_i from the first method that
+        answered, divided by the largest friction limit f P_i
+    displacement_disagreement : largest difference of the displacement X from that method, divided
+        by its largest |X|
     seconds : [s] time, including the normal solutions that were not cached
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
@@ -60,9 +61,9 @@ class PathEntry(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathComparison(Table, Plottable):
-    """A load path by several methods, the general step first.
+    """The results of three methods for one load path, the general step first.
 
-    order : as in `LoadPath.order`; the memory curve needs it not to fail
+    order : as in `LoadPath`; if it is "fails", the memory curve does not apply
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> max(each.displacement_disagreement for each in found.entries) < 1e-4
@@ -84,7 +85,6 @@ class PathComparison(Table, Plottable):
             yield each.way, found[:LINE]
 
     def _variables(self) -> Variables:
-        """The columns, with a row for each entry."""
         names = (
             *("way", "outcome", "message", "seconds"),
             *("force_disagreement", "displacement_disagreement"),
@@ -114,7 +114,7 @@ def compare_paths(
 
     loads, forces, start, influence : as in `load_path`
 
-    Raises InputError as `load_path`, and SolverError if no method answers.
+    Raises InputError for the same reasons as `load_path`, and SolverError if no method answers.
 
     >>> P = contact.load
     >>> found = cr.compare_paths(scene, loads=[P, P / 2], forces=[0.3 * P, 0.0])

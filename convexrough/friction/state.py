@@ -1,13 +1,8 @@
-"""Friction states as sums of normal solutions, by the bends of the memory curve.
+"""Friction states as sums of normal solutions, weighted with the bends of the memory curve.
 
-With the bends b_k of the curve at the levels s_k (`MemoryCurve.bends`) and Mindlin's ratio c_t,
-
-    Q_i = f sum b_k P_i(s_k),   X = c_t f sum b_k D0(s_k),   own + drift = c_t f sum b_k n_i(s_k),
-
-where n_i is the indentation, or minus the gap (docs/theory/states.md). First loading to Q at the
-load P has two bends. With L = P - Q/f and the gaps g_i it gives
-
-    Q_i = f (P_i(P) - P_i(L)),   X = c_t f (D0(P) - D0(L)),   slip_i = c_t f g_i(L).
+(1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of
+the bodies. The same sum over the indentations n_i (minus gaps where open) is the own deflection of
+an asperity plus its drift. First loading is (1) of docs/theory/states.md.
 """
 
 from __future__ import annotations
@@ -31,8 +26,10 @@ from convexrough.numbers.pairs import Pair
 class States(NamedTuple):
     """m states of N asperities in the scene's units, and proved bounds on their errors.
 
-    displacements (m,), forces (m, N) : X and Q_i;  drifts (m, N) : slip of each asperity on its
-    partner, also while open;  asperity_displacements (m, N) : own deflection plus drift
+    displacements : (m,) X
+    forces        : (m, N) Q_i
+    asperity_displacements : (m, N) own deflection plus drift
+    drifts        : (m, N) displacement relative to the opposite surface, also while open
     """
 
     displacements: Array
@@ -53,15 +50,17 @@ class States(NamedTuple):
 
 
 def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
-    """The loads of the levels that the states of these curves and their statuses need."""
+    """The loads of the levels that the states and statuses of these curves need."""
     bent = {load for curve in curves for load, bend in curve.bends if bend}
     return bent | {curve.front for curve in curves if curve.front is not None}
 
 
 class LevelSums(NamedTuple):
-    """Sums over the levels of each of m curves, weighted with their bends.
+    """Weighted sums over the levels of each of m curves.
 
-    used : (k,) loads of all levels;  places : (m, j) indices into `used`;  weights : (m, j) bends
+    used    : (k,) loads of all levels
+    places  : (m, j) the levels of each curve, as indices into `used`
+    weights : (m, j) bends of the curves at these levels
     """
 
     used: list[Fraction]
@@ -70,7 +69,6 @@ class LevelSums(NamedTuple):
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
-        """The sums that give the states of these curves."""
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
         place = {load: k for k, load in enumerate(used)}
@@ -102,7 +100,7 @@ def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> B
 def states_of(
     levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
 ) -> States:
-    """The states of these curves, for the asperities `which`, in this order, or for all."""
+    """The states of these curves, for the asperities `which` (default: all) in this order."""
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
@@ -131,7 +129,7 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) "open" where the level proves it, the given statuses where true, else "undecided"."""
+    """(N,) each given status where its mask is true, else "open" if proved, else "undecided"."""
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"

@@ -1,22 +1,25 @@
-r"""Order by sweeping: charges at near neighbours prove that no rate is negative.
+r"""Proof of order for many asperities: charges at near neighbours bound the rates from below.
 
-As in `friction.order`, C~ >= 0 is diagonal, and y(C) = (I + A C)^-1 1 for 0 <= C <= C~, where
-I + A C is regular. Let asperity i have weights w_j >= 0, of total 1, of some neighbours j != i on
-the support of C~, and let t_i be such that for all others k != i there
+C~, the support and the rates y(C) = (I + A C)^-1 1 are those of `friction.order`, and I + A C is
+regular for 0 <= C <= C~. Give asperity i weights w_j >= 0 for some neighbours j != i on the
+support, with the sum 1. Let t_i be a number such that for all k != i on the support
 
     A_ik <= t_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
 
-By (2) of that module, with the weights t_i w_j and delta = C~, all rates y_i(C) are at least
-1 - t_i, if this is positive on the support.
+If 1 - t_i is positive for all i on the support, it is a lower bound on the rate y_i(C): this is (2)
+of `friction.order` with the weights t_i w_j and delta = C~.
 
-(1) compares potentials. A charge 1 at i is swept onto its neighbours; the potential of these, each
-spread over a shell of radius R_j = scale C~_j and there as on its shell, may nowhere be less than
-the part 1 / t_i of that of the charge.
+(1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
+of radius R_j = scale C~_j. Multiplied by t_i, the potential of these charges is nowhere below that
+of the unit charge.
 
-Weights without first and second moments, sum w_j d_j = sum w_j d_j^2 = 0, and with the least energy
-do where neighbours are all around. At an edge a barrier method finds weights that meet (1) with the
-least total at near neighbours and at some far away. For one outside of the contact one neighbour
-alone does, if that is nearer to all others.
+There are three ways to find weights:
+
+- Where neighbours are all around i: weights of least energy whose first and second moments vanish,
+  sum w_j d_j = sum w_j d_j^2 = 0, with complex numbers d_j for the vectors from i to j.
+- At an edge of the contact: a barrier method, which minimises the sum of the weights (before it is
+  scaled to 1) under (1) with t_i = 1, at near asperities and at some far ones.
+- Outside the contact: one neighbour alone, if all others are nearer to it than to i.
 """
 
 from __future__ import annotations
@@ -33,32 +36,35 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Neighbours that get the weights of least energy, and those of least total, in one search after
-#: the other, each with the constraint that the last one met least. Heuristics, like what follows.
+# All numbers here are heuristics.
+
+#: Number of neighbours with weights of least energy; and with weights of least total, in each of
+#: several searches. Each search adds the constraint that the last one violated most.
 NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
 
-#: How many near ones weights of least total look at, and at one in each sector of rings; how near
-#: the least total they come before they are tried.
+#: The constraints of weights of least total are at the NEAR nearest asperities, and at one in each
+#: of SECTORS sectors of RINGS rings. CENTRED: how near the least total the method comes.
 NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
 
-#: Newton's steps at most of weights of least total, and what they leave of it at least.
+#: Largest number of Newton steps for weights of least total, and the gap at which they end.
 STEPS, LEAST = 40, 1e-8
 
-#: Searches for weights that are not negative: each drops those that are.
+#: Largest number of searches for weights of least energy; each drops neighbours of weights below 0.
 SEARCHES = 8
 
-#: Directions in which the extent of the support is known, and numbers held at once.
+#: Number of directions in which the extent of the support is known; numbers in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
-    """(n,) lower bounds on y(C) for all 0 <= C <= C~; all -inf if one of the support may be 0.
+    """(n,) lower bounds on y(C) for all 0 <= C <= C~.
 
-    With less than two on the support nothing is swept: row sums of A C~ say all there is.
+    All are -inf if one on the support is not positive, or if the support has fewer than two
+    asperities (then row sums of A C~ are enough).
 
-    c     : (n,) C~, 0 where open
-    spare : (n,) rates of open ones may be less than 0 by so much, and need not be known better
-    most  : for how many weights of least total are sought
+    c     : (n,) diagonal of C~, 0 where open
+    spare : (n,) a bound above -spare is enough for an open asperity, and is not improved
+    most  : largest number of asperities for which weights of least total are sought
     """
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
     rates = np.full(len(c), -np.inf)
@@ -86,7 +92,7 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
 
 
 def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
-    """make(*rows), so many rows at once that about NUMBERS numbers are held."""
+    """make(*rows), computed for so many rows at once that about NUMBERS numbers are in memory."""
     some = max(1, NUMBERS // cost)
     parts = range(0, max(1, len(rows[0])), some)  # one at least, if empty
     return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
@@ -94,7 +100,7 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """A coupling whose charges are swept onto the shells of a support, of radii (n,)."""
+    """An operator whose unit charges are swept onto the shells of a support, of radii (n,)."""
 
     influence: Influence
     support: Indices
@@ -102,18 +108,18 @@ class _Swept:
 
     @cached_property
     def places(self) -> NDArray[np.complex128]:
-        """(n,) the points, about their middle."""
+        """(n,) the points relative to their middle, as complex numbers."""
         x, y = self.influence.points.T
         return np.asarray((x - (x.min() + x.max()) / 2) + 1j * (y - (y.min() + y.max()) / 2))
 
     @cached_property
     def extent(self) -> float:
-        """At least the largest distance."""
+        """An upper bound on all distances."""
         return 2.01 * float(np.abs(self.places).max())
 
     @cached_property
     def lost(self) -> float:
-        """What (1) loses by rounding, relatively."""
+        """Bound on the relative rounding error of (1)."""
         moved = ROUNDOFF * self.extent / float(self.influence.separations().min())
         return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
@@ -128,7 +134,7 @@ class _Swept:
         return np.column_stack((places.real, places.imag))
 
     def neighbours(self, which: Indices, count: int) -> Indices:
-        """(m, count) the nearest of the support, without the asperity itself."""
+        """(m, count) the nearest asperities on the support, without the asperity itself."""
         count = min(count, len(self.support) - 1)
         _, found = self._tree.query(self._plane(self.places[which]), count + 1)
         nearest = self.support[found]
@@ -136,13 +142,13 @@ class _Swept:
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
 
     def potentials(self, charges: Indices, places: Indices) -> Array:
-        """Of charges 1 at places, on their shells if those are the same; shapes are broadcast."""
+        """Potentials of unit charges at places; on its shell where a charge is at the place."""
         apart = self.places[charges] - self.places[places]
         squares = apart.real**2 + apart.imag**2
         return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
 
     def outside(self, which: Indices) -> Array:
-        """(m,) bounds on rates by sweeping onto one neighbour, where all are nearer to that."""
+        """(m,) bounds on rates by sweeping onto one neighbour; -inf where this is not enough."""
         near, here = self.neighbours(which, NEIGHBOURS), self.places[which][:, None]
         away, middle = self.places[near] - here, (self.places[near] + here) / 2
         nearer = self._least_along(away) - (away.conj() * middle).real
@@ -151,15 +157,11 @@ class _Swept:
         return np.where(found, self.lost / 2, -np.inf)
 
     def lightest(self, which: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and weights with the least energy, without first and second moments.
-
-        Weights are all 0 where some would be negative.
-        """
+        """(m, s) neighbours and their weights of least energy; all 0 where none are found."""
         near = self.neighbours(which, NEIGHBOURS)
         return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
 
     def _lightest(self, which: Indices, near: Indices) -> Array:
-        """With Lagrange's multipliers, without neighbours whose weights would be negative."""
         (m, s), rows = near.shape, 5
         away = self.places[near] - self.places[which][:, None]
         least = np.abs(away).min(axis=1)[:, None]
@@ -189,10 +191,7 @@ class _Swept:
         return weights
 
     def tightest(self, which: Indices, count: int, looked: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and weights of the least total with (1), t_i = 1, where many are seen.
-
-        By a barrier: from far inside of the constraints, until the total is less than 1.
-        """
+        """(m, s) neighbours, and weights of least total by the barrier method."""
         near = self.neighbours(which, count)
         cost = max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support))
         return near, _in_parts(self._tightest, cost, which, near, looked)
@@ -228,7 +227,7 @@ class _Swept:
         return weights
 
     def _spread(self, which: Indices, nearest: Indices) -> Indices:
-        """(m, k) some of the support in all directions and at all distances; else the nearest."""
+        """(m, k) one asperity of the support in each sector of each ring, or else the nearest."""
         away = self.places[self.support] - self.places[which][:, None]
         itself = self.support == which[:, None]
         apart = np.abs(np.where(itself, self.extent, away))
@@ -243,7 +242,7 @@ class _Swept:
         return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) 1 - t of (1), and k where it is least; -inf without weights."""
+        """(m,) 1 - t of (1), and the k for which t is largest; -inf where all weights are 0."""
         from scipy.sparse import csr_array
 
         total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
@@ -266,7 +265,7 @@ class _Swept:
         return rates, worst
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
-        """(m, k) distances, to themselves as given."""
+        """(m, k) distances between asperities; `themselves` from an asperity to itself."""
         from scipy.spatial.distance import cdist
 
         apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))

@@ -1,4 +1,4 @@
-"""`verify` for shear forces: compare claims about sliding with the proof."""
+"""`verify_shear`: comparison of claimed shear forces with what is proved."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ CLAIMS_SLIDING = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """Comparison of claimed shear forces of first loading with the proof. Arrays are (n,).
+    """Comparison of claimed shear forces of first loading with what is proved.
 
     forces  : (n,) [force] the claimed shear forces
-    total_prescribed : [force] their prescribed sum Q
+    total_prescribed : [force] the prescribed sum Q of the shear forces
     claimed : (n,) true where the asperity is claimed to slide
     within  : largest error allowed, as a fraction of the largest force
     certificate : certificate of the claimed forces
-    solution : the friction state, with its own certificate
+    solution : the solution, with the certificate of the solution
     """
 
     one = "force"
@@ -52,12 +52,11 @@ class ShearVerdict(Claim, Record):
 
     @property
     def values(self) -> Array:
-        """(n,) [force] the claimed shear forces."""
         return self.forces
 
     @property
     def largest(self) -> float:
-        """[force] the size of the largest given force; if all are 0, the largest limit f P_i."""
+        """[force] the largest size of a claimed force, or the largest limit f P_i if all are 0."""
         limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())
         return super().largest or limit
 
@@ -89,15 +88,15 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Comparison of shear forces of first loading from any source with the solution.
+    """Comparison of shear forces of first loading from any source with what is proved.
 
-    forces  : (n,) [force] along the shear force, in the order of the scene's asperities
-    force   : [force] their prescribed sum Q
+    forces  : (n,) [force] shear forces in the order of the scene's asperities
+    force   : [force] the prescribed sum Q of the shear forces
     within  : largest error allowed, as a fraction of the largest force
-    sliding : (n,) true where an asperity is claimed to slide; default: where the size of its force
-        is at least (1 - 1e-4) f P_i
+    sliding : (n,) true where an asperity is claimed to slide; default: where |force| is at least
+        (1 - 1e-4) f P_i
 
-    Raises InputError as `certify_shear`.
+    Raises InputError for the same reasons as `certify_shear`.
     """
     within = tolerance("within", within)
     given = checks.array("forces", forces, length=len(contact.scene))
@@ -109,6 +108,6 @@ def verify_shear(
 
 
 def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:
-    """(n,) true where the size of the force is at least (1 - 1e-4) f P_i."""
+    """(n,) true where |force| is at least (1 - 1e-4) f P_i."""
     limits = checks.friction(contact.scene.friction) * contact.loads
     return np.asarray((limits > 0) & (np.abs(forces) >= (1.0 - CLAIMS_SLIDING) * limits))

@@ -1,8 +1,7 @@
-"""A path of (P, T = Q / f) through the levels of a contact, from which all friction results come.
+"""A path of (P, T = Q / f) with its levels, states and losses: the basis of all friction results.
 
-The memory curve gives the levels; states are sums over them, and losses are integrals over the
-pieces of the curve. If an indentation falls as the load rises, general steps give the results,
-without proofs.
+States are sums over the levels of the memory curve, losses are integrals over its pieces. If an
+indentation falls as the load rises, general steps compute the results, without proofs.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import SAFETY
 
-#: (P, T = Q / f), exactly.
+#: (P, T = Q / f) as exact fractions.
 Point: TypeAlias = tuple[Fraction, Fraction]
 
 
@@ -35,7 +34,7 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 class Walk:
     """A path from a memory curve through m points, with straight segments between them.
 
-    steps   : number of general steps per segment; None takes general steps only if order fails
+    steps   : number of general steps per segment; None: general steps only if order fails
     stepper : solver of the general steps
     """
 
@@ -51,22 +50,19 @@ class Walk:
 
     @property
     def curves(self) -> list[MemoryCurve]:
-        """The memory curve after each point."""
         return self._followed[0]
 
     @property
     def pieces(self) -> list[list[Piece]]:
-        """The pieces of the loss on each segment."""
         return self._followed[1]
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """The loads of all levels that the states and losses need."""
         return levels_needed(self.curves, self.pieces)
 
     @cached_property
     def order(self) -> Order:
-        """The order between these levels and P."""
+        """What is proved about order from the lowest of the needed levels up to P."""
         return self.levels.order(self.needed)
 
     @cached_property
@@ -77,14 +73,13 @@ class Walk:
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
     def states(self) -> States:
-        """The states after each point."""
         if self.general is not None:
             return self.general.states
         found = states_of(self.levels, self.curves)
         return found.unproved() if self.order == "fails" else found
 
     def status(self) -> NDArray[np.str_]:
-        """(m, N) the statuses after each point."""
+        """(m, N) the statuses at each point."""
         if self.general is not None:
             return self.general.status
         return frozen(
@@ -92,7 +87,7 @@ class Walk:
         )
 
     def losses(self) -> tuple[Array, Array]:
-        """(m,) [force length] energy lost since the start, and proved bounds on its errors."""
+        """(m,) [force length] energy lost since the start, and proved bounds on the errors."""
         unknown = frozen(np.full(len(self.points), np.inf))
         if self.general is not None:
             return self.general.losses, unknown
@@ -115,7 +110,7 @@ def follow(
 
 
 def levels_needed(curves: Sequence[MemoryCurve], costs: Iterable[Iterable[Piece]]) -> set[Fraction]:
-    """The loads of all levels that the states and losses of these curves and pieces need."""
+    """The loads of all levels that the states of these curves and these losses need."""
     return used_by(curves) | {load for pieces in costs for piece in pieces for load in piece[2:]}
 
 

@@ -1,4 +1,4 @@
-"""Hard scenes by name, each with its answer to 50 digits, to test any solver.
+"""Hard scenes by name, each with an answer to 50 digits, to test any solver.
 
 `convexrough gallery --export DIR` writes them as files for qpsolvers, Clarabel and CBF readers.
 """

@@ -18,11 +18,10 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact with a known answer. Its heights are rounded to float64, and
+    """A contact with a known answer, except that heights are rounded to float64.
 
-        cr.certify(made.scene, made.loads, approach=made.approach)
-
-    bounds the effect of this rounding and proves the statuses.
+    `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
+    and proves the statuses.
 
     approach : [length] the prescribed approach
     loads    : (n,) [force] 0 where open;  gaps : (n,) [length] 0 where touching
@@ -35,7 +34,7 @@ class Manufactured(Record):
 
 
 def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
-    """A contact of `count` asperities on a hexagonal lattice; a part `touching` of them touches.
+    """A contact of `count` asperities on a hexagonal lattice, of which the part `touching` touches.
 
     Contact radii are random from 0.1 to 0.45 of the spacing, tip radii from 4 to 8 of it, and gaps
     up to the largest indentation. Other versions of numpy may give other numbers for a `seed`.

@@ -1,4 +1,4 @@
-"""A hard case: a scene, the prescribed quantity, and the answer to compare results with."""
+"""Hard cases: a scene, the prescribed quantity, and the answer to compare results with."""
 
 from __future__ import annotations
 
@@ -61,7 +61,8 @@ class HardCase(Record):
 
     Digits are strings: "0" is exact, all others are right to one unit of the 50th. The answer is
     that of the scene whose data are the given float64 numbers. An interval Newton step proves that
-    it exists and is the only one nearby; `cr.certify` says whether it is the only one of all.
+    a solution agrees with these digits and is the only one nearby; `cr.certify` says whether it is
+    the only one of all.
 
     family, why : the difficulty
     approach [length], load [force] : one of them is prescribed; the other is None
@@ -104,11 +105,11 @@ class HardCase(Record):
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
-        """A mask (n,) of the asperities that touch."""
+        """(n,) True for the asperities that touch."""
         return frozen(np.array([digits != "0" for digits in self.loads]))
 
     def check(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Checked:
-        """Compare loads (n,) [force] with the answer.
+        """The comparison of loads (n,) [force] with the answer.
 
         within : largest error allowed, over the largest load
         floor  : [force] a load up to this claims that its asperity is open
@@ -118,7 +119,7 @@ class HardCase(Record):
         return _judged(given, self.loads, claimed, self.touching, within)
 
     def check_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Checked:
-        """Compare shear forces (n,) [force], at the end of a history, with the answer."""
+        """The comparison of shear forces (n,) [force], at the end of a history, with the answer."""
         if not self.forces:
             found = "a case in which an asperity is dragged along by the others"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
@@ -206,11 +207,7 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces as multiples of the last one, which erases the memory of all others.
-
-    "random" : up to 0.9 of it, some repeated, some 0
-    "nested" : each range lies inside the one before, so that all are remembered until the last
-    """
+    """Shear forces over the last, largest one; if "nested", each range is inside the one before."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

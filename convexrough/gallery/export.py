@@ -31,7 +31,7 @@ load. proved: how far the proof reaches that the answer is the only one.
 
 
 def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
-    """The files of these cases by their names, and last index.md and index.json."""
+    """The files of these cases by name, and last index.md and index.json."""
     index: dict[str, Any] = {}
     for name in names:
         LOGGER.info(name)

@@ -1,4 +1,4 @@
-"""A hard case for developers of solvers: its optimisation programs as files, and their data."""
+"""A hard case for developers of solvers: optimisation programs as files, and data about them."""
 
 from __future__ import annotations
 
@@ -13,23 +13,19 @@ from convexrough.normal.certificate import certify
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.program import WRITERS, Form, scaled_eigenvalues, stated
 
-#: Bristles of each asperity; fewer where a program would have more variables than this, as its file
-#: is dense. Heuristics, for files that are read in no time.
+#: Number of bristles of each asperity; the smallest number; and the number of variables above which
+#: fewer bristles are used. Heuristics for small files.
 BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
 
-#: Cone programs of at most so many asperities are written as CBF, too.
+#: Largest number of asperities of a cone program that is also written as CBF.
 SMALL = 20
 
-#: A program by the name of its file, without what it holds: what the index says.
+#: An entry of the index.
 About = dict[str, Any]
 
 
 def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
-    """What the index says of a case, and its files by name.
-
-    A program is left out, with the reason, where the answer lies beyond the boxes in which it is
-    exact.
-    """
+    """The entry of a case in the index, with reasons for missing programs, and the files."""
     problem = NormalProblem.assemble(case.scene, **case.control, influence="dense")
     loads = np.array([float(digits) for digits in case.loads])
     own = loads[problem.candidates] / problem.units.force
@@ -63,11 +59,7 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
 
 
 def _hardness(problem: NormalProblem, own: Array) -> About:
-    """Numbers that say how hard a case is.
-
-    condition : of the energy's Hessian over the touching ones, scaled to a diagonal of 1
-    spread    : smallest over largest load
-    """
+    """The condition number of the scaled Hessian, and the smallest over the largest load."""
     eigenvalues = scaled_eigenvalues(problem, own)
     positive = eigenvalues[0] > 0
     return {
@@ -79,7 +71,6 @@ def _hardness(problem: NormalProblem, own: Array) -> About:
 
 
 def _proved(case: HardCase, loads: Array) -> About:
-    """What the certificate says of the answer rounded to float64."""
     proof = certify(case.scene, loads, **case.control)
     bound = float(proof.load_errors.max())
     return {

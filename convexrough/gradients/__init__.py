@@ -1,1 +1,1 @@
-"""Derivatives of contacts, friction states and losses with respect to everything in a scene."""
+"""Derivatives of contacts, friction states and losses by all parameters of a scene."""

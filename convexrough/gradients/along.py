@@ -1,15 +1,10 @@
-"""Gradients along load paths, from weighted sums of the energy V and approach D0 at load levels.
+"""Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
 
-Levels L and weights are rational functions of the loads P_k and of T_k = Q_k / f. At a tie, where
-an inner loop just closes or a front just meets a bend, these functions differ on both sides. So the
-derivative by a load or force compares the path with a path on which this number is moved up or down
-by 2^-6000 of the largest load, in exact arithmetic. No difference of float64 numbers is as small:
-each tie breaks as under an infinitely small change. With the level l of the original path that
-corresponds to L, and S = dD0/dL, to first order in the shift
+docs/theory/gradients.md, "Along a path", explains the method: the path is compared with a path on
+which one load P_k or one T_k = Q_k / f is shifted by SHIFT, in exact arithmetic. Let l be the level
+of the original path that corresponds to a level L, and S = dD0/dL. To first order in the shift
 
-    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l)
-
-(docs/theory/gradients.md, "Along a path").
+    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l).
 """
 
 from __future__ import annotations
@@ -31,14 +26,15 @@ from convexrough.gradients.pulled import ZERO, Moves, Part
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 
-#: The shift of loads and forces, over the largest load. Levels nearer than NEAR correspond.
+#: The shift of loads and forces, and the distance below which levels of the two paths correspond,
+#: both divided by the largest load. SHIFT is less than any difference of float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: Weights on V, D0 and S at a level.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: For each segment: index of its end point, weight of its loss, weight of the displacement there.
+#: For each segment: index of the end point, weight of the loss, weight of the last displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
 #: Changes of P and of T at all points.
@@ -49,21 +45,21 @@ NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
 class LevelWeights(NamedTuple):
-    """Weights of V, D0 and S by level, of losses over c_t f^2 and displacements over c_t f."""
+    """Weights of V, D0 and S at each level, for losses / (c_t f^2) and displacements / (c_t f)."""
 
     losses: dict[Fraction, Weights]
     displacements: dict[Fraction, Weights]
 
-    def lose(self, piece: Piece, share: Fraction) -> None:
-        """Add the loss (1 - c th) I on a piece, times a share.
+    def lose(self, piece: Piece, weight: Fraction) -> None:
+        """Add the loss (1 - c th) I on a piece (`friction.loss`), multiplied by a weight.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
         b = (P0 - P1) / (L0 - L1) and the mean M of D0 from P1 to P0.
         """
-        share *= 1 - piece.sign * piece.slope
+        weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
         run, fall = high - low, before - after
-        add = self._adder(self.losses, share)
+        add = self._adder(self.losses, weight)
         add(high, 2 - fall / run, before - high)
         add(low, fall / run - 2, low - after)
         if fall == 0:
@@ -72,29 +68,30 @@ class LevelWeights(NamedTuple):
             add(before, -run / fall, Fraction(0))
             add(after, run / fall, Fraction(0))
 
-    def move(self, curve: MemoryCurve, share: Fraction) -> None:
-        """Add the displacement of a state, times a share."""
-        add = self._adder(self.displacements, share)
+    def move(self, curve: MemoryCurve, weight: Fraction) -> None:
+        """Add the displacement of a state, multiplied by a weight."""
+        add = self._adder(self.displacements, weight)
         for level, bend in curve.bends:
             add(level, Fraction(0), bend)
 
     @staticmethod
     def _adder(
-        found: dict[Fraction, Weights], share: Fraction
+        found: dict[Fraction, Weights], weight: Fraction
     ) -> Callable[[Fraction, Fraction, Fraction], None]:
         def add(level: Fraction, energy: Fraction, approach: Fraction) -> None:
             V, D, S = found.get(level, NOTHING)
-            found[level] = (V + share * energy, D + share * approach, S)
+            found[level] = (V + weight * energy, D + weight * approach, S)
 
         return add
 
 
 @dataclass(frozen=True)
 class Along:
-    """A path through points, with the weights of its losses and displacements.
+    """A path through points, with weights of the losses and displacements.
 
-    start : load [force] at which the path begins, without shear;  steps : segments and weights
-    loads, heights : P and T of the points
+    start : [force] load at which the path begins, without shear
+    steps : the segments and weights
+    loads, heights : [force] P and T at the points
     """
 
     known: FrictionLevels
@@ -125,7 +122,7 @@ class Along:
         return found
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
-        """The parts of each level, the weighted sum of losses, and that of displacements.
+        """The part of each level, the weighted sum of losses, and the one of displacements.
 
         moves : derivatives of the load of every level, at fixed T
         """
@@ -173,10 +170,10 @@ class Along:
         return total * times
 
     def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
-        """(m,) derivatives along directions of P and T, and (m, 2) from below and from above.
+        """`factor` times the (m,) derivatives along directions, and (m, 2) from below and above.
 
-        All are multiplied by a factor. A derivative is the mean of both sides if these agree within
-        their bounds, and nan if they differ or one does not exist.
+        A derivative is the mean of both sides if these agree within their error bounds. It is nan
+        if the sides differ or one does not exist.
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]
@@ -195,7 +192,7 @@ def _slopes(
 ) -> dict[Fraction, Weights]:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
-    unit : the largest load, the unit in which small weights of D0 and S are neglected
+    unit : the largest load; weights that are small in this unit are neglected
     """
     places, found = sorted(base), dict[Fraction, Weights]()
     for sign, weights in ((-1, base), (1, moved)):

@@ -1,7 +1,6 @@
 """Forward derivatives: first-order changes of results when a scene and its load change.
 
-Each load level on which a result depends takes one linear solve, with the system of the gradients
-(docs/theory/gradients.md, "The change in one direction").
+docs/theory/gradients.md, "The change in one direction".
 """
 
 from __future__ import annotations
@@ -37,13 +36,16 @@ WHOLE = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(Record):
-    """A change of the parameters of a scene and of its load. Each default is no change.
+    """A change of the parameters of a scene and of the load. The default of each is no change.
 
-    heights, tip_radii : [length] (n,), or one number for all;  positions : [length] (n, 2)
-    sphere_radius : [length];  contact_modulus : [force / length^2], at fixed Poisson's ratio
-    load, approach : [force], [length]; the change of one of them. Without either, the prescribed
-        quantity of the contact does not change
-    friction, force : coefficient of friction, shear force [force]; only for friction states
+    heights, tip_radii : [length] (n,), or one number for all asperities
+    positions : [length] (n, 2), or one number for all
+    sphere_radius : [length]
+    contact_modulus : [force / length^2] at constant Poisson's ratio
+    load      : [force]
+    approach  : [length]; give at most one of load and approach. If neither is given, the prescribed
+        one does not change
+    friction, force : coefficient of friction and shear force [force]; only for friction states
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
     True
@@ -68,9 +70,12 @@ class Direction(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactChange(Table):
-    """First-order changes of a contact. Arrays are (n,), in the scene's order.
+    """First-order changes of a contact when the scene or the load changes.
 
-    loads : [force];  gaps : [length];  approach : [length];  load : [force] total load
+    loads    : (n,) [force] loads, in the scene's order
+    gaps     : (n,) [length] gaps, in the scene's order
+    approach : [length]
+    load     : [force] total load
 
     >>> print(f"{contact.change(cr.Direction(load=1e-9)).approach:.4g}")
     8.234e-08
@@ -88,10 +93,12 @@ class ContactChange(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearChange(Table):
-    """First-order changes of a friction state. Arrays are (n,), in the scene's order.
+    """First-order changes of a friction state when the scene, load or shear force changes.
 
     pressed : changes of the contact
-    forces : [force];  slips : [length];  displacement : [length]
+    forces  : (n,) [force] shear forces, in the scene's order
+    slips   : (n,) [length] gross slips, in the scene's order
+    displacement : [length]
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print(f"{state.change(cr.Direction(force=1e-9)).displacement:.4g}")
@@ -109,7 +116,7 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """The result of `Contact.change`. Raises InputError for a change of friction or shear force."""
+    """The result of `Contact.change`. Raises InputError if friction or shear force changes."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
@@ -122,7 +129,7 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
 def _pressed(
     contact: Contact, direction: Direction, bent: _Bent, top: Level
 ) -> tuple[ContactChange, _Moved]:
-    """The changes of the contact and of its level."""
+    """The change of the contact, and the change of the level in scaled units."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
@@ -200,7 +207,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
 
 
 class _Moved(NamedTuple):
-    """The changes of a level in its own units: of P, n, D0 and the total load."""
+    """The changes of P, n, D0 and the total load of a level, in scaled units."""
 
     loads: Ball
     indentation: Ball
@@ -212,7 +219,8 @@ class _Moved(NamedTuple):
 class _Bent:
     """The changes of a scene's geometry and modulus in one direction.
 
-    everywhere : of all asperities;  here : of the candidates;  modulus : dlog E*
+    everywhere, here : changes of all asperities, and of the candidates only
+    modulus : dlog E*
     """
 
     geometry: Geometry
@@ -262,7 +270,7 @@ class _Bent:
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:
-    """(n, 2) changes of positions, checked; one number counts for all."""
+    """(n, 2) checked changes of positions; one number stands for all."""
     expected = f"({n}, 2) finite numbers: x and y of each asperity"
     moved = checks.numbers("positions", positions, expected)
     if moved.shape not in ((), (n, 2)):

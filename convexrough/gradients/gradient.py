@@ -1,7 +1,7 @@
 """`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
 
-Such a number is a weighted sum of the energy V, the approach D0, the loads and the indentations at
-some load levels (`gradients.pulled`). The levels depend on the loads, the forces and friction.
+The number is a weighted sum of energies V, approaches D0, loads and indentations at some load
+levels (`gradients.pulled`). The loads of these levels depend on loads, forces and friction.
 """
 
 from __future__ import annotations
@@ -29,17 +29,18 @@ from convexrough.sphere.smooth import smooth_reference
 
 Holding = Literal["load", "approach"]
 
-#: Parameters that not every gradient has: single numbers, and arrays.
+#: Parameters that only some gradients have: single numbers, and arrays.
 WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
 SEVERAL = ("loads", "forces")
 
 
 class Number(NamedTuple):
-    """A number J of a contact and its derivatives at constant forces and load.
+    """A number J that depends on a contact, with derivatives at constant forces and load.
 
-    value    : J;  scaled : the part of J that scales with forces at constant weights
+    value    : J
+    scaled   : the part of J that is proportional to forces if all forces are scaled
     pulled   : derivatives from each level, for the candidates of `problem`
-    slopes   : dJ by parameters outside the scene's geometry
+    slopes   : derivatives of J by parameters outside the scene's geometry
     steep    : coefficients of infinite derivatives, where J depends on D0 at the load 0
     sides    : (m, 2) derivatives from below and from above
     """
@@ -72,10 +73,7 @@ class Number(NamedTuple):
         return cls(contact, top.problem, top, value, scaled, pulled, slopes, steep)
 
     def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times a factor.
-
-        slopes : the derivatives of the factor, times this number
-        """
+        """The number times a factor; `slopes` are the factor's derivatives times this number."""
         names = {*self.slopes, *slopes}
         pulled = [each.times(factor) for each in self.pulled]
         both = {
@@ -85,7 +83,7 @@ class Number(NamedTuple):
         return self._replace(value=value, scaled=scaled, pulled=pulled, slopes=both)
 
     def holding_the_approach(self) -> Number:
-        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (J_P / S) dD0|P."""
+        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P."""
         slopes, units = dict(self.slopes), self.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
@@ -97,32 +95,35 @@ class Number(NamedTuple):
 class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
-    The unit of a derivative is that of the number over that of the parameter. Each derivative is at
-    constant values of the other parameters listed here; shear forces are constant, not their
-    fractions of f P or a prescribed displacement. At constant displacement X a loss W changes by
-    dW|X = dW|Q - (W_Q / X_Q) dX|Q, with twice the derivative of W by `maximum` as W_Q, and the
-    derivative of X by `force`, for the state at the amplitude of the cycle, as X_Q.
+    The unit of a derivative is the unit of the number over the unit of the parameter. Each
+    derivative is at constant values of the other parameters listed here. Shear forces are constant;
+    their fractions of f P, or a prescribed displacement, are not. At constant displacement X a loss
+    W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q: W_Q is twice the derivative of W by `maximum`, and
+    X_Q the derivative of X by `force`, for the state at the amplitude of the cycle.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
     contact is not proved at some load that the number depends on. With more than 1,000 loaded
-    asperities and no matrix they are also infinite for positions and, in the geometry "closest",
-    for radii. An infinite derivative, in gross sliding, has the error 0.
+    asperities and no stored matrix they are also infinite for positions and, in the geometry
+    "closest", for radii. An infinite derivative, in gross sliding, has the error 0.
 
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant
-    heights, tip_radii, positions : (n,), (n,) and (n, 2), in the scene's order; 0 for screened
-        asperities, and for open ones unless the number contains their gap
-    sphere_radius   : None unless the base is a sphere
-    contact_modulus : at constant Poisson's ratio;  poisson_ratio : at constant E*
+    heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for
+        screened asperities, and for open ones unless the number contains their gap
+    positions       : (n, 2) derivatives by x and y, with zeros as in `heights`
+    sphere_radius   : None for shapes other than a sphere
+    contact_modulus : at constant Poisson's ratio
+    poisson_ratio   : at constant contact modulus E*
     load, approach  : derivative by the quantity `holding`; the other is None
     friction        : None for a scene without friction
-    force           : by the shear force of a friction state
-    maximum, minimum : by the extreme shear forces of a cycle
-    forces, loads   : (m,) by those of a history or path; nan where the derivatives from below and
-        above differ, as at a repeated point;  force_sides, load_sides : (m, 2) both of these
-    balance_defect  : difference between the derivative by the modulus from a sum and from a scaling
-        law, over the largest term of both
+    force           : derivative by the shear force of a friction state
+    maximum, minimum : derivatives by the largest and smallest shear force of a cycle
+    forces, loads   : (m,) derivatives by the forces and loads of a history or path; nan where the
+        derivatives from below and above differ, as at a repeated point
+    force_sides, load_sides : (m, 2) these derivatives from below and above
+    balance_defect  : difference between two formulas for the derivative by the modulus, divided by
+        the largest term of both; a check of rounding
 
     >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
     >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")
@@ -219,9 +220,8 @@ class Gradient(Table, Plottable):
     def normalised(self) -> Gradient:
         """The gradient of `Cycle.loss_normalised` = W / W0, from the gradient of a cycle's loss W.
 
-        W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) is proportional to c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3).
-        At constant approach the total load P varies. Raises InputError for gradients of other
-        numbers, and for a base without a smooth reference.
+        At constant approach the load P in W0 varies. Raises InputError for gradients of other
+        numbers, and for shapes of which no smooth solution is known.
         """
         if self.maximum is None:
             expected = "the gradient of the loss of a cycle"
@@ -229,7 +229,7 @@ class Gradient(Table, Plottable):
         number, scene = self.number, self.contact.scene
         reference = smooth_reference(scene, self.contact.load)
         if reference is None:
-            expected = "a base with a smooth reference: a sphere or an ellipsoid"
+            expected = "a sphere or an ellipsoid"
             raise InputError("normalised", found=named(scene.sphere_radius), expected=expected)
         R = Ball.exact(scene.mean_radius)
         E = Ball.exact(scene.material.contact_modulus)
@@ -254,13 +254,13 @@ class Gradient(Table, Plottable):
         return Gradient.of(number.times(factor, slopes), self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """The printed rows, without internal data and without parameters that are None."""
+        """The printed rows, without internal data and parameters that are None."""
         hidden = ("number", "derivatives")
         return (row for row in super()._rows() if row[0] not in hidden and row[1] != "None")
 
 
 def _balance_defect(number: Number, found: Derivatives) -> float:
-    """The relative defect of  E* J_E* + sum over levels of J_L L = `number.scaled`."""
+    """Relative defect of  E* dJ/dE* + sum over levels of L dJ/dL = `number.scaled`."""
     bent, by_coupling = found.local.sum() * -2.0 / 3.0, -found.coupled
     terms = [bent, by_coupling, -number.scaled, *(each.load * each.total for each in number.pulled)]
     defect = float(sum(terms, start=ZERO).value)
@@ -269,7 +269,7 @@ def _balance_defect(number: Number, found: Derivatives) -> float:
 
 
 def control_held(contact: Contact, holding: Holding | None) -> Holding:
-    """The quantity that is kept constant, checked; by default the prescribed one."""
+    """The checked name of the quantity that is kept constant; by default the prescribed one."""
     checks.instance("contact", contact, Contact)
     if holding is None:
         return "approach" if contact.prescribed_load is None else "load"

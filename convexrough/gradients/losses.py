@@ -21,9 +21,8 @@ from convexrough.numbers.balls import Ball
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     """The result of `Cycle.gradient`.
 
-    At constant load the loss is W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2], L = P - T,
-    T = (max - min) / (2 f), with the complementary energy V and the approach D0
-    (docs/theory/losses.md). Otherwise W is the loss of the second cycle on the path.
+    At constant load the loss W is (1) of docs/theory/losses.md. Otherwise W is the loss of the
+    second cycle on the path.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
     holding = control_held(contact, holding)
@@ -82,7 +81,7 @@ def path_gradient(
 
 
 def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: bool) -> Gradient:
-    """The gradient of a weighted sum along a path; with derivatives by loads if `paths`."""
+    """The gradient of a weighted sum along a path; if `paths`, with derivatives by all loads."""
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)

@@ -1,4 +1,4 @@
-"""`Objective`: a result as a function of a scene's parameters, for optimisers and frameworks."""
+"""`Objective`: a result as a function of parameters of a scene, for optimisers and frameworks."""
 
 from __future__ import annotations
 
@@ -22,30 +22,31 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
 
-#: The possible values of `of`, and the quantity that must be prescribed for each.
+#: The possible values of `of`, each with the quantity that must be prescribed for it.
 NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
 
-#: The possible parameters: of each asperity, of the scene, of the material, and prescribed ones.
+#: The possible parameters: of asperities, of the scene, of the material, and prescribed quantities.
 EACH, WHOLE = ("heights", "tip_radii", "positions"), ("sphere_radius", "friction")
 ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach", "force")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Objective(Record):
-    """A result for a scene as a function of a vector of parameters, with its gradient.
+    """A result for a scene as a function of a vector of parameters, with the gradient.
 
-    scene : values of all parameters that are not varied
-    of    : "loss" of the symmetric cycle of this force, "displacement" under it, "approach" under
-        a load, "load" at an approach
-    by    : contents of the vector, in this order: "heights", "tip_radii", "positions" (x and y of
-        the first asperity, ...), "sphere_radius", "contact_modulus", "poisson_ratio", "friction",
-        "load", "approach", "force"
-    load or approach : the prescribed quantity, kept constant;  force : [force] half the range of
-        the cycle
+    scene : the scene, with the values of all parameters that are not in the vector
+    of    : the result: "loss" of the symmetric cycle with the amplitude `force`, "displacement"
+        under `force`, "approach" under `load`, or "load" at `approach`
+    by    : names of the parameters in the vector, in the order of the vector: "heights",
+        "tip_radii", "positions" (x and y of the first asperity, ...), "sphere_radius",
+        "contact_modulus", "poisson_ratio", "friction", "load", "approach", "force"
+    load  : [force] the prescribed load, or None
+    approach : [length] the prescribed approach, or None
+    force : [force] shear force, or amplitude of the cycle
     influence : compliance operator, as in `press`
 
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
-    Divide by the initial value: the tolerances of scipy are absolute, and a loss may be 1e-13.
+    Divide both by the initial value: scipy's tolerances are absolute, and a loss may be 1e-13.
     `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
@@ -85,7 +86,7 @@ class Objective(Record):
                 raise InputError("by", found=repr(name), expected=expected)
 
     def _able(self) -> list[str]:
-        """The parameters on which the number depends; `press` depends on no friction."""
+        """The parameters on which the number depends."""
         known = [*EACH, *WHOLE, *ELASTIC, *PRESCRIBED]
         if NUMBERS[self.of] != "force":
             known.remove("force")
@@ -94,7 +95,7 @@ class Objective(Record):
         return [name for name in known if getattr(self, name, 0.0) is not None]
 
     def _listed(self) -> tuple[str, ...]:
-        """The names in `by`, checked for repetition."""
+        """The names in `by`, after a check that none is repeated."""
         try:
             by = tuple(self.by)
             once = 0 < len(by) == len(set(by))
@@ -107,11 +108,11 @@ class Objective(Record):
 
     @property
     def start(self) -> Array:
-        """(m,) the parameters of the given scene and the prescribed quantities."""
+        """(m,) the vector of parameters for the given scene and prescribed quantities."""
         return np.concatenate([np.ravel(self._own(name)) for name in self.by]).astype(np.float64)
 
     def __call__(self, parameters: ArrayLike) -> tuple[float, Array]:
-        """The number and its gradient (m,).
+        """The number, and the gradient (m,).
 
         parameters : (m,) in the order of `by`, in the scene's units
 
@@ -141,25 +142,25 @@ class Objective(Record):
         return contact.gradient(load=1.0)
 
     def to_jax(self) -> Callable[[Any], Any]:
-        """The number as a function for jax.grad, jax.jit and jax.vmap. Raises ExtraError."""
+        """The number as a function for jax. Raises ExtraError if jax is not installed."""
         from convexrough.gradients.with_jax import differentiable
 
         return differentiable(self)
 
     def to_torch(self) -> Callable[[Any], Any]:
-        """The number as a function of torch that supports `backward`. Raises ExtraError."""
+        """The number as a function for torch. Raises ExtraError if torch is not installed."""
         from convexrough.gradients.with_torch import differentiable
 
         return differentiable(self)
 
     def to_autograd(self) -> Callable[[Any], Any]:
-        """The number as a function for `autograd.grad`. Raises ExtraError."""
+        """The number as a function for autograd. Raises ExtraError if it is not installed."""
         from convexrough.gradients.with_autograd import differentiable
 
         return differentiable(self)
 
     def _own(self, name: str) -> Any:
-        """The value of a parameter in the given scene, or the prescribed one."""
+        """The value of a parameter in the given scene, or the prescribed quantity."""
         if name in EACH:
             return getattr(self.scene.asperities, name)
         if name in ELASTIC:
@@ -196,7 +197,7 @@ class Objective(Record):
 
 
 def _loss(contact: Contact, force: float | None) -> Gradient:
-    """The gradient of the loss of the cycle between -force and force; errors name the force."""
+    """The gradient of the loss of the cycle from -force to force; errors name `force`."""
     if force is not None:
         checks.non_negative("force", force)
     try:
@@ -208,7 +209,7 @@ def _loss(contact: Contact, force: float | None) -> Gradient:
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter; a change of a cycle's force moves maximum and minimum."""
+    """The derivative by a parameter. The force of a cycle changes maximum and minimum."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

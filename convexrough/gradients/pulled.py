@@ -1,19 +1,9 @@
-"""Derivatives of a number at one load level, as balls in the units of the level.
+"""Derivatives of a number at one load level, as balls in the scaled units of the level.
 
 A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
-indentations n (minus the gap where open), and the energy V. It depends on the offsets d, the local
-coefficients k and the influence matrix A. With C = k P^(2/3), c = dP/dC, q = dP/dL and S = dD0/dL,
-
-    dV  = -P'dd + (3/5) (P C)'d log k + P'dA P / 2 + D0 dL,
-    dD0 = -q'dd + (q C)'d log k + q'dA P + S dL.
-
-A number with the weights w of loads and v of indentations takes one linear solve:
-lambda / c + A lambda = w - A v + mu, sum lambda = 0 gives
-
-    w'dP + v'dn = (lambda + v)'dd - (lambda C)'d log k - (lambda + v)'dA P
-                  + (sum v) dD0 + (w - A v)'q dL.
-
-Derived in docs/theory/gradients.md.
+indentations n (minus the gap where open), and energy V. It depends on the offsets d, the local
+coefficients k and the compliance matrix A. (1), (2) and (4) of docs/theory/gradients.md give its
+derivatives; the weights v and w, and lambda, are those of (4).
 """
 
 from __future__ import annotations
@@ -30,17 +20,17 @@ from convexrough.numbers.balls import Ball, where
 
 ZERO = Ball.exact(0.0)
 
-#: Derivatives of a level's total load (own units), by the names of the parameters.
+#: Derivatives of a level's total load (in scaled units), by the names of the parameters.
 Moves: TypeAlias = Mapping[str, Ball]
 
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a number that comes from one level: a weighted sum of its results.
+    """The part of a number that comes from one level: a weighted sum of V, D0, P and n.
 
-    energy, approach : () weights of V and D0, in the unit of the number over that of the level
-    loads, indentations : (n,) weights of P and n
-    moves    : derivatives of the level's total load by parameters of the number
+    energy, approach : weights of V and D0, in the unit of the number over that of the level
+    loads, indentations : (n,) weights of P and n, in such units
+    moves : derivatives of the level's total load by parameters of the number
     """
 
     level: Level
@@ -52,7 +42,6 @@ class Part:
 
     @property
     def value(self) -> Ball:
-        """The weighted sum."""
         level = self.level
         total = self.approach * level.approach
         if self.energy.size > 0.0:
@@ -75,8 +64,10 @@ class Part:
 class Pulled(NamedTuple):
     """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a part.
 
-    Arrays are (n,). loads, coupled : P and A P;  total : L
-    steep : weight of D0 if the load is 0, where D0 changes infinitely fast with L
+    offsets, local, left : (n,) the coefficients
+    loads, coupled : (n,) P and A P
+    total : L
+    steep : weight of D0 if L = 0, where the derivative dD0/dL is infinite
     """
 
     offsets: Ball
@@ -90,7 +81,6 @@ class Pulled(NamedTuple):
 
     @classmethod
     def of(cls, part: Part) -> Pulled:
-        """The derivative of one part."""
         level, v, w = part.level, part.indentations, part.loads
         weight = part.approach if v is None else part.approach + v.sum()
         P, zero = level.loads, Ball.exact(np.zeros(len(level.problem)))
@@ -116,7 +106,6 @@ class Pulled(NamedTuple):
         return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, coupled, level.load)
 
     def times(self, factor: Ball) -> Pulled:
-        """The derivative times a factor."""
         return self._replace(
             offsets=factor * self.offsets,
             local=factor * self.local,
@@ -127,7 +116,7 @@ class Pulled(NamedTuple):
 
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
-    """Weights of dd and dL at the load 0, where D0 = -d of the first asperity to touch."""
+    """Coefficients of dd and dL at the load 0, where D0 = -d of the first asperity to touch."""
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
@@ -139,7 +128,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 
 
 def product(level: Level, weights: Ball) -> Ball:
-    """A times weights; their radii are multiplied with the largest entry of A."""
+    """A times weights; the sum of their radii is multiplied by the largest entry of A."""
     problem = level.problem
     coupled = problem.product(weights.mid)
     if weights.radius.any():
@@ -150,5 +139,4 @@ def product(level: Level, weights: Ball) -> Ball:
 
 
 def value_of(parts: Iterable[Part]) -> Ball:
-    """The sum of these parts."""
     return sum((part.value for part in parts), start=ZERO)

@@ -1,6 +1,7 @@
-"""Derivatives by the parameters of a scene, as balls, from those by offsets, coefficients and A.
+"""Derivatives by the parameters of a scene, as balls.
 
-These are dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, and
+They follow from the derivatives by offsets d, coefficients k and the compliance matrix A,
+dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, and from
 
     d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
     A_ij = 1 / (pi E* |c_i - c_j|).
@@ -29,7 +30,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named
 from convexrough.scene.scene import Scene
 
-#: For at most so many loaded asperities, sums over pairs are computed with balls.
+#: Largest number of loaded asperities for which sums over pairs are computed with balls.
 PAIRWISE = 1000
 
 #: Number of pairs whose balls are computed together.
@@ -48,9 +49,12 @@ class Bending(NamedTuple):
 class Geometry:
     """The geometry of a problem's candidates in the scene's units, as balls.
 
-    points : (n, 2) r, of the summits;  contact_points : (n, 2) c
-    tips   : (n,) rho;  curvature : (2,) 1/R along x and y;  bend : (n, 2) b
-    share  : (n, 2) c / r;  relative : (n,) 1 / (1/R + 1/rho)
+    points, contact_points : (n, 2) r and c
+    tips      : (n,) rho
+    curvature : (2,) 1/R along x and y
+    bend      : (n, 2) b
+    share     : (n, 2) c / r
+    relative  : (n,) 1 / (1/R + 1/rho)
     """
 
     problem: NormalProblem
@@ -93,7 +97,6 @@ class Geometry:
 
     @cached_property
     def by_tip(self) -> Bending:
-        """Derivatives by rho."""
         r, local = self.points, -self.relative / (3.0 * self.tips * self.tips)
         if not self.closest:
             return Bending(0.0 * local, local, 0.0 * r)
@@ -102,7 +105,6 @@ class Geometry:
 
     @cached_property
     def by_radius(self) -> Bending:
-        """Derivatives by the radius of a sphere."""
         squared = self.curvature[0] * self.curvature[0]
         flatter = self.points * self.share * self.share * squared
         outwards = flatter * self.tips[:, None] if self.closest else 0.0 * flatter
@@ -110,7 +112,7 @@ class Geometry:
         return Bending((self.points * flatter).sum() * 0.5, local, outwards)
 
     def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
-        """Changes due to those of heights (n,), rho (n,), summits (n, 2) and a sphere's radius."""
+        """Changes for given changes of heights, rho (n,), summits (n, 2) and a sphere's radius."""
         a, b, sunk = self.by_tip, self.by_radius, (self.points * self.bend * moved).sum()
         return Bending(
             heights - sunk + tips * a.offsets + radius * b.offsets,
@@ -119,11 +121,10 @@ class Geometry:
         )
 
     def slopes(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
-        """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 for the m asperities `which`.
+        """(m, 2) sums -scale sum_j (c_i - c_j) P_j / r_ij^3 for the asperities `which`, per P.
 
-        loads : several (m,) P. For more than PAIRWISE asperities the sums are computed in float64.
-        With a matrix their error is about m roundoffs of the sum of magnitudes; else no bound is
-        known
+        loads : vectors P, (m,) each. For more than PAIRWISE asperities the sums are computed in
+            float64, and without a stored matrix no error bound is known
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)
@@ -162,7 +163,9 @@ class Geometry:
 class Derivatives:
     """Derivatives of one number by the parameters of the n candidates, in the scene's units.
 
-    offsets : (n,) by d [1 / length];  local : (n,) by log k;  pulled : derivatives of each level
+    offsets : (n,) derivatives by d
+    local   : (n,) derivatives by log k
+    pulled  : derivatives of each level
     """
 
     geometry: Geometry
@@ -178,7 +181,7 @@ class Derivatives:
         return cls(Geometry.of(problem), offsets, local, tuple(pulled))
 
     def in_scene(self, values: Array) -> Array:
-        """(N, ...) values of the candidates, and 0 for all other asperities."""
+        """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
         problem = self.geometry.problem
         return frozen(among_zeros(values, problem.candidates, len(problem.scene)))
 
@@ -212,7 +215,7 @@ class Derivatives:
         return self.turning * geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
-        """(n,) derivatives by parameters that change the geometry by these amounts."""
+        """(n,) derivatives along a change of the geometry."""
         found = self.offsets * by.offsets + self.local * by.local
         return found + (self.turning * by.points).sum() if self.geometry.closest else found
 
@@ -222,7 +225,7 @@ class Derivatives:
 
     @property
     def sphere_radius(self) -> Ball | None:
-        """The derivative by the radius of the sphere; None for other bases."""
+        """The derivative by the radius of the sphere; None for other shapes."""
         if named(self.geometry.problem.scene.sphere_radius) != "a sphere":
             return None
         return self.along(self.geometry.by_radius).sum()

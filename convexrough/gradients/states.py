@@ -1,4 +1,4 @@
-"""Gradients of a pressed contact, a friction state, and an onset of sliding."""
+"""Gradients of a pressed contact, of a friction state, and of the onset of sliding."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from convexrough.normal.refine import refined_loads
 from convexrough.numbers import balls
 from convexrough.numbers.balls import Ball
 
-#: Newton steps to the level at which an asperity starts to slide. The start has an error of about
-#: 1e-15; each step raises the error to the power 3/2.
+#: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
+#: about 1e-15 at first, and each step raises it to the power 3/2.
 NEWTON = 3
 
 
 @dataclass(frozen=True)
 class Frictional:
-    """A contact with friction, and its levels by rational loads."""
+    """A contact with friction, and the levels of this contact by rational loads."""
 
     contact: Contact
     known: FrictionLevels
@@ -64,7 +64,7 @@ class Frictional:
 
     @property
     def unit(self) -> float:
-        """[force] the unit of loads of the levels."""
+        """[force] the scaled unit of loads."""
         return self.known.units.force
 
     def below(self, what: str, force: float | Fraction, holding: Holding) -> Level:
@@ -76,7 +76,7 @@ class Frictional:
         return self.known.at(self.known.load - height)
 
     def moves(self, height: Ball, /, **shares: float) -> Moves:
-        """Derivatives of L = P - T by load, friction, and forces; shares : dQ by these forces."""
+        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ by each force."""
         by_force = -1.0 / self.known.force_unit
         rates = {name: by_force * share for name, share in shares.items()}
         return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
@@ -138,11 +138,12 @@ def state_gradient(
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
     """Derivatives of the shear force at which one asperity starts to slide on first loading.
 
-    asperity : its index in the scene;  holding : quantity kept constant, as in `Contact.gradient`
+    asperity : index of the asperity in the scene
+    holding  : quantity kept constant, as in `Contact.gradient`
 
-    Raises InputError if the asperity carries no load, or if several asperities slide last and it is
-    one of them (there is no derivative); ProofError if it is not proved that its indentation rises
-    with the load.
+    Raises InputError if the asperity carries no load, or is one of several that slide last, where
+    there is no derivative; ProofError if it is not proved that the indentation of the asperity
+    rises with the load.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
@@ -190,15 +191,15 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
         load = Ball.exact((load - level.indentation[place] / slope).mid)
     level, slope = at(load)
     left = float(level.indentation[place].size)
-    reach = 2.0 * left / float(slope.lower) if slope.positive else np.inf
-    level, slope = at(Ball.around(load.mid, reach))
-    if not left <= float(slope.lower) * reach:
+    radius = 2.0 * left / float(slope.lower) if slope.positive else np.inf
+    level, slope = at(Ball.around(load.mid, radius))
+    if not left <= float(slope.lower) * radius:
         raise ProofError("the onset is not proved: the indentation may fall as the load rises")
     return level, slope
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """Weights of gaps, 0 where not open; a ball that contains both where this is not proved."""
+    """Weights of gaps, 0 for asperities that touch; balls that contain both if undecided."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
@@ -209,7 +210,7 @@ def _where_open(level: Level, weights: Array) -> Ball:
 
 
 def _wider(level: Level, which: Indices) -> Level:
-    """The same level with more candidates, which are open."""
+    """The level with further candidates, which are open."""
     problem = level.problem.widened(which)
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)
@@ -221,7 +222,7 @@ def _wider(level: Level, which: Indices) -> Level:
 
 
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
-    """The given weights, checked: numbers, and (n,) of asperities; 0 for those not given."""
+    """The checked weights: numbers, or arrays (n,) for asperities; 0 for those not given."""
     if all(value is None for value in weights.values()):
         expected = "weights of at least one of these results"
         raise InputError(", ".join(weights), found="none", expected=expected)

@@ -12,9 +12,11 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """A function f(x) -> number for `autograd.grad`, from `both`: x -> (number, gradient).
+    """A function f(x) -> number for `autograd.grad`, without second derivatives.
 
-    There are no second derivatives. Raises ExtraError if autograd is not installed.
+    both : function x -> (number, gradient)
+
+    Raises ExtraError if autograd is not installed.
     """
     try:
         from autograd.extend import defvjp, primitive

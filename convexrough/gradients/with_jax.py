@@ -12,10 +12,10 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """A function f(x) -> number for jax.grad, jax.jit and jax.vmap, from `both`.
+    """A function f(x) -> number for jax.grad, jax.jit and jax.vmap, without second derivatives.
 
-    both : x -> (number, gradient), computed outside of jax in float64; without `jax_enable_x64`
-        results are rounded to float32. There are no second derivatives
+    both : function x -> (number, gradient), called outside of jax in float64. Without the option
+        `jax_enable_x64` results are rounded to float32
 
     Raises ExtraError if jax is not installed.
     """

@@ -12,9 +12,10 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """A function f(x) -> number that supports `backward`, from `both`: x -> (number, gradient).
+    """A function f(x) -> number that supports `backward`, without second derivatives.
 
-    It is computed outside of torch, in float64, on the CPU. There are no second derivatives.
+    both : function x -> (number, gradient), called outside of torch in float64 on the CPU
+
     Raises ExtraError if torch is not installed.
     """
     try:

@@ -1,4 +1,4 @@
-"""The choice of a compliance operator: the cheapest exact one, unless one is named."""
+"""`couple`: the compliance operator of some asperities of a scene."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: Largest number of asperities for which the matrix is always cheapest. It affects speed only.
+#: Largest number of asperities for which a matrix is cheapest, on a lattice and elsewhere. Timed on
+#: two cores; the numbers affect speed only.
 FEW_ASPERITIES = 512
-
-#: The same for asperities that are not on a lattice. Both were timed on two cores.
 FEW_SCATTERED = 3000
 
 
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
-    """The compliance operator of some of a scene's asperities; scale = 1 / (pi E*) in their units.
+    """The compliance operator of the asperities `which` of a scene.
 
-    kind : None for the cheapest: a matrix for few asperities, else Fourier transforms, on a lattice
-        if the asperities lie on one, else on a mesh
+    scale : 1 / (pi E*), with the contact modulus E*, in the units of the loads
+    kind  : None for the cheapest: a matrix for few asperities, else Fourier transforms, on a
+        lattice if the asperities lie on one, else on a mesh
 
     Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
     than fit in memory.

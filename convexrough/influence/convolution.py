@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices
 
-#: Roundoffs, relative in the 2-norm, of one pass of a transform, by its radix p: 4.5 for the
-#: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
-#: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
-#: docs/theory/operators-lattice.md, "Rounding".
+#: Error of one pass of a transform in roundoffs, relative to the 2-norm, by its radix:
+#: docs/theory/operators-lattice.md, "Rounding". Radices 4 and 8 have smaller errors than two and
+#: three passes of radix 2.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed in groups: this many bytes of each row, so that they fit in the cache.
@@ -37,11 +36,10 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 @dataclass(frozen=True, eq=False)
 class SiteBox:
-    """A box of sites, and convolutions on it.
+    """A rectangle of lattice sites i b1 + j b2, with convolutions on it.
 
     shape  : (rows, columns) of sites
-    basis  : (2, 2) rows b1 and b2 in units of the spacing, so that the kernel fits in single
-        precision for any units of the scene
+    basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
     extent : [spacing] upper bound on the distance of two occupied sites
     """
 
@@ -53,8 +51,8 @@ class SiteBox:
     def padded(self) -> tuple[int, int]:
         """The size of the transforms, in which no two differences of occupied sites coincide.
 
-        Twice the box is enough, as no difference has so many rows or columns. A smaller size is
-        enough if every period i b1 + j b2 is longer than twice the extent.
+        Twice the box is enough. A smaller size is enough if every period is longer than twice the
+        extent.
         """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
 
@@ -74,16 +72,15 @@ class SiteBox:
 
     @property
     def workers(self) -> int:
-        """The number of threads for the transforms."""
         return threads.worthwhile(self.padded[0] * self.padded[1])
 
     @cached_property
     def loss(self) -> float:
-        """Roundoffs of one two-dimensional transform, relative in the 2-norm."""
+        """Error of one two-dimensional transform in roundoffs, relative to the 2-norm."""
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
-        """1 / |i b1 + j b2|^power for every difference (i, j) of occupied sites; 0 at (0, 0)."""
+        """The kernel 1 / |i b1 + j b2|^power for all differences of occupied sites; 0 at (0, 0)."""
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
             with np.errstate(divide="ignore"):
@@ -129,10 +126,7 @@ class SiteBox:
         return found[::-1]
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values at differences of sites, in some rows of the padded box; 0 where there are none.
-
-        Each place has the value for the shortest difference of two sites that maps to it.
-        """
+        """Values in some rows of the padded box, for the shortest differences that map there."""
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []
@@ -172,7 +166,7 @@ class SiteBox:
         return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Differences i, j of two sites of the box, and the rows and columns that they map to."""
+        """Rows and columns of the padded box, and the differences i, j that map to them."""
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
@@ -194,10 +188,10 @@ class SiteBox:
         return x
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field (rows, columns) with a kernel, on the box.
+        """The convolution of a field (rows, columns) with a kernel.
 
-        The field may have extra columns of zeros up to the padded width, which saves a copy; these
-        columns of the result are meaningless.
+        The field may have extra columns of zeros up to the padded width, which saves a copy. These
+        columns of the result have no meaning.
         """
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
@@ -207,7 +201,7 @@ class SiteBox:
         return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
+        """Bound on the 2-norm of the error of `convolve`, divided by the 2-norm of the field.
 
         (1) of docs/theory/operators-lattice.md, "Rounding".
         """
@@ -216,12 +210,9 @@ class SiteBox:
         return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
 
     def bound_each(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on each component of the error of `convolve`, relative to the field's 2-norm.
+        """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        (2) of docs/theory/operators-lattice.md, "Rounding". An error of one forward transform
-        reaches a component multiplied by the 2-norm of the other transform. The error of the
-        inverse transform is relative to the mean modulus of its terms, which is at most the product
-        of both 2-norms.
+        (2) of docs/theory/operators-lattice.md, "Rounding".
         """
         inverse = float(np.sqrt(2.0)) * self.loss
         return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
@@ -231,7 +222,8 @@ class SiteBox:
 class Kernel:
     """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary.
 
-    spectrum : the transform, or its imaginary part;  total, norm : the kernel's sum and 2-norm
+    spectrum    : the transform, or the imaginary part of the transform
+    total, norm : the sum and the 2-norm of the kernel
     """
 
     spectrum: NDArray[Any]
@@ -242,10 +234,9 @@ class Kernel:
 def through_waves(
     fields: Sequence[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
 ) -> list[NDArray[Any]]:
-    """The fields whose transforms `mix` computes from the transforms of the given fields.
+    """The fields (rows, padded columns) whose transforms `mix` computes.
 
-    The given fields (rows, columns) are padded with zeros. The results have the same number of
-    rows, and all padded columns.
+    fields : (rows, columns) each; `mix` gets their transforms, after padding with zeros
     """
     from scipy import fft
 
@@ -273,7 +264,7 @@ def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """The fewest places in a direction whose period exceeds `length` sites; at most `twice`."""
+    """The smallest number of places whose period exceeds `length` sites; at most `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -288,7 +279,7 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Distances and differences (i, j) of two sites, nearest first; (-i, -j) is left out."""
+    """Distances and differences (i, j) of two sites, nearest first, without (-i, -j)."""
     rows, columns = box.shape
     reach = 1
     done = 0.0

@@ -1,8 +1,8 @@
-"""The interface of all elastic couplings of asperities, with bounds on their rounding errors.
+"""The interface of all compliance operators of asperities, with bounds on their rounding errors.
 
-A point force at one asperity moves another, at a distance r, by 1 / (pi E* r) (Boussinesq;
-equation (3) of the source). The coupling has a zero diagonal: an asperity's own displacement is
-Hertz's business.
+A unit point force displaces the surface at the distance r by 1 / (pi E* r), with the contact
+modulus E* (Boussinesq; equation (3) of Dini and Hills, 2009). The diagonal of an operator is 0: the
+contact law adds the displacement of an asperity by its own load, from Hertz's law.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from convexrough.arrays import Array, Indices
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 
-#: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
-#: squares 3, their sum 4, its root 3, then a product with pi and a division.
+#: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points. It is 1 after the
+#: differences, 3 after the squares, 4 after their sum, 3 after the root, and 8 at the end.
 ENTRY_ROUNDOFFS = 8
 
-#: The ways to couple.
+#: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
 
-#: For given W: from r to about (I + W A W)^-1 r, and about the 2-norm of A W r.
+#: A function of r that returns estimates of (I + W A W)^-1 r and of the 2-norm of A W r.
 Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 
 
 class Rounding(NamedTuple):
-    """How far a computed product A P can be from the true one, for loads of either sign.
+    """Bounds on the error of a computed product A P, for loads of either sign.
 
     The error of component i is at most  relative * (A |P|)_i + r_i  with |r_i| <= each  and
     ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md.
@@ -45,11 +45,7 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """2-norm of a residual that solvers need not reduce: small beside these bounds.
-
-        By a factor of 10 beside that of sums, which is near the truth, and of 50 beside that of
-        transforms, which is some thousand times the truth.
-        """
+        """2-norm of a residual that solvers need not reduce, because the bounds are larger."""
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.norm
 
@@ -58,7 +54,7 @@ class Coupling(Protocol):
     """A linear map from loads at the asperities to displacements at some points."""
 
     def apply(self, loads: Array) -> Array:
-        """(m,) A P for loads (n,); in float32 where the loads are, if that is faster."""
+        """(m,) A P for loads (n,); in float32 if the loads are float32 and that is faster."""
         ...
 
     def rounding(self, loads: Array) -> Rounding:
@@ -66,23 +62,23 @@ class Coupling(Protocol):
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(m,) upper bounds on sum_j strengths_j / r_ij^power, to be a few per cent of it high.
+        """(m,) upper bounds on sum_j strengths_j / r_ij^power, mostly a few per cent too large.
 
-        Higher where the strengths differ by many powers of ten, and the sum is small.
-
-        strengths : (n,) not negative;  power : 2 or 3
+        strengths : (n,) not negative
+        power     : 2 or 3
         """
         ...
 
 
 class Influence(Coupling, Protocol):
-    """The coupling A among asperities.
+    """The compliance operator A among asperities, A_ij = scale / r_ij.
 
     name   : "dense", "lattice" or "scattered"
-    points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
-    stored : the matrix is stored, so that to use it, or a part of it, costs nothing; else products
-        of float32 loads are cheaper than those of float64 loads
-    cheap_sums : `sums` cost few products, so that Newton's last step starts from them
+    points : (n, 2) [length]
+    scale  : 1 / (pi E*) in the units of the problem
+    stored : True if the matrix is stored; otherwise products with float32 loads are cheaper than
+        with float64 loads
+    cheap_sums : True if `sums` costs few products, so that Newton's last step starts from it
     """
 
     @property
@@ -98,11 +94,11 @@ class Influence(Coupling, Protocol):
 
     @property
     def matrix(self) -> Array:
-        """(n, n) A itself; computed when asked for, if it fits in memory, unless it is stored."""
+        """(n, n) A as a matrix, which must fit in memory."""
         ...
 
     def submatrix(self, which: Indices) -> Array:
-        """(m, m) A among some of the asperities, to be written into."""
+        """(m, m) A among some of the asperities, as a new array."""
         ...
 
     @property
@@ -113,17 +109,17 @@ class Influence(Coupling, Protocol):
     def __len__(self) -> int: ...
 
     def restricted(self, which: Indices) -> Influence:
-        """The coupling among some of the asperities."""
+        """The operator among some of the asperities."""
         ...
 
     def onto(self, points: Array) -> Coupling:
-        """The displacements that these asperities cause elsewhere; 0 from a point to itself."""
+        """The map from loads to displacements at other points; 0 from a point to itself."""
         ...
 
     def slopes(self, loads: Array) -> Array:
-        """(n, 2) [1 / length] how A P changes at each asperity as its point is moved.
+        """(n, 2) derivatives of (A P)_i with respect to the point c_i of the asperity.
 
-        -scale sum_j (c_i - c_j) P_j / r_ij^3; nothing is proved of its rounding.
+        They are -scale sum_j (c_i - c_j) P_j / r_ij^3, without a bound on the rounding error.
         """
         ...
 
@@ -136,35 +132,28 @@ class Influence(Coupling, Protocol):
         ...
 
     def semidefinite_with(self, radius: float) -> bool:
-        """Whether A + (scale / radius) I >= 0 is known, shells of that radius may well overlap.
-
-        From what is known of a lattice; elsewhere False.
-        """
+        """True if A + (scale / radius) I is proved positive semidefinite; only for lattices."""
         ...
 
     def sums(self, loads: Pair) -> Ball:
-        """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
-
-        Of the points where they are, as far as that is known.
-        """
+        """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`."""
         ...
 
     def smoother(self, root: Array) -> Smoother | None:
         """An approximate inverse of I + W A W, W = diag(root), symmetric and positive definite.
 
-        It also says how large A W r is, about: what an error r of a linear system in Newton's
-        method leaves of the normal map. None where there is nothing better than the identity.
+        None if nothing better than the identity is known.
         """
         ...
 
 
 def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
-    """(m,) bounds on sqrt(sum_j A_ij^2 v_j): how far an error of the loads moves each point."""
+    """(m,) bounds on sqrt(sum_j A_ij^2 v_j), the effect of load errors on displacements."""
     return scale * np.sqrt(coupling.falloff(variances, 2))
 
 
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
-    """(n, 2) the points, with what they lack if that is given; and a bound on their error."""
+    """(n, 2) points plus their low parts (tails), if given, and a bound on the remaining error."""
     if tails is None:
         return Pair.exact(points), point_error
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))
@@ -173,7 +162,7 @@ def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair,
 def squared_distances(
     points: Array, others: Array, tails: tuple[Array, Array] | None = None
 ) -> Array:
-    """(n, m) [length^2] r_ij^2; with what the points and the others lack."""
+    """(n, m) [length^2] r_ij^2; `tails` are low parts of the points and of the others."""
     squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
     if tails is not None:
         squares += np.subtract.outer(tails[0][:, 0], tails[1][:, 0])
@@ -185,7 +174,7 @@ def squared_distances(
 
 
 def inverse_distances(points: Array, others: Array) -> Array:
-    """(n, m) [1/length]  1 / r_ij, and 0 where the two points are one."""
+    """(n, m) [1 / length] 1 / r_ij, and 0 where two points coincide."""
     squares = squared_distances(points, others)
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / np.sqrt(squares)
@@ -194,7 +183,7 @@ def inverse_distances(points: Array, others: Array) -> Array:
 
 
 def cubed(squares: Array) -> Array:
-    """1 / r^3 of squared distances, and 0 where two points are one."""
+    """1 / r^3 for squared distances r^2, and 0 where two points coincide."""
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / (squares * np.sqrt(squares))
     inverse[squares == 0] = 0.0

@@ -24,12 +24,12 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: Largest coupling to other points that is cached: a larger one is recomputed as fast as read.
+#: Largest number of entries 1 / r to other points that are cached; reading more saves no time.
 KEPT = 2**16
 
 
 def fits_densely(count: int) -> None:
-    """Raise InputError if the matrix of all pairs, with the copies a solver needs, is too large."""
+    """Raise InputError if the matrix of all pairs, with a solver's copies, exceeds the memory."""
     checks.fits_in_memory("asperities that could touch", count, 5 * 8, power=2)
 
 
@@ -42,18 +42,14 @@ def dense_matrix(points: Array, scale: float) -> Array:
 
 
 def entry_error(point_error: float, nearest: float) -> float:
-    """Relative error of a computed scale / r, for r at least `nearest`.
-
-    Each point has an error of at most sqrt(2) point_error, so the distance has an error of at most
-    x r, and 1 / r a relative error of at most x / (1 - x).
-    """
+    """Bound on the relative error of a computed scale / r, for r of at least `nearest`."""
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
     return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
 
 
 def by_pairs(points: Array, values: Array) -> Array:
-    """sum_j (c_i - c_j) v_j / r_ij^3 (n, 2) for points c, summed pair by pair."""
+    """(n, 2) sums over j of (c_i - c_j) v_j / r_ij^3 for points c and values v."""
     total = np.empty_like(points)
     rows = max(1, 2**22 // max(1, len(points)))
     for start in range(0, len(points), rows):
@@ -67,13 +63,10 @@ def by_pairs(points: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DenseInfluence:
-    """The coupling A as a stored matrix.
+    """The compliance operator as a stored matrix; see `coupling.Influence`.
 
-    points      : (n, 2) [length]
-    scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
     entry_error : bound on the relative error of each A_ij
-    sums        : the map from P to sum_j P_j / r_ij, with many more digits
     """
 
     points: Array
@@ -112,7 +105,7 @@ class DenseInfluence:
         return len(self.points)
 
     def apply(self, loads: Array) -> Array:
-        """A P, summed in blocks of about sqrt(n) terms: rounding grows as sqrt(n), not as n."""
+        """A P, summed in blocks of about sqrt(n) terms, so that rounding grows only as sqrt(n)."""
         size = self._block
         if len(self) <= size:
             return np.asarray(self.matrix @ loads)
@@ -122,10 +115,7 @@ class DenseInfluence:
         return total
 
     def rounding(self, loads: Array) -> Rounding:
-        """The error of a sum of m terms is at most m roundoffs times the sum of their sizes.
-
-        (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
-        """
+        """Bounds for sums in blocks: Higham, Accuracy and Stability, section 4.2."""
         terms = self._block + -(-len(self) // self._block) + 1
         return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0, 0.0)
 
@@ -176,17 +166,13 @@ class DenseInfluence:
         return max(64, int(np.ceil(np.sqrt(len(self)))))
 
     def _loss(self, power: int) -> float:
-        """Relative error of a sum of powers of 1 / r."""
+        """Bound on the relative error of a sum of powers of 1 / r."""
         return 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
 
 
 @dataclass(frozen=True, eq=False)
 class DenseCoupling:
-    """Displacements at other points, computed row by row; a large matrix is not stored.
-
-    points  : (n, 2) [length] the asperities
-    targets : (m, 2) [length] the other points
-    """
+    """The map from loads at `points` (n, 2) to displacements at `targets` (m, 2) [length]."""
 
     points: Array
     targets: Array
@@ -215,7 +201,7 @@ class DenseCoupling:
         return inverse_distances(self.targets, self.points)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
-        """1 / r in blocks of rows; a single small block is cached."""
+        """1 / r in blocks of rows; a small matrix is one block, which is cached."""
         if len(self.points) * len(self.targets) <= KEPT:
             yield slice(None), self._whole
             return

@@ -1,9 +1,9 @@
 """The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
 The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
-box of sites that holds the asperities is padded with zeros to at most about twice its size, so that
-there are no periodic images. Heights and radii of the asperities do not matter. The rounding errors
-of the transforms are bounded in docs/theory/operators-lattice.md, "Rounding".
+box of sites that holds the asperities is padded with zeros, to at most about twice its size, so
+that there are no periodic images. The method, its rounding errors and the products with more digits
+("sharp" products) are explained in docs/theory/operators-lattice.md.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ ENTRY_ROUNDOFFS = 24
 #: Number of array elements in a block, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
-#: Fill ratio of a box below which neighbours are found by a k-d tree. A heuristic: it affects speed
-#: and the tightness of the shells.
+#: Fill ratio of a box below which a k-d tree finds neighbours. A heuristic: it affects speed, and
+#: how tight the nearest distances are from which docs/theory/convexity.md makes shells.
 FILLED = 0.2
 
 #: Number of asperities above which rarely needed spectra are not cached.
 MOST_KEPT = 2**21
 
-#: 2 log 2, rounded down. The symbol of a row of points has the minimum -2 log 2, and that of every
-#: lattice is at least as low. The constant affects speed only.
+#: 2 log 2, rounded down. The minimum of the symbol is -2 log 2 for a row of points, and at most
+#: this for every lattice. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -62,7 +62,7 @@ class LatticeCoupling:
     sources, targets : (n,), (m,) indices of the sites in the box, row by row
     scale   : A_ij r_ij
     spacing : [length] the shortest distance of two sites
-    site_error : [spacing] bound on |(x_i - x_j) - (s_i - s_j)| for points x and their sites s
+    site_error : [spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i
     """
 
     box: SiteBox
@@ -79,8 +79,8 @@ class LatticeCoupling:
         return product
 
     def rounding(self, loads: Array) -> Rounding:
-        # Points that deviate from their sites change 1/r by at most site_error / r^2. The sum of
-        # that over a row bounds the effect on the 2-norm and on the largest component.
+        # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
+        # row sum of this bounds the effect on the 2-norm and on the largest component.
         kernel, off = self._kernel, self._displaced
         size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
@@ -89,7 +89,7 @@ class LatticeCoupling:
         return Rounding(relative, self._unit * norm, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """Upper bounds in single precision, which include a bound on the rounding error."""
+        """(m,) upper bounds on sum_j strengths_j / r_ij^power, computed in single precision."""
         kernel = self.box.kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
@@ -110,7 +110,7 @@ class LatticeCoupling:
 
     @property
     def _displaced(self) -> float:
-        """[1 / spacing] bound on the norm of the change of 1/r by deviations from the sites."""
+        """[1 / spacing] norm bound on the change of the matrix 1/r by deviations from the sites."""
         return self.site_error / self._least * self._kernel.norm**2
 
     @cached_property
@@ -149,7 +149,7 @@ class LatticeInfluence(LatticeCoupling):
 
     array       : (N, 2) [length] points, with errors of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact points; its lattice is `lattice` up to the factor `lattice.shrink`
+    layout      : the exact points before they were multiplied by `lattice.shrink`
     lattice     : the lattice of the points
     """
 
@@ -165,7 +165,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @classmethod
     def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """The operator of points (n, 2) [length]. ValueError if some are not on the lattice."""
+        """The operator of points (n, 2) [length]. Raises ValueError for points off the lattice."""
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
@@ -182,7 +182,7 @@ class LatticeInfluence(LatticeCoupling):
         scale: float,
         point_error: float = 0.0,
     ) -> LatticeInfluence:
-        """The operator of the given members of a layout with known sites."""
+        """The operator of the given members of a layout whose sites are known."""
         assert layout.sites is not None
         box, index = _boxed(lattice, layout.sites[members])
         spacing = lattice.spacing
@@ -206,7 +206,6 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def points(self) -> Array:
-        """(n, 2) [length] the points of these asperities."""
         return self.array[self.members]
 
     @property
@@ -259,7 +258,7 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """The largest crowding of a pair. Near pairs come first, so that most are skipped."""
+        """The largest (a_i + a_j) / r_ij, for contact radii a; pairs too far apart are skipped."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
@@ -272,21 +271,21 @@ class LatticeInfluence(LatticeCoupling):
         return worst
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """Pairs of sites as in `neighbours`, with a lower bound on the distance of their points."""
+        """Differences (i, j) of sites, nearest first, with lower bounds on distances of points."""
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if proved by the minimum of the symbol less the effect of deviations from sites."""
+        """True if A + (scale / radius) I is proved positive semidefinite, by the least symbol."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
-        """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
+        """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
 
-        slices : number of slices of 10 to 18 bits into which loads and kernel are divided; default
+        slices : number of parts of 10 to 18 bits into which loads and kernel are divided; default
             3, and 4 on a large box (docs/theory/operators-lattice.md, "Slices")
         """
         slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
@@ -295,7 +294,7 @@ class LatticeInfluence(LatticeCoupling):
         return sliced.sums(loads, self._padded[0], *off_sites)
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
-        """The object of this name, cached for later products unless it is too large."""
+        """The object of this name, cached unless it is too large."""
         found: Made = self._spectra[name] if name in self._spectra else make()
         if len(self) <= MOST_KEPT:
             self._spectra[name] = found
@@ -315,13 +314,7 @@ class LatticeInfluence(LatticeCoupling):
     def _off_sites(self, loads: Array) -> tuple[Array, float]:
         """Change of sum_j P_j / r_ij by deviations from the sites, and a bound on its error.
 
-        With the deviation eps_i of a point from its site, eta >= |eps_i - eps_j| for all i and j,
-        and the distance vector d of two sites (docs/theory/operators-lattice.md, "Points off their
-        sites"),
-
-            1 / |d + eps_i - eps_j| = 1 / |d| - (eps_i - eps_j) . d / |d|^3
-
-        with an error of at most eta^2 / (|d| - eta)^3.
+        The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
         x, y, unknown = self.layout.cached(off_sites)
         shrunk = float(self.lattice.shrink)
@@ -344,7 +337,7 @@ class LatticeInfluence(LatticeCoupling):
         change = fields[2].ravel()[targets]
         change -= x * fields[0].ravel()[targets]
         change -= y * fields[1].ravel()[targets]
-        # The kernel norm bounds the row sums of 1 / r^2, as in `rounding`, and those of 1 / r^3.
+        # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
         error = 2.0 * each_loss(self.box, 2) * norm * most * float(np.linalg.norm(shares))
@@ -359,7 +352,7 @@ class LatticeInfluence(LatticeCoupling):
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:
-    """The largest sum of the values of two sites i rows and j columns apart; at least 0."""
+    """The largest sum of the values at two sites that are i rows and j columns apart, or 0."""
     here, there = field[i:], field[: len(field) - i]
     if j >= 0:
         here, there = here[:, j:], there[:, : there.shape[1] - j]
@@ -398,8 +391,8 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
 
     threads.each(look, threads.chunks(len(points), CHUNK), threads.worthwhile(len(points)))
     most = float(np.abs(sites).max(initial=0))
-    reach = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
-    return away[0], away[1], 96 * ROUNDOFF**2 * reach
+    largest = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
+    return away[0], away[1], 96 * ROUNDOFF**2 * largest
 
 
 def _least_symbol(lattice: Lattice) -> float:

@@ -1,17 +1,9 @@
-"""An approximate inverse of I + W A W on a lattice, for conjugate gradients.
+"""An approximate inverse of I + W A W on a lattice, to precondition conjugate gradients.
 
-Long waves make this matrix hard: there A is large. They see W^2 only as an average over some sites.
-So let G^2 be an average with a Gaussian, d the local mean of W^2 by which w = W / d^(1/2) has
-G^2 w^2 = 1 about, and
-
-    M  =  I - w G (1 - (1 + d A)^-1) G w,
-
-with the median for d and A by Fourier transforms, cut to those that touch: on long waves
-(1 + d A)^-1, on short ones 1, which the matrix is taken to be there; symmetric, and positive
-definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, m at least 2, small beside
-the Gaussian, with A the mean over pairs of blocks.
-(docs/theory/newton.md, "Many asperities".) The constants are heuristics: where they are wrong,
-conjugate gradients take more steps to the same answer.
+It is the preconditioner M of docs/theory/newton.md, "Many asperities", for the compliance operator
+A and a diagonal W. The code computes it on blocks of m x m sites that are smaller than the
+Gaussian, with the mean of A over pairs of blocks. The constants are heuristics: they change the
+number of steps of conjugate gradients, not the answer.
 """
 
 from __future__ import annotations
@@ -28,32 +20,32 @@ from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
 
-#: Windows are so large that the means of W^2 in them scatter by at most about this, squared.
+#: Windows are so large that the relative variance of the mean of W^2 over a window is about this.
 SCATTER = 0.04
 
-#: Width of the Gaussian in parts of such a window, with which both hold as many sites.
+#: Width of the Gaussian divided by the side of a window; with it both average over as many sites.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
-#: Blocks are so many times smaller than windows: what a Gaussian passes, they hold.
+#: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.
 FINE = 3.5
 
-#: Windows of smooth W: so large that blocks have 2 x 2 sites, which costs a third of single ones.
+#: Side of windows for smooth W. Then blocks have 2 x 2 sites, at a third of the cost of one site.
 LEAST_WINDOW = 2 * FINE
 
-#: How large the blocks are on which the scatter of W^2 is looked at.
+#: Side of the windows on which the scatter of W^2 is measured.
 WINDOW = 8
 
-#: The spectrum of A is negative at short waves; in the convex range 1 + d A stays above 0.
+#: Lower limit of 1 + d A, as the spectrum of A is negative at short waves.
 LEAST = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """Blocks of m x m sites that cover a box, and where asperities are.
+    """Blocks of m x m sites that cover a box.
 
     shape  : (rows, columns) of blocks
-    places : (n,) of the asperities, in the box filled up to whole blocks
-    which  : (n,) blocks that they are in
+    places : (n,) sites of the asperities, as indices into the box extended to whole blocks
+    which  : (n,) block of each asperity
     """
 
     m: int
@@ -69,7 +61,7 @@ class _Blocks:
         return cls(m, blocks, places, places // columns // m * blocks[1] + places % columns // m)
 
     def sums(self, values: NDArray[Any]) -> Single:
-        """Of values (n,) over each block."""
+        """The sum of values (n,) over each block."""
         m = self.m
         field = np.zeros((self.shape[0] * m, self.shape[1] * m), dtype=np.float32)
         field.ravel()[self.places] = values
@@ -88,7 +80,7 @@ def block_smoother(
     root: Array,
     workers: int,
 ) -> Smoother:
-    """M for the asperities at places `sources` of a box of sites; root (n,) is W."""
+    """M for asperities at the sites `sources` of a box, with the diagonal `root` (n,) of W."""
     squares = np.zeros(shape[0] * shape[1], dtype=np.float32)
     squares[sources] = root * root
     window = _window(squares.reshape(shape))
@@ -134,7 +126,7 @@ def block_smoother(
 
 
 def _window(squares: Single) -> float:
-    """The smallest m for which means of W^2 over m x m sites vary little from one to the next."""
+    """The smallest m for which the means of W^2 over windows of m x m sites vary little."""
     m = WINDOW
     rows, columns = (max(1, length // m) for length in squares.shape)
     inside = squares[: rows * m, : columns * m]
@@ -149,7 +141,7 @@ def _window(squares: Single) -> float:
 
 
 def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
-    """What a Gaussian of this width (in shortest steps) passes of each wave, once and back."""
+    """The factor by which G^2 multiplies each wave, for a Gaussian of this width [spacing]."""
     dual = 2.0 * np.pi * np.linalg.inv(basis).T
     i, j = (np.fft.fftfreq(n) for n in size)
     i, j = i[:, None], np.abs(j[: size[1] // 2 + 1])
@@ -165,7 +157,7 @@ def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
 def _local_mean(
     sums: Single, touching: NDArray[np.bool_], size: tuple[int, int], passed: Single, workers: int
 ) -> Single:
-    """d, with which sums / d have the local mean 1 about wherever there are any."""
+    """d, such that the local mean of sums / d is about 1 wherever asperities touch."""
 
     def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
         waves[0] *= passed[:, each]
@@ -182,9 +174,9 @@ def _local_mean(
 def _block_spectrum(
     blocks: tuple[int, int], basis: Array, m: int, count: float, workers: int
 ) -> tuple[tuple[int, int], Single]:
-    """Size and spectrum of the mean of 1 / r over pairs of blocks, as if the box were repeated.
+    """Size and spectrum of the mean of 1 / r over pairs of blocks of a periodic box.
 
-    count : touching asperities in a block: a part 1 / count of pairs in one block are no pairs
+    count : mean number of touching asperities in a block
     """
     from scipy import fft
 
@@ -207,6 +199,6 @@ def _block_spectrum(
 
 
 def differences(length: int) -> NDArray[np.int64]:
-    """0, 1, ..., -2, -1: whole numbers modulo the length, nearest to 0."""
+    """0, 1, ..., -2, -1: the whole numbers nearest to 0, modulo the length."""
     i = np.arange(length)
     return np.where(i <= (length - 1) // 2, i, i - length)

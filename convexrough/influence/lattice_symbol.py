@@ -1,13 +1,11 @@
-"""A lower bound on the eigenvalues of the coupling of points on a lattice.
+"""A lower bound on the eigenvalues of the compliance operator of points on a lattice.
 
-docs/theory/operators-lattice.md, "The symbol". Loads v on some sites of a lattice have
-sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2,  with the symbol f(k) of all sites, k a wave vector
-(sigma(q) on that page). Split at any alpha (Ewald), with E(q) = erfc(q / 2 alpha) / q,
+It is the minimum of the symbol f(k), a function of the wave vector k: sigma(q) of
+docs/theory/operators-lattice.md, "The symbol". With any alpha and E(q) = erfc(q / 2 alpha) / q,
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 
-over all lattice vectors d except 0 and all G of the dual lattice; V is the area of a cell. Omitted
-terms of the second sum are positive.
+over all lattice vectors d except 0 and all vectors G of the dual lattice; V is the area of a cell.
 """
 
 from __future__ import annotations
@@ -18,20 +16,19 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Largest distance of the bound below the least value found. A smaller one takes more time.
+#: Largest difference between the least value found and the bound. A smaller one takes more time.
 TOLERANCE = 1e-3
 
-#: Ratio of the longer to the shorter basis vector above which no bound is computed: the sums have
-#: too many terms.
+#: Ratio of the longer to the shorter basis vector above which the sums have too many terms.
 LONGEST = 50.0
 
-#: alpha |d| beyond which erfc (below 3e-17) is omitted, and |k + G| / 2 alpha likewise.
+#: Terms with alpha |d| or |k + G| / 2 alpha above this are omitted; there erfc is below 3e-17.
 REACH = 6.0
 
 #: Bound on the omitted terms and on the rounding of some hundred terms below 10.
 LOST = 1e-9
 
-#: Number of cells along each direction of the dual at first, and largest number of halvings.
+#: First number of cells along each direction of the dual lattice, and largest number of halvings.
 FIRST, MOST_HALVINGS = 8, 12
 
 #: Vectors from the middle of a cell to the middles of its quarters, in units of a quarter's size.
@@ -41,7 +38,7 @@ QUARTERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) / 2.0
 def least_symbol(basis: Array) -> float:
     """A lower bound on f for a reduced basis (2, 2) whose shorter vector has length 1.
 
-    Cells of the dual are halved until the bounds on f in all of them are within the tolerance of
+    Cells of the dual lattice are halved until the bounds in all cells are within the tolerance of
     the least value found. The result is -inf if the longer vector exceeds `LONGEST`.
     """
     if np.hypot(*basis.T).max() > LONGEST:
@@ -74,7 +71,7 @@ class _Symbol:
 
     @classmethod
     def of(cls, basis: Array) -> _Symbol:
-        """The terms for an alpha with which both sums have about equally many terms."""
+        """The terms, with an alpha for which both sums have about equally many."""
         area = abs(float(np.linalg.det(basis)))
         alpha = float(np.sqrt(np.pi / area))
         dual = np.asarray(2.0 * np.pi * np.linalg.inv(basis).T, dtype=np.float64)
@@ -84,13 +81,14 @@ class _Symbol:
         return cls(alpha, area, dual, sites[distances > 0], distances[distances > 0], images)
 
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
-        """f (m,) in the middles c of cells of the dual, and lower bounds on f in each cell (m,).
+        """(m,) f in the middles c of cells of the dual lattice, and lower bounds on f in each cell.
 
-        The bound is the larger of two: f(c) - |grad f(c)| rho - bend rho^2 / 2 within a distance
-        rho of c, where no second derivative is below -bend; and the least value of the first sum
-        plus the second sum with E, which decreases, at the largest distances.
+        Each bound is the larger of two. The first is f(c) - |grad f(c)| rho - bend rho^2 / 2 for
+        points within rho of c, where no second derivative is below -bend. The second takes the
+        least value of the first sum, and E, which decreases, at the largest distances.
 
-        cells : (m, 2) middles c in units of g1 and g2;  size : side of the cells in these units
+        cells : (m, 2) middles c in units of g1 and g2
+        size  : side of the cells in these units
         """
         from scipy.special import erfc
 

@@ -1,6 +1,6 @@
-"""A square mesh with the softened kernel, and interpolation between its nodes and points.
+"""A square mesh with the softened kernel, and the interpolation between mesh nodes and points.
 
-Derived in docs/theory/operators-mesh.md, "A mesh and near pairs".
+docs/theory/operators-mesh.md, "A mesh and near pairs", derives both.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Mesh(SiteBox):
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """The interpolation W from nodes to points, a product of two factors (n, width), x and y.
+    """The interpolation W from nodes to points, with one factor (n, width) for x and one for y.
 
-    patches : of each block its first point, the point after its last, and its first node in x and y
+    patches : for each block, its first point, the point after its last, and its first node (i, j)
     """
 
     x: NDArray[Any]
@@ -63,7 +63,7 @@ class Interpolation:
         return cls(x, y, patches, shape)
 
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P on the mesh; with the absolute values of the weights if `absolute`."""
+        """W^T P on the mesh, or |W|^T P if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
         width = x.shape[1]
@@ -74,7 +74,7 @@ class Interpolation:
         return field
 
     def from_nodes(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W times a field on the mesh (n,); with absolute values of the weights if `absolute`."""
+        """(n,) W times a field on the mesh, or |W| times the field if `absolute`."""
         result = np.empty(len(self.x), dtype=field.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
         width = x.shape[1]

@@ -1,4 +1,4 @@
-"""Near pairs of points, found block by block, with the part of 1 / r^q that is not smooth."""
+"""Near pairs of points, with the part of 1 / r^q that is not smooth."""
 
 from __future__ import annotations
 
@@ -25,10 +25,13 @@ PIECE, BATCH = 2**17, 32
 class Order:
     """Points sorted by the block of the mesh that contains them.
 
-    places : (n,) original indices of the sorted points;  points : (n, 2) [length] the sorted points
-    tails  : (n, 2) [length] their low parts, or None
-    cells  : (n, 2) mesh cells;  shares : (n, 2) position of each point in its cell, from 0 to 1
-    keys   : numbers of the blocks with points, sorted;  starts : (blocks + 1,) their first points
+    places : (n,) original indices of the sorted points
+    points : (n, 2) [length] the sorted points
+    tails  : (n, 2) [length] low parts of the sorted points, or None
+    cells  : (n, 2) mesh cell of each point
+    shares : (n, 2) position of each point in its cell, from 0 to 1
+    keys   : numbers of the blocks with points, sorted
+    starts : (blocks + 1,) first point of each block
     shape  : rows and columns of blocks
     """
 
@@ -67,11 +70,7 @@ class Order:
 def _placed(
     points: Array, low: Array, spacing: float, tails: Array | None
 ) -> tuple[Indices, Array]:
-    """The cell of each point, and its position in the cell, rounded once.
-
-    A tail may move a point into the previous cell, and an outermost point out of the mesh by a
-    roundoff.
-    """
+    """The cell of each point, and the position of the point in the cell, rounded once."""
     away = Pair(*two_sum(points, -low))
     if tails is not None:
         away += Pair.exact(tails)
@@ -82,16 +81,18 @@ def _placed(
     return cells.astype(np.intp), (away.high - cells) + away.low
 
 
-#: A slice of the sorted points, and where their neighbours begin and end in each row of blocks.
+#: A slice of the sorted points, and the first and last neighbours in each row of blocks.
 Piece: TypeAlias = tuple[slice, Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """S of docs/theory/operators-mesh.md: 1 / r^q minus its smooth part, of pairs within the cut.
+    """The matrix S of docs/theory/operators-mesh.md: 1 / r^q minus L, for pairs within the cut.
 
-    upper   : (n, n) sparse, pairs i < j;  own : the diagonal, minus the smooth part at r = 0
-    terms   : largest number of terms in a sum;  nearest : [length] least distance that is not 0
+    upper   : (n, n) sparse, pairs i < j
+    own     : the diagonal, -L(0)
+    terms   : largest number of terms in a sum
+    nearest : [length] least distance that is not 0
     """
 
     upper: Any
@@ -162,10 +163,7 @@ def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
 
 
 def _neighbourhoods(order: Order, splitting: Splitting) -> Iterator[Piece]:
-    """Points, and the points of the same and of later blocks that can be nearer than the cut.
-
-    Blocks in a row are consecutive in the order, and so are their points.
-    """
+    """Points, with the points of the same and of later blocks that can be nearer than the cut."""
     rows, columns = order.shape
     away = 0
     if splitting.meshed:

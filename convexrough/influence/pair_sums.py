@@ -1,9 +1,8 @@
 """Sums over pairs of arbitrary points: distant pairs by a mesh, near pairs one by one.
 
-1 / r^q is split into a part that is smooth everywhere (`softened`) and a rest that is 0 beyond a
-distance, the reach. The smooth part is interpolated from a square mesh and convolved on it by
-Fourier transforms; the rest is a sparse matrix. The errors of interpolation and of rounding are
-bounded (docs/theory/operators.md).
+1 / r^q is the sum of a smooth part L (`softened`) and a rest S that is 0 beyond a distance, the
+reach. L is interpolated from a square mesh, on which Fourier transforms compute the convolution; S
+is a sparse matrix. docs/theory/operators-mesh.md derives the method and the error bounds.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """The sums (n,). A second thread computes the sparse part: both parts release the GIL."""
+        """(n,) the sums. A second thread computes the sparse part; both parts release the GIL."""
         ordered = loads[self.order.places]
         if self.weights is None:
             total = self.near.apply(ordered)
@@ -77,10 +76,10 @@ class Product:
         return self.weights.from_nodes(field)
 
     def interpolation(self, strengths: Array) -> Array:
-        """Bounds (n,) on the error of interpolation, for strengths that are not negative.
+        """(n,) bounds on the interpolation error of near pairs, for strengths of at least 0.
 
-        They include pairs within the reach plus the `sway` of the stencils, each with the error of
-        the worst pair. The error of other pairs is relative, and part of `rounding`.
+        Near are pairs within the reach plus the `sway` of the stencils. The relative error of other
+        pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
         if not self.splitting.meshed:
@@ -93,11 +92,11 @@ class Product:
 
     @cached_property
     def interpolation_norm(self) -> float:
-        """Bound on the 2-norm of the error of interpolation for loads of 2-norm 1."""
+        """Bound on the 2-norm of the interpolation error for loads of 2-norm 1."""
         return float(self.interpolation(np.ones(len(self.order.points))).max(initial=0.0))
 
     def above(self, strengths: Array) -> Array:
-        """Upper bounds (n,) on the sums, for strengths that are not negative."""
+        """(n,) upper bounds on the sums, for strengths of at least 0."""
         total = self.apply(strengths)
         rounding = self.rounding(strengths)
         total += rounding.of(total) + self.interpolation(strengths)
@@ -105,10 +104,7 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Rounding outside the transforms: relative, and per 2-norm of the loads.
-
-        docs/theory/operators-mesh.md, "Errors", "Rounding".
-        """
+        """Rounding errors outside the transforms: relative ones, and those per 2-norm of loads."""
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
@@ -117,7 +113,10 @@ class Product:
         return 1.01 * relative, 1.01 * own
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bound on the error of `apply` in float64, without that of `interpolation`."""
+        """Bound on the error of `apply` in float64, without the bound of `interpolation`.
+
+        docs/theory/operators-mesh.md, "Errors".
+        """
         relative, own = self._rounding
         norm, each = own * float(np.linalg.norm(loads)), own * float(np.abs(loads).max(initial=0.0))
         if self.weights is not None:
@@ -138,7 +137,7 @@ class Product:
 
     @property
     def _weighing(self) -> tuple[float, float]:
-        """Relative rounding of products with W^T and with W; adding zeros is exact."""
+        """Relative rounding errors of products with W^T and with W."""
         order, width = self.splitting.kernel.order, self.splitting.width
         weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
         overlaps = (-(-width // self.splitting.block)) ** 2
@@ -148,7 +147,7 @@ class Product:
 
     @cached_property
     def _stretch(self) -> float:
-        """Bound on the 2-norm of W and of |W|: the largest (|W| |W|^T v)_i / v_i, for any v > 0."""
+        """Bound on the 2-norms of W and |W|: the root of max (|W| |W|^T v)_i / v_i for a v > 0."""
         assert self.weights is not None
         vector = np.ones(len(self.order.points))
         least = np.inf
@@ -163,10 +162,7 @@ class Product:
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:
-    """Upper bounds (n,) on the sum of all strengths within a distance of each point.
-
-    The sums are over square cells with sides of a quarter of the distance.
-    """
+    """(n,) upper bounds on the sum of all strengths within a distance of each point."""
     parts = 4
     side = distance * (1.0 + 1e-9) / parts
     cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)

@@ -1,7 +1,6 @@
 """The compliance operator of arbitrary points: a mesh and a sparse matrix, with error bounds.
 
-`pair_sums`, `mesh`, `near_pairs`, `splitting` and `softened` contain the method and the bounds;
-docs/theory/operators-mesh.md, "A mesh and near pairs", derives them.
+`pair_sums` has the method, and docs/theory/operators-mesh.md derives it.
 """
 
 from __future__ import annotations
@@ -27,29 +26,26 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.scene.neighbours import crowding, separations
 
-#: Relative error of a product that interpolation may cause. It is nearly all of the error of
-#: `sums`, which are accurate to 1e-16.
+#: Largest relative error of a product by interpolation. It is most of the error of `sums`, 1e-16.
 TOLERANCE = 5e-17
 
-#: The same for loads in single precision, and for `falloff`.
+#: Largest relative error by interpolation for loads in single precision, and for `falloff`.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
-#: Largest number of asperities whose `sums` use a matrix: it is as fast as a mesh, to 27 digits.
+#: Largest number of asperities for which `sums` uses a matrix, with 27 digits; for speed only.
 FEW = 1500
 
-#: Largest number of pairs (asperity, other point) that `onto` couples one by one; for speed only.
+#: Largest number of pairs (asperity, other point) that `onto` computes one by one; for speed only.
 FEW_PAIRS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
 class ScatteredInfluence:
-    """The compliance operator of asperities at arbitrary points.
+    """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
-    points      : (n, 2) [length]
-    scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
     tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
-    tolerance   : relative error of a product that interpolation may cause
+    tolerance   : largest relative error of a product by interpolation
     """
 
     points: Array
@@ -85,7 +81,6 @@ class ScatteredInfluence:
         )
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """Computed by a coarser mesh, whose error bounds are added."""
         product = self._square if power == 2 else self._cube
         return product.above(strengths) * self._stretched(power)
 
@@ -127,7 +122,6 @@ class ScatteredInfluence:
         return False
 
     def sums(self, loads: Pair) -> Ball:
-        """Computed by the mesh, or for few points by their matrix."""
         found = self._sums(loads)
         if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
             return found
@@ -146,7 +140,7 @@ class ScatteredInfluence:
         return coarse_inverse(self.points, self.scale, root)
 
     def _stretched(self, power: int) -> float:
-        """The factor by which 1 / r^q can be higher because of the errors of the points."""
+        """The factor by which errors of the points can increase 1 / r^power."""
         moved = entry_error(self._unknown, self._double.near.nearest)
         return float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
@@ -172,13 +166,13 @@ class ScatteredInfluence:
 
     @property
     def _unknown(self) -> float:
-        """Bound on the error [length] of each coordinate, with the tails."""
+        """[length] bound on the error of each coordinate of the points with their tails."""
         return known(self.points, self.tails, self.point_error)[1]
 
 
 @dataclass(frozen=True, eq=False)
 class ScatteredCoupling:
-    """The map from loads on the first asperities of an operator to displacements of the others."""
+    """The map from loads on the first `sources` points of `joint` to displacements of others."""
 
     joint: ScatteredInfluence
     sources: int

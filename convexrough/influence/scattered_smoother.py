@@ -1,6 +1,6 @@
 """An approximate inverse of I + W A W for arbitrary points, to precondition conjugate gradients.
 
-Derived in docs/theory/operators-mesh.md, "Approximate inverse".
+docs/theory/operators-mesh.md, "Approximate inverse", derives it.
 """
 
 from __future__ import annotations
@@ -13,18 +13,15 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Smoother
 from convexrough.influence.dense import dense_matrix
 
-#: Approximate number of nodes of the coarse mesh, and fewest touching points for which it is used.
+#: Approximate number of nodes of the coarse mesh, and least number of touching points for its use.
 #: Heuristics: they change the number of steps of conjugate gradients, not the answer.
 COARSE, FEW_TOUCHING = 1000, 200
 
 
 def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
-    """(I + T K T^t)^-1 in single precision, where T K T^t approximates W A W by a coarse mesh.
+    """(I + T K T^t)^-1 in single precision, where T K T^t approximates W A W; None for few points.
 
-    T = W S, where S interpolates linearly to touching points from the nodes around them. K is
-    1 / (pi E* r) between nodes, with shells of half the spacing on its diagonal: it is positive
-    definite (docs/theory/convexity.md), and so is the inverse for any points. By Woodbury's
-    identity the inverse is I - T (K^-1 + T^t T)^-1 T^t.
+    root : (n,) diagonal of W
     """
     from scipy.linalg.lapack import dpotrf, dpotri, spotrs
     from scipy.sparse import csr_array
@@ -67,7 +64,7 @@ def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
 
 
 def _coarse_spacing(points: Array, most: int) -> float:
-    """The spacing [length] of a square mesh in which about this many cells contain points."""
+    """The spacing [length] of a square mesh in which about `most` cells contain points."""
     low, widest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     spacing = widest
     while True:
@@ -80,7 +77,7 @@ def _coarse_spacing(points: Array, most: int) -> float:
 
 
 def _linear(points: Array, spacing: float) -> tuple[Indices, Array, Array]:
-    """The nodes around each point and their weights, both (n, 4), and all nodes (m, 2) [length]."""
+    """(n, 4) nodes around each point, (n, 4) weights, and (m, 2) [length] all nodes."""
     away = (points - points.min(axis=0)) / spacing
     cells = away.astype(np.intp)
     shares = away - cells

@@ -1,4 +1,8 @@
-"""Near pairs to more digits: docs/theory/operators-mesh.md, "Near pairs to more digits"."""
+"""Sums over near pairs with more digits than float64 has.
+
+docs/theory/operators-mesh.md, "Near pairs to more digits", derives them. `pair_sums` defines the
+parts S and L of 1 / r.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +21,17 @@ from convexrough.influence.softened import Softened, exact_series
 from convexrough.numbers.pairs import CHUNK, Pair, rounded, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: Bits after the point of the integers that L is computed with within the reach.
+#: Binary places of the integers with which L is computed within the reach.
 FIXED = 160
 
-#: Nodes of the table of L, at least, and terms of Taylor's series about each.
+#: Least number of nodes of the table of L, and number of terms of Taylor's series at each node.
 NODES, TERMS = 1024, 8
 
 
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
-    """Taylor's series of reach L in (r / reach)^2 at r^2 = 0, step, 2 step, ...: its first terms.
+    """The first terms of Taylor's series of reach L in (r / reach)^2, in units of 2^-FIXED.
 
-    As whole numbers of 2^-FIXED.
+    The nodes are r^2 = 0, step, 2 step, ...
     """
     one, apart = 1 << FIXED, step / Fraction(kernel.reach) ** 2
     t = one - np.arange(nodes, dtype=object) * one * apart.numerator // apart.denominator
@@ -40,18 +44,19 @@ def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list
 
 
 def soft_values(values: Any, scale: Fraction) -> Pair:
-    """Of whole numbers of 2^-FIXED, times a number."""
+    """Whole numbers in units of 2^-FIXED, multiplied by `scale`, as pairs."""
     unit = scale / (1 << FIXED)
     return Pair(*np.array([Pair.nearest(value * unit) for value in values]).T)
 
 
 @dataclass(frozen=True, eq=False)
 class SoftTable:
-    """L of squared distances from 0 to the reach: Taylor's series from the nearest node.
+    """L as a function of r^2 within the reach, by Taylor's series at the nearest node.
 
-    step  : [length^2] of nodes, a power of two;  values : (m,) at these
-    terms : (TERMS - 1, m) the others of the series in r^2 / step, in float64
-    error : bound on that of each L
+    step   : [length^2] distance of nodes, a power of two
+    values : (m,) L at the nodes
+    terms  : (TERMS - 1, m) further terms of the series in r^2 / step, in float64
+    error  : bound on the error of each L
     """
 
     step: float
@@ -76,7 +81,7 @@ class SoftTable:
         return cls(step, soft_values(values, 1 / Fraction(kernel.reach)), slopes, error)
 
     def at(self, squares: Pair) -> Pair:
-        """L; the low parts are up to a hundredth of it."""
+        """L; the low parts are at most a hundredth of the high parts."""
         node = np.rint(squares.high / self.step).astype(np.intp)
         away = ((squares.high - node * self.step) + squares.low) / self.step
         value = self.terms[-1][node]
@@ -88,11 +93,14 @@ class SoftTable:
 
 @dataclass(frozen=True, eq=False)
 class SharpPairs:
-    """S, its entries cut in two: first parts are multiples of a unit, so that their sums are exact.
+    """S in two parts. First parts are multiples of a unit, so that sums of them are exact.
 
     first, second : (n, n) sparse, pairs i < j
-    unit, loads   : powers of two: of the first parts, and of loads of 1 at most
-    sums          : (n,) of S;  centre : L(0);  error : bound on that of an entry beside 1 / r
+    unit   : unit of the first parts, a power of two
+    loads  : unit of the first parts of loads up to 1, a power of two
+    sums   : (n,) bounds on the row sums of |S|
+    centre : L(0)
+    error  : bound on the error of an entry that is not due to 1 / r
     """
 
     product: Product
@@ -111,7 +119,7 @@ class SharpPairs:
         upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
         ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
         sums = _sizes(product, ones)
-        # What a sum has in the middle, and 16 times that, is to be exact.
+        # Sums up to 16 times the median must be exact.
         bits = (49 - terms.bit_length()) // 2
         unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
         table = SoftTable.of(kernel)
@@ -143,7 +151,7 @@ class SharpPairs:
         return cls(product, high, low, unit, 2.0**-bits, sums, centre, error)
 
     def __call__(self, ordered: Pair) -> tuple[Pair, Array]:
-        """(n,) sums for loads of 1 at most, and bounds on their errors."""
+        """(n,) sums for loads up to 1, and bounds on the errors of the sums."""
         product, kernel = self.product, self.product.splitting.kernel
         first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
         second = np.asarray((ordered.high - first) + ordered.low)
@@ -168,7 +176,7 @@ def _applied(upper: Any, loads: Array) -> Array:
 
 
 def _sizes(product: Product, strengths: Array) -> Array:
-    """(n,) bounds on the sums of |S| over near pairs: between two points that are one it is -L."""
+    """(n,) bounds on the sums of |S| over near pairs, weighted with the strengths."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)

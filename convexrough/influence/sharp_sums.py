@@ -1,8 +1,8 @@
-"""The sums of `pair_sums` to more digits, for the one product of a certificate.
+"""The sums of `pair_sums` with more digits than float64 has, for the products of a certificate.
 
-docs/theory/operators-mesh.md. The products to the mesh, on it and from it are computed in slices:
-first slices have so few bits that their products are exact, and the rests are small. The remaining
-error is mostly that of interpolation.
+Products to the mesh, on it and from it are computed in slices: first slices have so few bits that
+their products are exact, and the rests are small. The remaining error is mostly that of
+interpolation (docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: Bits of a float64 number, and bits of first slices in sums of at most 16 units.
+#: Bits of a float64 number, and bits of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches processed together: they fit in the cache.
+#: Number of patches processed together, which fit in the cache.
 PATCHES = 64
 
 LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -54,7 +54,7 @@ class Slices(NamedTuple):
 def in_slices(
     product: Callable[[Array, Array], Array], a: Slices, b: Slices
 ) -> tuple[Array, Array]:
-    """A bilinear product in two parts: that of the first slices, which is exact, and the rest."""
+    """A bilinear product in two parts: the exact product of the first slices, and the rest."""
     left = product(a.first, b.second)
     left += product(a.second, b.first + b.second)
     return product(a.first, b.first), left
@@ -62,9 +62,10 @@ def in_slices(
 
 @dataclass(frozen=True)
 class SoftValues:
-    """The softened kernel times a unit, unit L, between nodes of a mesh.
+    """The softened kernel L between nodes of a mesh, multiplied by a unit.
 
-    near : values within the reach, by i^2 + j^2;  distances : values beyond, 1 / r
+    near      : values within the reach, by i^2 + j^2
+    distances : values 1 / r beyond the reach
     """
 
     near: Pair
@@ -90,7 +91,7 @@ class SoftValues:
 
 
 def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
-    """unit L(spacing sqrt(s)) for s = 0, 1, ... at distances below the reach."""
+    """unit L(r) at the distances r = spacing sqrt(s) within the reach, for s = 0, 1, ..."""
     step = Fraction(spacing) ** 2
     nodes = math.ceil(Fraction(kernel.reach) ** 2 / step)
     return soft_values(
@@ -99,7 +100,7 @@ def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
 
 
 class MeshSums:
-    """The sums sum_j P_j / r_ij for exact points, by the mesh of a product."""
+    """The sums over j of P_j / r_ij for exact points, by the mesh of a product."""
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
@@ -169,7 +170,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W times values on the mesh: whole numbers, rests, their unit, and an error bound in it."""
+    """W times values on the mesh: whole numbers, rests, the unit of both, and an error bound."""
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
@@ -191,7 +192,7 @@ def _from_nodes(
 def _weighed(
     product: Product, lows: LowWeights
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
-    """Points of some patches; the rows and nodes of each patch; the weights in x and in y."""
+    """Points of some patches, rows and nodes of each patch, and the weights in x and y."""
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):
@@ -217,7 +218,7 @@ def _met(product: Product) -> int:
 
 
 def _relative(product: Product) -> float:
-    """Relative error of distant pairs by interpolation, and by the rounding of places in cells."""
+    """Relative error of distant pairs by interpolation and by rounding of positions in cells."""
     kernel, spacing = product.splitting.kernel, product.splitting.spacing
     return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)
 

@@ -1,6 +1,6 @@
-"""Radii of shells about asperities that do not overlap: with them the coupling is semidefinite.
+"""Shells: spheres about asperities that do not overlap and make the energy convex.
 
-The lemma is proved in docs/theory/convexity.md, "Why (2) is not convex as it stands".
+docs/theory/convexity.md, "Why (2) is not convex as it stands", proves this.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from convexrough.roundoff import SAFETY
 
 
 def shells(influence: Influence) -> Array:
-    """1 / (pi E* s_i) (n,) with s_i half the distance to the nearest neighbour: s_i + s_j <= r_ij.
+    """(n,) 1 / (pi E* s_i), with s_i half the distance to the nearest neighbour.
 
-    A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A shell is 0 for a single
-    asperity, and infinite where rounding leaves no distance.
+    A + diag(shells) is positive semidefinite. A value is 0 for a single asperity, and infinite for
+    points that may coincide.
     """
 
     def about(separations: Array) -> Array:
@@ -27,12 +27,10 @@ def shells(influence: Influence) -> Array:
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """`shells` adapted to contact radii a (n,) [length] of neighbours that differ in size.
+    """(n,) 1 / (pi E* s_i) for shells adapted to contact radii a_i that differ: `radii` [length].
 
-    docs/theory/certificate.md, "Which box", 3: the radii are
-    s_i = share a_i / c + (1 - share) d_i / 2, where c is the crowding, the largest
-    (a_i + a_j) / r_ij, and d_i the distance to the nearest neighbour. Both a_i / c and d_i / 2
-    satisfy s_i + s_j <= r_ij, so their mean does. Every a_i / s_i is at most c / share.
+    With the largest (a_i + a_j) / r_ij as c, and distances d_i to the nearest neighbours, the radii
+    are s_i = share a_i / c + (1 - share) d_i / 2: docs/theory/certificate.md, "Which box", 3.
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

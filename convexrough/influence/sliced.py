@@ -1,10 +1,9 @@
-"""Products on a box of sites to any number of digits, by exact convolutions.
+"""Products on a box of sites with any number of digits, by exact convolutions.
 
-docs/theory/operators-lattice.md. Loads and kernel are cut into slices of whole numbers and a small
-rest; the unit shrinks by the same power of two from one slice to the next. All products of slices
-that have the same unit are summed as a level. A level computed by Fourier transforms has an error
-below one half, so that rounding to whole numbers makes it exact. The rest is small, and so is its
-error.
+Loads and kernel are divided into slices of whole numbers and a small rest; the unit shrinks by the
+same power of two from one slice to the next. All products of slices that have the same unit are
+summed as a *level*. Fourier transforms compute a level with an error below one half, so rounding to
+whole numbers makes it exact (docs/theory/operators-lattice.md, "Slices").
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from convexrough.roundoff import ROUNDOFF
 #: The error of a level may be at most this, so that rounding makes it exact.
 SURE = 0.45
 
-#: Number of slices, and the number of sites of a box above which there is one more: on 6.6 million
-#: sites, three slices prove loads to 7e-13 of the largest load, and four to 3e-15.
+#: Number of slices, and the number of sites of a box above which there is one more. On 6.6 million
+#: sites, three slices prove loads to 7e-13 of the largest load, four slices to 3e-15.
 SLICES, LARGE = 3, 2**22
 
 #: Largest number of bits in a slice: float64 holds these and a rest.
@@ -35,7 +34,7 @@ MOST_BITS = 48
 
 
 class Values(Protocol):
-    """An even kernel of size at most 1, as a function of differences of sites.
+    """An even kernel of values up to 1, as a function of differences of sites.
 
     error : bound on the relative error of each value
     """
@@ -44,7 +43,7 @@ class Values(Protocol):
     def error(self) -> float: ...
 
     def at(self, i: Indices, j: Indices) -> Pair:
-        """The values (len(i), len(j))."""
+        """(len(i), len(j)) values at the differences (i, j)."""
         ...
 
 
@@ -52,8 +51,8 @@ class Values(Protocol):
 class Distances:
     """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
 
-    gram : three slices (3, 3) of b1 b1, 2 b1 b2 and b2 b2; the first two slices have so few bits
-        that their sums with i^2, i j and j^2 are exact
+    gram : (3, 3) three slices (rows) of b1 b1, 2 b1 b2 and b2 b2. The first two slices have so few
+        bits that their products with i^2, i j and j^2, and sums of these, are exact
     """
 
     gram: Array
@@ -95,10 +94,9 @@ class Distances:
 
 
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
-    """Whole numbers v_1, v_2, ... and last a rest, with  values = sum 2^-(bits + s more) v_{s+1}.
+    """Slices v_1, v_2, ... of whole numbers, and a rest: values = sum 2^-(bits + s more) v_{s+1}.
 
-    |v_1| is at most about 2^bits max |values|, the others at most 2^(more - 1); the rest is rounded
-    once.
+    |v_1| is at most about 2^bits max |values|, the other slices are at most 2^(more - 1) in size.
     """
     high, low = values.high * 2.0**bits, values.low * 2.0**bits
     slices = []
@@ -112,12 +110,12 @@ def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A kernel on a box in slices, whose transforms serve for any loads.
+    """A kernel on a box in slices, for products with any loads.
 
     unit    : [length] the unit of distances, a power of two
     kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more)
-    error   : relative error of the values
-    budget  : upper limit on the product of the 2-norms of a slice of loads and one of the kernel
+    error   : bound on the relative error of the values
+    budget  : largest product of the 2-norms of a slice of loads and a slice of the kernel
     """
 
     box: SiteBox
@@ -130,7 +128,7 @@ class Sliced:
 
     @classmethod
     def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
-        """Slices of the kernel; norm : about its 2-norm over all differences of two sites."""
+        """The kernel in `count` slices; norm : approximate 2-norm of the kernel."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
@@ -148,9 +146,9 @@ class Sliced:
             more -= 1
 
     def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """The sums (n,) of g_ij P_j / unit, g the kernel, plus a known `change` with an `error`.
+        """(n,) sums over j of g_ij P_j / unit with the kernel g, plus a `change` with an `error`.
 
-        at : (n,) places of the loads, in a box with as many columns as the transforms
+        at : (n,) sites of the loads, in a box with as many columns as the transforms
         """
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
@@ -181,7 +179,7 @@ class Sliced:
             return Pair(total.high * unit, total.low * unit) + Pair.exact(change[some])
 
         unit = size / self.unit
-        left = behind = 0.0  # bounds by norms, as in `_levels`
+        left = behind = 0.0  # norms of the products that `_levels` adds up in its last field
         for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
@@ -199,7 +197,7 @@ class Sliced:
         return 2.0**-self.bits * sum(norms)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads for which all levels are exact, and the bits of the first slice."""
+        """Slices of loads for which all levels are exact, and number of bits of the first slice."""
         count = len(self.kernels)
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
@@ -228,7 +226,7 @@ class Sliced:
 
 
 def each_loss(box: SiteBox, count: int) -> float:
-    """Bound on the error of a component of a level, relative to the product of the 2-norms.
+    """Bound on the error of a component of a level, divided by the product of the 2-norms.
 
     (2) of docs/theory/operators-lattice.md, with 2 `count` + 6 roundoffs instead of 4: up to
     `count` products are added up before the inverse transform, and the last slices are rounded.

@@ -1,9 +1,9 @@
-"""Sums of P_j / r_ij by a matrix, to some 27 digits, with products by BLAS.
+"""Sums over j of P_j / r_ij by a matrix, to about 27 digits, with products by BLAS.
 
-Entries and loads are cut into slices. The first slices are multiples of one unit for each row and
-block of columns, with so few bits that sums of their products stay below 2^53 units and are exact
-in any order. The same holds for products of first with second slices. The rest is some 2^-48 of the
-whole, and its rounding some 2^-101.
+Entries and loads are divided into slices. First slices are multiples of one unit for each row and
+block of columns. They have so few bits that sums of their products stay below 2^53 units and are
+exact in any order; so are sums of products of first with second slices. The rest is about 2^-48 of
+the sum, and its rounding error about 2^-101.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: Number of columns that share a unit; bits of the first and of the second slice of an entry.
+#: Number of columns with the same unit; bits of the first and of the second slice of an entry.
 BLOCK, FIRST, SECOND = 128, 24, 23
 
-#: Largest number of bits in a first slice of loads; more would not reduce the error.
+#: Largest number of bits of a first slice of loads; more would not reduce the error.
 MOST_BITS = 30
 
-#: Largest number of rows of a matrix that is cached: its slices take 0.4 GB.
+#: Largest number of rows of a cached matrix, whose slices take 0.4 GB.
 KEPT = 4096
 
-#: A whole matrix is computed, instead of a part, if it has at most this many rows, or twice as many
-#: as the part: other parts may be needed.
+#: The whole matrix is computed instead of a part if it has at most this many rows, or at most twice
+#: as many rows as the part, because other parts may be needed later.
 SMALL = 128
 
-#: Number of entries computed together: they fit in the cache.
+#: Number of entries computed together, which fit in the cache.
 PIECE = 2**15
 
-#: Bound on 1 / r for points that span 1: of a larger one, r^2 may underflow.
+#: Bound on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
 LARGEST = 2.0**300
 
 
@@ -46,9 +46,10 @@ LARGEST = 2.0**300
 class SlicedMatrix:
     """Rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
 
-    blocks : the columns of each block, and the bits that a slice of their loads may have
-    losses : (3 blocks, m) errors of a product per unit of, in each block, the largest load, the
-        largest rest of a load after two slices, and the largest rest after one slice
+    blocks : the columns of each block, and the number of bits for a slice of the loads there
+    losses : (3 blocks, m) error factors. A product has an error of at most the sum over blocks of
+        these factors times the largest load, the largest rest of a load after two slices, and the
+        largest rest after one slice
     """
 
     slices: tuple[Array, Array, Array]
@@ -57,7 +58,7 @@ class SlicedMatrix:
 
     @classmethod
     def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
-        """The rows for points (n, 2) that span about 1, each known to a distance `point_error`."""
+        """Some rows for points (n, 2) with an extent of about 1 and errors up to `point_error`."""
         here, n = points.at(rows), len(points.high)
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
@@ -102,7 +103,7 @@ class SlicedMatrix:
         return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
 
     def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
-        """High and low parts (..., m) of products with loads (..., n) up to 1, and error bounds."""
+        """(..., m) high and low parts of products with loads (..., n) up to 1, and error bounds."""
         sums, rests, left_over = [], [], []
         for columns, bits in self.blocks:
             a, b, c = (part[:, columns].T for part in self.slices)
@@ -125,9 +126,9 @@ class SlicedMatrix:
 
 
 class MatrixSums:
-    """sum_j P_j / r_ij among points (n, 2), each coordinate known to within `point_error`.
+    """The sums over j of P_j / r_ij among points (n, 2) with errors up to `point_error`.
 
-    The slices of up to `KEPT` rows are cached; larger matrices are computed anew for each product.
+    Slices of up to `KEPT` rows are cached. Larger matrices are computed again for each product.
     """
 
     def __init__(self, points: Pair, point_error: float = 0.0) -> None:
@@ -182,7 +183,7 @@ class MatrixSums:
 
     @cached_property
     def _scale(self) -> int:
-        """The exponent of the power of two by which the points are divided, so that they span 1."""
+        """k such that the points divided by 2^k have an extent of about 1."""
         if self._of_whole:
             assert self.whole is not None
             return self.whole._scale
@@ -194,7 +195,7 @@ class MatrixSums:
 
 
 def _unit(largest: Array) -> Array:
-    """The unit of first slices of entries up to this size."""
+    """The unit of first slices of entries up to `largest`."""
     return np.asarray(np.ldexp(2.0**-FIRST, np.frexp(largest)[1]))
 
 

@@ -1,12 +1,12 @@
-"""How the surface slopes at each asperity: the derivative of the coupling by its points.
+"""The slope of the surface at each asperity: the derivative of displacements by the points.
 
-An asperity that is moved by dc feels the displacement A P changed by its slope times dc,
+If the point c_i of asperity i is moved, its displacement changes with the derivative
 
-    d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3,
+    d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3.
 
-two sums with odd kernels. They need the same boxes and meshes as the coupling, and no bounds:
-nothing is proved of derivatives by positions. On a mesh the smooth part is -grad L, which is r
-times the softened 1 / r^3 of one order less.
+These are two sums with odd kernels, on the boxes and meshes of the compliance operator, without
+error bounds. On a mesh the smooth part is -grad L, which is r times the softened 1 / r^3 of one
+order less.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened
 
-#: Pairs looked at together.
+#: Number of pairs processed together.
 BLOCK = 2**22
 
 
 def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
-    """x and y over r^3 for every difference of two sites of a box: odd kernels.
+    """The odd kernels x / r^3 and y / r^3 for every difference of two sites of a box.
 
-    over_cube : 1 / r^3, or what is taken for it, of squared distances
+    over_cube : 1 / r^3, or the softened one, as a function of squared distances
     """
 
     def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
@@ -40,7 +40,7 @@ def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
 
 
 def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
-    """(n, 2) the two sums above: by the mesh for distant pairs, one by one for near pairs."""
+    """(n, 2) the two sums, without the factor -scale, for arbitrary points."""
     ordered = values[product.order.places]
     total = _nearby(product, ordered)
     if product.weights is not None:
@@ -54,7 +54,7 @@ def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
 
 
 def mesh_pulls(product: Product) -> list[Kernel]:
-    """The odd kernels of the smooth part of a product; an empty list if it has none."""
+    """The odd kernels of the smooth part of a product; empty if there is no smooth part."""
     return [] if product.weights is None else pulls(product.mesh, _softer(product).smooth)
 
 

@@ -1,11 +1,9 @@
-"""1 / r^q made smooth within a reach: what a mesh can interpolate, and how well it does.
+"""The softened kernel L: 1 / r^q made smooth within a reach, with bounds on interpolation errors.
 
-Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 - (r/a)^2 is cut
-after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
-potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
-theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
-docs/theory/operators-mesh.md, "A mesh and near pairs": "The smooth part",
-"Derivatives of L", "Interpolation".
+Beyond the reach a, L is 1 / r^q. Within, L is a polynomial: the series of 1 / r^q in
+t = 1 - (r/a)^2, which ends with t^p. So L has p continuous derivatives at r = a. All terms of the
+series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds: "The
+smooth part", "Derivatives of L", "Interpolation".
 """
 
 from __future__ import annotations
@@ -20,21 +18,21 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.numbers.pairs import Pair, two_sum
 
-#: Near pairs whose part would be less than so much of the error of interpolation are left out. A
-#: heuristic: what is left out is part of the bound.
+#: Near pairs are omitted if 1 / r^q - L is below this fraction of the interpolation error. The
+#: number is a heuristic; omitted pairs are part of the error bound.
 CUT_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Softened:
-    """power : q;  order : p, an even number;  reach : a [length], infinite for no smooth part."""
+    """The kernel of power q, even order p and reach a [length]; without L if a is infinite."""
 
     power: int
     order: int
     reach: float
 
     def smooth(self, squares: Array) -> Array:
-        """L, for squared distances; exactly the power from the reach on."""
+        """L as a function of squared distances."""
         ratio = squares / self.reach**2
         within = ratio < 1.0
         values: Array = 1.0 / np.sqrt(np.maximum(ratio, 1.0))
@@ -45,7 +43,7 @@ class Softened:
         return values
 
     def local(self, squares: Array) -> Array:
-        """1 / r^q - L within the reach; -L(0) between two points that are one."""
+        """1 / r^q - L within the reach; -L(0) where two points coincide."""
         with np.errstate(divide="ignore"):
             values: Array = 1.0 / np.sqrt(squares)
         values[squares == 0.0] = 0.0
@@ -66,25 +64,22 @@ class Softened:
 
     @property
     def roundoffs(self) -> float:
-        """Roundoffs of one computed L, relative.
+        """Relative error of one computed L, in roundoffs.
 
-        Term k of the series: 2 k + 1 by Horner's rule, one of its coefficient and k of t's own
-        rounding, k on average at most as at r = 0. Distances squared and over a^2 have at most 7,
-        and L q / 2 of that: (k + 1) c_(k+1) = (k + q/2) c_k.
+        docs/theory/operators-mesh.md, "Rounding errors of L".
         """
         mean = self._slope / float(_series(self.order, self.power).sum())
         return 3.0 * mean + 4.0 + 4.5 * self.power
 
     @property
     def beyond_roundoffs(self) -> float:
-        """Roundoffs of one computed 1 / r^q, relative."""
+        """Relative error of one computed 1 / r^q, in roundoffs."""
         return 8.0 * self.power + 2.0
 
     def moved(self, shift: float) -> float:
-        """Error of L, relative to 1 / r^q, where a distance has the error `shift` [length].
+        """Bound on the error of L, divided by 1 / r^q, for distances with the error `shift`.
 
-        Its slope is at most q / r^(q + 1), that of 1 / r^q, of which it has some of the terms, and
-        at most 2 D r / a^(q + 2), D = sum k c_k. Times r^q, the lesser is largest where they meet.
+        docs/theory/operators-mesh.md, "Rounding", for any q.
         """
         if not np.isfinite(self.reach):
             return 0.0
@@ -92,14 +87,14 @@ class Softened:
         return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
 
     def pair_error(self, spacing: float) -> float:
-        """Bound on the error between any two points: of interpolating L, and of what is cut."""
+        """Bound on the error for any pair, by interpolation of L and by omitting 1 / r^q - L."""
         return (1.0 + CUT_SHARE) * self._interpolation_error(spacing)
 
     def cut(self, spacing: float) -> float:
-        """[length] where 1 / r^q - L has fallen to a small part of the error of interpolating L.
+        """[length] the distance beyond which 1 / r^q - L may be omitted.
 
-        With t <= 1/2 and coefficients that grow by less than a tenth from one to the next, the rest
-        of the series is at most 2.3 times its first term.
+        1 / r^q - L is the rest of the series. For t <= 1/2 it is at most 2.3 times its first term,
+        because each coefficient is less than a tenth larger than the one before.
         """
         if not np.isfinite(self.reach):
             return np.inf
@@ -116,7 +111,7 @@ class Softened:
         return _interpolated(self.order) * worst * ratio / self.reach**self.power
 
     def far_error(self, spacing: float) -> float:
-        """The same, relative to 1 / r^q, for points further apart than the reach and their sway."""
+        """Bound on the relative error by interpolation for pairs beyond the reach plus the sway."""
         if not np.isfinite(self.reach):
             return 0.0
         worst = float(math.comb(self.order + self.power - 1, self.order))
@@ -125,7 +120,7 @@ class Softened:
         return float(_interpolated(self.order) * worst * ratio * nearer**self.power)
 
     def sway(self, spacing: float) -> float:
-        """[length] by how much stencils can change a distance: half of them at each end."""
+        """[length] the most by which the distance of two nodes of stencils differs from r."""
         return math.sqrt(2.0) * self.order * spacing if np.isfinite(self.reach) else 0.0
 
     @property
@@ -143,10 +138,9 @@ class Softened:
 
 
 def lebesgue(order: int) -> float:
-    """The largest sum of the sizes of Lagrange's polynomials in the middle of even nodes.
+    """The Lebesgue constant: the largest sum of |Lagrange's polynomials| in the middle interval.
 
-    In the middle interval the sum is a polynomial with signs that alternate from node to node
-    elsewhere: even, and with all its roots outside. So it is largest in the middle.
+    There the sum is an even polynomial with all its roots outside, so it is largest in the middle.
     """
     return float(np.abs(lagrange(np.array([0.5]), order)).sum())
 
@@ -173,8 +167,8 @@ def twofold_lagrange(places: Array, order: int) -> Pair:
     return weights
 
 
-#: Bounds on the relative error of each of them: of at most 60 operations on pairs and of
-#: a low part in single precision; and, in roundoffs, of float64 numbers alone.
+#: Bounds on the relative error of a weight: of pairs (at most 60 operations, and a low part in
+#: single precision); and of float64 numbers alone, in roundoffs.
 TWOFOLD_WEIGHT = 2.0**-76
 WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40
 
@@ -195,10 +189,7 @@ def exact_series(order: int, power: int) -> list[Fraction]:
 
 @cache
 def _interpolated(order: int) -> float:
-    """c with |error| <= c h^p max |d^p L| / p!: interpolation in four variables, one by one.
-
-    Lagrange's remainder, and its growth by the interpolations that follow.
-    """
+    """c with |error| <= c h^p max |d^p L| / p! for interpolation in four variables, one by one."""
     growth = lebesgue(order)
     remainder = math.prod(range(1, order, 2)) ** 2 / 2.0**order
     return 1.01 * remainder * (1.0 + growth + growth**2 + growth**3)
@@ -208,12 +199,13 @@ def _interpolated(order: int) -> float:
 def _steepest(order: int, power: int) -> float:
     """Bound on |d^p L / dx^p| / p! anywhere in the plane, for a reach of 1.
 
-    Beyond the reach binom(p + q - 1, p), the largest value of Gegenbauer's polynomial. Within, the
-    derivative is a polynomial in r times one in the cosine of the direction; it exceeds its largest
-    value on a grid by 1 / cos(pi d / 2N) at most, for degree d and N nodes (Ehlich and Zeller).
+    Beyond the reach it is binom(p + q - 1, p), the largest value of Gegenbauer's polynomial.
+    Inside, the derivative is a polynomial in r and in the cosine of the direction. A polynomial of
+    degree d is at most 1 / cos(pi d / 2N) times its largest value at N Chebyshev nodes (Ehlich and
+    Zeller).
     """
     terms = _series(order, power)
-    # Of degree p in r, 2 p less p derivatives, and p in the angle; N = 6 p nodes in each.
+    # The degree is p in r (2 p less p derivatives) and p in the angle; each has N = 6 p nodes.
     radii = np.cos((np.arange(3 * order) + 0.5) * np.pi / (6 * order))
     cosines = np.cos(np.arange(3 * order + 1) * np.pi / (6 * order))
     total = np.zeros((len(radii), len(cosines)))

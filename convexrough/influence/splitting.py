@@ -1,7 +1,7 @@
-"""The choice of the splitting of 1 / r^q and of the mesh for its smooth part.
+"""The choice of the splitting of 1 / r^q, and of the mesh for the smooth part.
 
 docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: they affect
-the cost, and how near the error is to the tolerance, but the error is bounded for any choice.
+the cost, and how near the error is to the tolerance. The error is bounded for any choice.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from convexrough.influence.softened import Softened
 #: Candidates for p, the number of nodes for interpolation in each direction.
 ORDERS = range(4, 30, 2)
 
-#: Sums at SAMPLE points, over MORE points, are used to estimate those at all points.
+#: Sums at SAMPLE points over MORE points are used to estimate the sums at all points.
 SAMPLE, MORE = 32, 2**15
 
 #: Number of nearest points that are left out of the estimate of a sum.
 NEAREST = 8
 
-#: Estimated times [ns] on two cores: of the transforms per node; per pair, with its assembly; of
-#: interpolation per point and squared width of its stencil.
+#: Estimated times [ns] on two cores: transforms, per node; near pairs, per pair; interpolation, per
+#: point and squared width of the stencil.
 NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 
 
@@ -71,17 +71,16 @@ class Splitting:
 
     @property
     def meshed(self) -> bool:
-        """True if there is a smooth part."""
         return bool(np.isfinite(self.kernel.reach))
 
     @property
     def cut(self) -> float:
-        """The distance [length] beyond which no pair is summed individually."""
+        """[length] the distance beyond which no pair is summed individually."""
         return self.kernel.cut(self.spacing)
 
     @property
     def width(self) -> int:
-        """Side of the square of nodes that the points of one block need."""
+        """Number of nodes, in each direction, that the points of one block need."""
         return self.block + self.kernel.order - 1
 
 

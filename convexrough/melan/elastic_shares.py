@@ -1,9 +1,9 @@
 """Elastic shares: the shear forces of asperities that all stick, per unit of the total force.
 
-The shares Y solve  (H + C) Y = the same displacement at every asperity,  sum Y = 1,  with
-H = diag(1/(2 E* a)), contact radii a of the true loads, and the influence matrix C. The theorem of
-`convex.theorem` bounds the errors of computed shares: docs/theory/shakedown.md, "Elastic shares".
-Y is (n,), or (n, 2, 2) with the full kernel.
+The shares Y solve  (H + A) Y = the same displacement at every asperity,  sum Y = 1,  with
+H = diag(1/(2 E* a)), the contact modulus E*, contact radii a, and the compliance matrix A. Y is
+(n,), or (n, 2, 2) with the full tangential kernel. The errors of computed shares are bounded in
+docs/theory/shakedown.md, "Elastic shares".
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from convexrough.vector_shear.problem import VectorProblem
 class Shares(NamedTuple):
     """Shares of the n loaded asperities. Errors are proved bounds, infinite without a proof.
 
-    values : (n,) or (n, 2, 2);  errors : (n,), or (n, 2) for forces along x and along y
-    loads, load_errors : (n,) in units of the problem
+    values : (n,) or (n, 2, 2)
+    errors : (n,), or (n, 2) for forces along x and along y
+    loads, load_errors : (n,) in scaled units
     """
 
     values: Array
@@ -64,10 +65,7 @@ def vector_shares(contact: Contact) -> Shares:
 
 
 def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
-    """(n,) bounds on the errors of shares (n, 2), from the residual of the equations above.
-
-    The difference of their sum from the total counts as an error of the first asperity.
-    """
+    """(n,) bounds on the errors of shares (n, 2), from the residual of their equations."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     stiffness = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
     moved = exact * stiffness + problem.couple(shares).T
@@ -83,7 +81,7 @@ def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
 
 
 def _unproved(values: Array, problem: Loaded) -> Shares:
-    """The same shares with infinite errors."""
+    """The shares with infinite errors."""
     nowhere = np.full(len(values), np.inf)
     errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)
     return Shares(values, errors, problem.loads, nowhere)

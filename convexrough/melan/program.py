@@ -1,16 +1,9 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-Let q_i(v) be the shear force on asperity i at the vertex v of a path if all asperities stick, t0
-the mean shear force, both over f, and r_i shear forces at rest. Melan's program is
-
-    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0.
-
-For slips s_iv with the same sum x over v at every asperity i, any such lambda is at most
-
-    [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
-
-This module evaluates both for the solver's result, which need not be correct, with bounds on the
-errors of shares and loads: docs/theory/shakedown.md, "Melan's program".
+This module evaluates the two bounds of docs/theory/shakedown.md, "Melan's program", for the result
+of a solver, which need not be accurate: the largest lambda for given residual forces r_i, and (3)
+for given slips. The bounds include the errors of shares and loads. As on that page, shear forces
+are divided by the coefficient of friction; t0 is the mean of the path, P_i are the loads.
 """
 
 from __future__ import annotations
@@ -28,20 +21,20 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.loaded import Loaded
 
-#: The solver's tolerance, and the part of the way by which its state moves to one within friction.
+#: The solver's tolerance, and the fraction by which residual forces are moved into the cones.
 TOLERANCE, MARGIN = 1e-10, 1e-9
 
-#: Slips are rounded to multiples of the largest slip / STEPS, so that sums of them are exact.
+#: Slips are rounded to multiples of the largest slip / STEPS, so that sums of slips are exact.
 STEPS = 2.0**30
 
 
 class Melan(NamedTuple):
     """The largest lambda of Melan's program, with proved bounds.
 
-    factor : lambda of the computed state, shares and loads
+    factor : lambda for the computed residual forces, shares and loads
     lower, upper : proved bounds; 0 and infinite if shares or loads are not proved
     gross  : lambda at which the path reaches the friction limit of the whole contact
-    rest   : (N, 2) [force] shear forces at rest over f, less the shares of the mean force
+    rest   : (N, 2) [force] residual forces r_i minus the elastic shares of the mean force
     slips  : (m, N, 2) slips at each vertex
     """
 
@@ -54,7 +47,7 @@ class Melan(NamedTuple):
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
-    """The solution with the full kernel; mean (2,) and vertices (m, 2) are values of Q / f."""
+    """The solution with the full kernel, for a mean (2,) and vertices (m, 2) [force] of Q / f."""
     problem = Loaded.of(contact)
     unit, n = problem.units.force, len(problem)
     shares, m = vector_shares(contact), len(vertices)
@@ -77,7 +70,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
 
 
 def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
-    """The cone program in lambda and r - steady, with cones scaled by P_i."""
+    """The cone program in lambda and r - steady; the cone of asperity i is divided by P_i."""
     from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
 
     m, n, _ = elastic.shape
@@ -105,17 +98,14 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
 
 def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) the state, corrected to the total and moved slightly to one within friction."""
+    """(n, 2) the residual forces, corrected to the sum t0 and moved slightly into the cones."""
     parts = limits[:, None] / limits.sum()
     state = state + parts * (mean - state.sum(axis=0))
     return np.asarray(state + MARGIN * (parts * mean - state))
 
 
 def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """A lower bound on the largest lambda that the state admits; 0 without a proof.
-
-    The difference of the state's sum from the total reduces the limit of every asperity.
-    """
+    """A lower bound on the largest lambda that the residual forces admit; 0 without a proof."""
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
     limits = (shares.loads - shares.load_errors - missing) * (1 - SAFETY)
@@ -132,10 +122,7 @@ def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Arr
 
 
 def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
-    """The least and largest lambda with |fixed + lambda scaled| <= limit everywhere.
-
-    fixed : (n, 2);  scaled : (m, n, 2);  limits : (n,)
-    """
+    """The least and largest lambda with |fixed (n, 2) + lambda scaled (m, n, 2)| <= limits (n,)."""
     a = (scaled**2).sum(axis=-1)
     b = (fixed * scaled).sum(axis=-1)
     c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
@@ -148,7 +135,7 @@ def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
 
 
 def _closed(slips: Array) -> Array:
-    """(m, n, 2) whole-number slips whose sum over vertices is the same at every asperity."""
+    """(m, n, 2) slips as whole numbers whose sum over vertices is the same at every asperity."""
     largest = float(np.abs(slips).max())
     if not largest > 0:
         raise SolverError("the solver found no slips", solver="shakedown")
@@ -161,7 +148,7 @@ def _closed(slips: Array) -> Array:
 
 
 def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """The upper bound on lambda from these slips; infinite if they do no work."""
+    """The upper bound on lambda from these slips; infinite if their work is not positive."""
     sizes = np.hypot(slips[..., 0], slips[..., 1])
     done = slips * elastic
     uncertainty = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(

@@ -1,10 +1,6 @@
 """`shakedown`: the largest factor of a load path at which asperities stop sliding.
 
-The points of the path are (P0, Q0) + factor (p, q), with mean load P0, mean shear force Q0 and
-amplitudes p, q. With the coefficient of friction f, t = q / f and the largest values r+ of -(p + t)
-and r- of -(p - t), the contact discs at the load L* = P0 - factor (r+ + r-) / 2 stay stuck in the
-steady cycle. Asperity i slides or opens in every cycle if L* is below its onset, the load at which
-it first touches: docs/theory/shakedown.md, "The exact limit".
+docs/theory/shakedown.md derives the exact limit and the programs of Melan's theorem.
 """
 
 from __future__ import annotations
@@ -36,27 +32,32 @@ from convexrough.vector_shear.loaded import Loaded
 
 Theory = Literal["exact", "elastic", "vector"]
 
-#: `Shakedown` with the prescribed quantities filled in, to be called with the results.
+#: The constructor of `Shakedown` with the prescribed quantities filled in; called with the results.
 Limit: TypeAlias = "Callable[..., Shakedown]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shakedown(Table, Plottable):
-    """The largest factor of a load path that shakes down, with proved bounds.
+    """The shakedown limit of a load path: the largest factor at which asperities stop sliding.
+
+    The path has m points (P0, Q0) + factor (p, q) of normal load and shear force. The scene has n
+    asperities and the coefficient of friction f.
 
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
-        asperities that stick until they slide, with the scalar or full kernel, at constant load P0
-    factor  : the smallest of `factors`, or the solution of Melan's program
-    lower, upper : proved bounds on it; 0 and infinite without a proof
-    factors : (n,) the factor of each asperity that touches at the load P0; nan for others and for
-        those not computed; for "vector" the same factor for all
-    gross   : the factor at which the path reaches the friction limit of the whole contact
-    witness : (n,) or (n, 2) [force] shear forces of a state from which no asperity slides along the
+        asperities that stick until they slide as a whole, with the scalar kernel or the full one;
+        the load must be constant
+    factor  : the largest factor of the path at which all asperities stop sliding
+    lower, upper : proved bounds on `factor`; 0 and infinite without a proof
+    factors : (n,) the largest factor at which each asperity stops sliding; nan where it is not
+        computed and where the asperity does not touch at the load P0; for "vector" all are equal
+    gross   : the factor at which the path reaches the friction limit f P of the whole contact
+    witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
         path scaled by `lower`
-    mechanism : (n,) slips just above `upper`, scaled to a largest of 1; (m, n, 2) for "vector"
-    order   : for "exact" as in `Cycle`, bounds need "proved"; None for other kinds
-    load, force : [force] P0 and Q0;  Q0 (2,) for "vector"
-    load_amplitudes, force_amplitudes : (m,) [force] p and q;  q (m, 2) for "vector"
+    mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
+        (m, n, 2), at each point of the path
+    order   : for "exact" as in `Cycle`; bounds need "proved". None for other kinds
+    load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
+    load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
 
     >>> Q = 0.1 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -95,7 +96,6 @@ class Shakedown(Table, Plottable):
         return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
 
     def _variables(self) -> Variables:
-        """The variables; for "vector", vectors have a dimension "direction"."""
         found = super()._variables()
         if self.kind == "vector":
             for name, along in (
@@ -121,15 +121,17 @@ def shakedown(
 
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
-    loads, forces : [force] load P0 and shear force Q0; Q0 is (2,) for "vector"
-    load_amplitudes, force_amplitudes : [force] (m,) p and q, or one number p for all points; q is
-        (m, 2) for "vector". p must be 0 unless the kind is "exact"
+    loads, forces : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
+    load_amplitudes : [force] (m,) or one number for all points; must be 0 unless `kind` is "exact"
+    force_amplitudes : (m,) [force]; (m, 2) for "vector"
     kind      : "exact", "elastic" or "vector", as in `Shakedown`
     influence : compliance operator, as in `load_path`
 
-    Raises InputError for invalid values, |Q0| >= f P0, or a path of equal points.
+    Raises InputError for invalid values, if |Q0| >= f P0 with the coefficient of friction f, or if
+    all points of the path are equal.
 
-    Example: in the paper's scene (f = 0.5, so Q is 0.1 f P) sliding ceases up to 0.3517 f P.
+    Example: in the scene of Dini and Hills (2009), sliding ceases for all amplitudes up to
+    0.3517 f P. Here f = 0.5, so Q is 0.1 f P.
 
     >>> Q = 0.05 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -208,16 +210,16 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The solution of the scalar program: alternating slip of one asperity, or gross sliding."""
+    """The limit of the scalar program: one asperity slips back and forth, or all slide."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """The factor at which the range of each asperity's share reaches 2 P_i."""
-        reach = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
-        return np.divide(2.0 * loads, reach, out=np.full_like(loads, np.inf), where=reach > 0)
+        """The factor at which the shear force of each asperity, over f, has the range 2 P_i."""
+        ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
+        return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
 
     each = limits(P, np.abs(q))
     sliding = min(
@@ -264,7 +266,7 @@ def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
-    """(m, 2) forces in the plane, checked; a number, if one vector is expected, is along x."""
+    """(m, 2) checked forces. If one vector is expected, a number is taken as its x component."""
     given = checks.numbers(what, values)
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])
@@ -275,7 +277,7 @@ def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
 
 
 def _alike(what: str, values: ArrayLike, count: int) -> Array:
-    """(count,) amplitudes, checked; one number counts for all."""
+    """(count,) checked amplitudes; one number stands for all."""
     given = checks.array(what, np.atleast_1d(np.asarray(values)))
     if np.ndim(values) == 0:
         return frozen(np.full(count, float(given[0])))

@@ -1,11 +1,8 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-`tried` yields them, the widest first. Boxes of crowded contacts can only have touching asperities:
-`box_of_touching`, docs/theory/crowded.md. Symbols of these pages, and names in the code:
-
-    B, h, mu              loads, stiffness, 1 - convexity_number
-    theta, s_i            convexity_number, problem.shells (1 / (pi E* s_i))
-    O                     fixed open
+Boxes of crowded contacts can only have touching asperities: docs/theory/crowded.md. In comments,
+h is the local stiffness `NormalProblem.stiffness`, H the diagonal matrix of the h, A the compliance
+operator, and mu = 1 - `convexity_number` the margin of convexity.
 """
 
 from __future__ import annotations
@@ -28,19 +25,17 @@ from convexrough.roundoff import ROUNDOFF
 
 Scope = Literal["global", "local", "none"]
 
-#: Convexity number of the loads from which shells are fitted to them. A heuristic: a wrong value
-#: wastes work, or makes a bound less sharp.
+#: Convexity number of the loads above which shells are fitted to them. A heuristic.
 FIT_FROM = 0.8
 
-#: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the
-#: bounds are sharpened afterwards on a smaller box.
+#: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
 MARGINS = (0.1, 1e-3)
 
 #: Least growth of each load in a box of touching asperities, as a fraction of the load and of the
 #: largest load (the sum of both). Heuristics: the proof allows any box.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
-#: Touching asperities up to which a Cholesky factor costs no more than overlapping shells.
+#: Number of touching asperities up to which Cholesky costs no more than overlapping shells.
 FACTORISED = 1500
 
 #: Margins mu of a box of touching asperities, some small: it may be barely convex.
@@ -52,14 +47,14 @@ class Box(NamedTuple):
 
     scope: Scope
     problem: NormalProblem | Stack  # with the shells that prove convexity
-    loads: Array  # the upper corner
-    stiffness: Array  # h there
+    loads: Array  # upper ends; the lower ends are 0
+    stiffness: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # upper bounds that the solution is yet to be proved below; or infinite
-    fixed_open: NDArray[np.bool_]  # assumed open, which is yet to be proved
+    faces: Array  # limits below which the solution must still be proved to lie; or infinite
+    fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:
-        """The boxes of some rows, which are those of `problem`."""
+        """The boxes of some rows of a stack, with `problem` as the stack of these rows."""
         return self._replace(
             problem=problem,
             loads=self.loads[rows],
@@ -71,12 +66,12 @@ class Box(NamedTuple):
 
     @property
     def closed(self) -> Box:
-        """The same box for another load or approach, where it may not hold every solution."""
+        """The same box for another load or approach, whose solutions may lie outside it."""
         return self._replace(faces=np.where(self.loads > 0, self.loads, np.inf))
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
-    """Boxes: a global one, convex by shells or by Cholesky, or else a local one."""
+    """Boxes, the widest first: if possible one with every solution, else a local one."""
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.stiffness(corner)
@@ -102,7 +97,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 
 
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """The least known upper bound on D0 at any solution; `displacement` is A times the loads."""
+    """The least known upper bound on the approach of any solution, from loads and A times these."""
     if problem.load is None:
         return problem.approach_bound
     return min(problem.approach_bound, problem.overhang(loads, displacement))
@@ -111,11 +106,9 @@ def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Ar
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """A local box of the touching asperities, with all others fixed open; None if not convex.
+    """A local box of touching asperities, with all others fixed open; None if not proved convex.
 
-    Fitted shells or `crowded_margin` prove convexity: docs/theory/crowded.md.
-
-    room : (n,) least growth of the loads in the box
+    room : (n,) least increase from `loads` to the upper ends of the box
     """
     which = np.flatnonzero(touching)
     influence = problem.influence.restricted(which)
@@ -132,7 +125,7 @@ def box_of_touching(
 
 
 def crowded_margin(influence: Influence, stiffness: Array) -> float:
-    """The largest proved mu: by Cholesky where a matrix is cheap, else by overlapping shells."""
+    """The largest proved mu: by Cholesky for small matrices, else by overlapping shells."""
     if not influence.stored and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)
     scaled, error = _scaled(influence, stiffness), influence.entry_error + 8 * ROUNDOFF
@@ -147,7 +140,7 @@ def _scaled(influence: Influence, stiffness: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Loaded asperities in pairs that no energy minimum has, else whose shells meet; else all."""
+    """Loaded asperities in pairs that no energy minimum has; else whose shells meet; else all."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which
@@ -168,10 +161,7 @@ def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
 
 
 def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
-    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
-
-    0 without a stored matrix: the cost of a factorisation grows as the cube of its size.
-    """
+    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved by a stored matrix, else 0."""
     if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF

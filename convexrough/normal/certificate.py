@@ -1,8 +1,7 @@
-"""The certificate: what is proved about given loads, in the units of the scene.
+"""The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
-Every bound holds for the exact solution of the scene whose data are the given float64 numbers.
-`refine` evaluates the contact law in ball arithmetic, `proved` applies the theorem on a box of
-loads, and this module bounds the distance from the given loads to the proved solution.
+The data of the scene are the given float64 numbers. `refine` evaluates the contact law in ball
+arithmetic, `proved` proves a solution near the loads, and this module bounds the distance to it.
 """
 
 from __future__ import annotations
@@ -36,16 +35,14 @@ STATUSES = np.array(["undecided", "contact", "open"])
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Table):
-    """What is proved about given loads. Arrays are (n,), in the order of the given loads.
-
-    `scope` says in which set the solution is unique.
+    """What is proved about given loads. Arrays are (n,), in the order of the loads.
 
     scope : "global": the scene has exactly one solution; "local": it has exactly one solution with
         contact radii near these (`meaning` describes the others that are possible); "none":
         nothing is proved, every bound is infinite and every asperity is undecided
-    convexity_number : below 1 the energy is strictly convex on the box of loads that was used: the
-        smallest eigenvalue of its Hessian, scaled by its local part, is at least
-        1 - convexity_number
+    convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
+        the smallest eigenvalue of the Hessian, scaled by each asperity's local stiffness, is at
+        least 1 - convexity_number
     status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
         "undecided"
     load_errors : [force] bounds on |load - solution|
@@ -56,15 +53,14 @@ class Certificate(Table):
     duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
         prescribed, the loads are first scaled to it
-
     fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
         unless contacts are crowded. No other solution nearby has the same asperities open
-    other_solutions_crowding : every other solution has a larger crowding than this; infinite where
-        there is no other solution, 0 where nothing is known. The crowding is the largest sum of
-        two contact radii over the distance of their asperities
+    other_solutions_crowding : every other solution has a larger crowding than this: the largest sum
+        of two contact radii over the distance of their asperities. It is infinite where there is no
+        other solution, and 0 where nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
-    in_the_way : (m,) asperities that prevent a proof; empty where there is one
+    in_the_way : (m,) indices of asperities that prevent a proof; empty where there is one
     obstacle : a sentence that says why these asperities prevent a proof
 
     >>> judged = contact.certificate
@@ -92,7 +88,7 @@ class Certificate(Table):
 
     @property
     def meaning(self) -> str:
-        """The scope as a sentence: which other solutions are possible.
+        """A sentence on the scope: which other solutions are possible.
 
         >>> contact.certificate.meaning
         'the only solution'
@@ -123,12 +119,12 @@ class Certificate(Table):
 
     @property
     def load_error(self) -> float:
-        """[force] the largest of `load_errors`."""
+        """[force] The largest of `load_errors`."""
         return float(self.load_errors.max())
 
     @property
     def gap_error(self) -> float:
-        """[length] the largest of `gap_errors`."""
+        """[length] The largest of `gap_errors`."""
         return float(self.gap_errors.max())
 
 
@@ -140,11 +136,11 @@ def certify(
     load: float | None = None,
     influence: Kind | None = None,
 ) -> Certificate:
-    """The certificate of given loads.
+    """The certificate of loads from any source.
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
     approach, load : [length], [force] the prescribed quantity, exactly one of the two. Loads are
-        scaled to a prescribed total, and the bounds include the effect of that
+        scaled to a prescribed total, and the bounds include this change
     influence : compliance operator "dense", "lattice" or "scattered"; None for the cheapest
 
     Raises InputError for loads of the wrong length, negative or not finite.
@@ -191,7 +187,7 @@ def certificate_of(
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
     given = loads[problem.candidates]
-    if here and np.array_equal(given / force, found.loads.value):  # proved from these loads
+    if here and np.array_equal(given / force, found.loads.value):  # the proof is for these loads
         off = found.loads.error
         moved = off + np.abs(start.loads.low)
         errors, shift = found.indentation.error, float(found.approach.error)
@@ -200,7 +196,7 @@ def certificate_of(
         moved = (Ball.exact(start.loads) - found.loads).size
         errors = (found.indentation - known.value).size
         shift = float((found.approach - start.approach.value).size)
-    # Asperities that cannot touch have no load. Tiny loads underflow in the problem's units.
+    # Asperities that cannot touch have no load. Tiny loads underflow in scaled units.
     load_errors = loads.copy()
     load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
     errors = problem.to_scene(errors)
@@ -237,8 +233,8 @@ def certificate_of(
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
     """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| if Phi is convex from P to P*.
 
-    P are the loads, P* the solution, and e the residuals of the contact law at P. Loads q on
-    asperities fixed open add at most e'q; removing q changes the residuals by A q.
+    P are the loads, P* the solution, and e the violations of the contact law at P. Loads q on
+    asperities fixed open add at most e'q, and removing them changes the residuals by A q.
     """
     box = found.box
     excess = np.where(box.fixed_open & (start.loads.high == 0), 0.0, start.excess)
@@ -247,7 +243,7 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
         displacement = problem.influence.apply(q)
         excess += displacement + problem.influence.rounding(q).of(displacement)
     most = np.where(box.fixed_open, 0.0, np.maximum(box.loads, start.loads.high * (1 + SAFETY)))
-    # A >= -theta H in the box; for larger loads H is at least this fraction of H in the box.
+    # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
     part = np.cbrt(np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0))
     convex = part.min(initial=1.0) > box.convexity_number * (1 + SAFETY)
     if not (convex or box.problem.convexity_at(problem.stiffness(most)) < 1):
@@ -283,17 +279,13 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy, in the problem's units, of loads on asperities that cannot touch.
-
-    Loads s on these add  sum (3/5) k s^(5/3) + g's + s'A s / 2,  with their gaps g >= 0, the local
-    coefficients k and the compliance operator A.
-    """
+    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2: loads s where contact is impossible."""
     screened = loads.copy()
     screened[problem.candidates] = 0.0
     which = np.flatnonzero(screened)
     if len(which) == 0 or problem.load is not None:
         return 0.0
-    # Loads that underflow in the problem's units count as the smallest positive number.
+    # Loads that underflow in scaled units count as the smallest positive number.
     s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
     coefficients = hertz.local_coefficient(
         problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
@@ -310,7 +302,6 @@ def _screened_energy(
 def _unproved(
     problem: NormalProblem, start: Trial, indentation: Array, obstacle: Obstacle
 ) -> Certificate:
-    """A certificate of scope "none", with the obstacle."""
     n, length = len(indentation), problem.units.length
     return Certificate(
         scope="none",

@@ -1,4 +1,4 @@
-"""Comparison of a claim with the proof: the common part of verdicts on loads and shear forces."""
+"""The comparison of a claim with a proof, which verdicts on loads and on shear forces share."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SUSPICIOUS = 1e-3
 
 
 def tolerance(name: str, within: float) -> float:
-    """A checked `within`. Raises InputError unless it is in (0, 1]."""
+    """The tolerance `within`. Raises InputError unless it is above 0 and at most 1."""
     if checks.positive(name, within) > 1.0:
         expected = "a fraction of the largest force, at most 1; 5 % is 0.05"
         raise InputError(name, found=within, expected=expected)
@@ -33,8 +33,9 @@ def tolerance(name: str, within: float) -> float:
 class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
-    one, many : names of a force and of the forces;  proved : name of the claimed set
-    kinds     : ways in which a status can be wrong: attributes with indices, and their descriptions
+    one, many : the singular and the plural of what a force is called in messages
+    proved    : name in messages of the set of asperities that the claim is about
+    kinds     : names of attributes with the indices of wrong statuses, and what is wrong there
     claims    : the statuses that are claimed where `claimed` is True and where it is False
     within : largest error allowed, as a fraction of the largest force, and of the total
     total_prescribed : [force] None where it is not prescribed
@@ -62,16 +63,16 @@ class Claim(ABC):
     @property
     @abstractmethod
     def errors_alone(self) -> Array:
-        """(n,) [force] bounds on |force - solution| by the forces alone, or infinite."""
+        """(n,) [force] bounds on |force - solution| proved from the forces alone, or infinite."""
 
     @property
     def wrong(self) -> dict[str, Indices]:
-        """Indices of asperities whose claimed status is proved wrong, by kind of claim."""
+        """Indices of asperities with a status that is proved wrong, by the texts in `kinds`."""
         return {said: getattr(self, name) for name, said in self.kinds.items()}
 
     @abstractmethod
     def nearby(self) -> tuple[Array, Array] | None:
-        """(n,) [force] forces of a solution, and their bounds; None without a solution."""
+        """(n,) [force] forces of `solution`, and bounds on their errors; None without one."""
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
@@ -97,13 +98,13 @@ class Claim(ABC):
 
     @property
     def holds(self) -> bool:
-        """True if all claimed statuses are proved, all forces near enough, and the total agrees."""
+        """True if all claimed statuses are proved, all forces accurate, and the total agrees."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
 
     @property
     def wrongly_claimed(self) -> Indices:
-        """Indices (m,) of asperities whose claimed status is proved wrong, of every kind."""
+        """(m,) indices of asperities whose claimed status is proved wrong."""
         return np.concatenate(list(self.wrong.values()))
 
     @cached_property
@@ -123,13 +124,13 @@ class Claim(ABC):
 
     @cached_property
     def off(self) -> Indices:
-        """(m,) asperities with an error above `within`, largest first."""
+        """(m,) indices of asperities with an error above `within`, largest first."""
         order = np.argsort(-self.errors, kind="stable")
         return frozen(order[~(self.errors[order] <= self.within * self.largest)])
 
     @property
     def near_enough(self) -> bool:
-        """True if every force is proved to be near enough to the solution."""
+        """True if every force is proved to have an error of at most `within`."""
         return not len(self.off)
 
     @property
@@ -147,10 +148,11 @@ class Claim(ABC):
 
     @cached_property
     def suspects(self) -> Indices:
-        """(m,) asperities claimed wrongly or with forces far from the solution, likeliest first.
+        """(m,) indices of asperities with a wrong status or a wrong force, likeliest first.
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
-        two. Forces with another total than the solution are also compared after scaling to it.
+        two. If the total differs from that of the solution, the forces are also compared after
+        scaling to it.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or (self.near_enough and not len(wrong)):

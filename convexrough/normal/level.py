@@ -3,10 +3,11 @@
 At a total load L the scene has one solution in the box where it was proved: loads P_i(L), approach
 D0(L), indentations n_i(L) (minus the gap where open), and the energy
 
-    V(L) = min over sum P = L of  sum (3/5) k P^(5/3) + P'AP/2 - d'P,    so that V' = D0.
+    V(L) = min over sum P = L of  sum (3/5) k P^(5/3) + P'AP/2 - d'P,    so that dV/dL = D0.
 
-Its tangent q = dP/dL, S = dD0/dL solves  q / c + A q = S,  sum q = 1  over the touching asperities,
-with c = dP/dn = (3/2) P^(1/3) / k.
+Coefficients k, operator A and offsets d are those of `NormalProblem`. The derivatives q = dP/dL and
+S = dD0/dL solve  q / c + A q = S,  sum q = 1  over the touching asperities, with
+c = dP/dn = (3/2) P^(1/3) / k.
 """
 
 from __future__ import annotations
@@ -36,18 +37,18 @@ from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: Largest residual of a response after refinement, relative to the first one.
+#: Largest residual of a response after refinement, over that before refinement.
 SOLVED = 1e-6
 
 #: Largest number of candidates for which levels are solved together: for more this saves no time.
 MOST = 512
 
-#: A solver: takes a problem and initial loads or None, and returns loads, in the problem's units.
+#: A function of a problem and initial loads (or None) that returns loads, all in scaled units.
 Press = Callable[[NormalProblem, Array | None], Array]
 
 
 class Response(NamedTuple):
-    """What `Level.response` returns, as balls in the problem's own units.
+    """The result x, beta of `Level.response`, as balls in scaled units.
 
     loads : (n,) x, 0 where open;  approach : beta
     """
@@ -59,10 +60,10 @@ class Response(NamedTuple):
 class Springs(NamedTuple):
     """The contacts of a level as linear springs, for the system that `Level.response` solves.
 
-    touching  : (n,) asperities whose stiffness is known;  doubtful : others that may touch
-    slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : 1/c, likewise
-    bound     : (n,) h, at most 1/c where the asperity may touch; infinite where open
-    margin    : mu of the theorem, with H = diag(h); 0 where nothing is proved
+    touching  : (n,) True where the stiffness is known;  doubtful : (n,) others that may touch
+    slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : (n,) 1/c where touching
+    bound     : (n,) h <= 1/c where the asperity may touch; infinite where open
+    margin    : mu of docs/theory/one-theorem.md, with H = diag(h); 0 where nothing is proved
     """
 
     touching: NDArray[np.bool_]
@@ -75,11 +76,11 @@ class Springs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The normal solution at one total load, as balls over the candidates, in the problem's units.
+    """The normal solution at one total load, as balls over the candidates, in scaled units.
 
-    load     : () L;  approach : () D0(L)
-    loads    : (n,) P_i(L);  indentation : (n,) n_i(L), minus the gap where open
-    touching, open : (n,) proved
+    load, approach : () the total load L and D0(L)
+    loads, indentation : (n,) P_i(L) and n_i(L)
+    touching, open : (n,) True where proved
     """
 
     problem: NormalProblem
@@ -109,7 +110,7 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """The level of unproved trial loads: the radii of the loads are infinite."""
+        """A level of loads near which nothing is proved: the radii of the balls are infinite."""
         unknown = Ball.around(state.loads, np.inf)
         none = np.zeros(len(problem), dtype=bool)
         approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
@@ -118,7 +119,7 @@ class Level:
 
     @classmethod
     def unloaded(cls, problem: NormalProblem) -> Level:
-        """The level L = 0, where the highest asperity just touches."""
+        """The level at L = 0, where the first asperity just touches."""
         offsets = problem.exact.offsets
         ends = np.array([offsets.lower.max(), offsets.upper.max()])
         highest = offsets[int(np.argmax(offsets.value))]
@@ -138,12 +139,12 @@ class Level:
 
     @cached_property
     def tangent(self) -> Response:
-        """q = dP/dL and S = dD0/dL."""
+        """The derivatives dP/dL and dD0/dL."""
         return self.response(Ball.exact(np.zeros(len(self.problem))), Ball.exact(1.0))
 
     @cached_property
     def springs(self) -> Springs:
-        """The springs that `response` solves with. Raises ProofError at no load."""
+        """The springs with which `response` solves. Raises ProofError at L = 0."""
         found, state = self.solution, self.trial
         if state is None:
             raise ProofError("at no load the approach has no derivative")
@@ -173,9 +174,9 @@ class Level:
     def response(self, right: Ball, total: Ball) -> Response:
         """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
 
-        The solution is refined in pairs of float64 numbers until the residual no longer halves. The
-        theorem of `convex.theorem` then bounds the error: first what doubtful asperities could
-        carry, then the error of the others, with that included.
+        The solution is refined in pairs of float64 numbers until the residual no longer halves.
+        Bounds on its error follow from docs/theory/one-theorem.md. They include the x of doubtful
+        asperities.
 
         right : (n,);  total : ()
 
@@ -267,17 +268,17 @@ class Level:
 
     @cached_property
     def rates(self) -> Array:
-        """(n,) dn/dL = S - A q, in float64."""
+        """(n,) the derivatives dn/dL = S - A q, in float64."""
         q, rate = self.tangent
         rates: Array = float(rate.value) - self.problem.influence.apply(q.value)
         return rates
 
 
 class Levels:
-    """The normal solutions of one scene at total loads up to that of `top`; `at` caches them.
+    """The normal solutions of one scene up to the load of the level `top`; `at` caches them.
 
-    top : the level with the highest load, that of a pressed contact
-    together : Newton's method may solve several levels at once, as rows of a stack
+    top : the level of a pressed contact
+    together : True if Newton's method may solve several levels at once, as rows of a stack
     """
 
     def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
@@ -286,11 +287,11 @@ class Levels:
 
     @property
     def presses(self) -> int:
-        """The number of levels found besides `top`."""
+        """The number of levels computed besides `top`."""
         return len(self._known)
 
     def below(self, drop: Ball) -> Level:
-        """The level at the load of `top` minus `drop`, in the problem's own units."""
+        """The level at the load of `top` minus `drop`, in scaled units."""
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
@@ -308,7 +309,7 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at positive loads (k,), solved together; None for those left to `at`."""
+        """The levels at positive loads (k,), solved together; None where `at` must solve one."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None or found.box.fixed_open.any():
@@ -320,11 +321,11 @@ class Levels:
         return levels
 
     def at_approach(self, approach: Ball) -> Level:
-        """The level at an approach above first touch, in the problem's units. Not cached."""
+        """The level at an approach above first touch, in scaled units. It is not cached."""
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The solution in the box of `top`; if not proved, sought again from the loads of `top`."""
+        """The level in the box of `top`; a second attempt starts from the loads of `top`."""
         state, found = self._sought(problem, None)
         top = self.top.solution
         if isinstance(found, Obstacle) and top is not None:
@@ -349,7 +350,6 @@ def _key(load: Ball) -> tuple[float, float, float]:
 
 
 def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
-    """The levels at these loads; None where the solution is not proved in the box."""
     scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
     rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
     force, modulus = total.value * problem.units.force, scene.material.contact_modulus
@@ -377,7 +377,7 @@ def rows_of(levels: Sequence[Level]) -> Rows:
 
 @np.errstate(invalid="ignore")  # unproved levels
 def energies(levels: Sequence[Level]) -> Ball:
-    """(k,) V(L) of levels of one scene."""
+    """(k,) the energies V(L) of levels of one scene."""
     high, low, radius = np.zeros((3, len(levels)))
     which = [k for k, level in enumerate(levels) if level.trial is not None]
     if which:

@@ -28,15 +28,14 @@ STRAIGHT = 1e-11
 
 @np.errstate(all="ignore")
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
-    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load; or of rows, with loads (m, 1).
+    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load;  rows (m, n) have loads (m, 1).
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing and convex in tau,
-    and nearly straight. From the second step on, Newton's method approaches the root from the
-    right. The shift is relative to the largest delta, to keep the precision of small loads.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in
+    tau, and Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # if one asperity bears the whole load
+    most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
@@ -61,26 +60,25 @@ def approach_bound(
     offsets: Array,
     load: float | Array,
 ) -> Any:
-    """Upper bound on D0 at every solution of total `load` (derived in docs/theory/certificate.md).
+    """Upper bound on the approach at every solution of total load L.
 
-    With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
+    It is (2) of docs/theory/certificate.md, with q = weights / sum(weights), alpha = q k, c = A q.
 
-        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
-
-    A number, or (m, 1) for loads (m, 1) of a stack.
-
-    displacement : (n,) no less than A times weights;  offsets : (n,) no more than d
+    weights      : (n,) approximate loads, not negative, not all 0
+    displacement : (n,) A times weights, or more
+    coefficients, offsets : (n,) k, and d or less
+    load         : L, or (m, 1) for m rows; the bound has the same shape
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
     cubes = (q * coefficients) ** 3
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
-        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # only these matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
-    # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L: Newton's method for
-    # S^(-1/3), which is concave and nearly straight, from the left.
+    # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L. Newton's method from the
+    # left is applied to S^(-1/3), which is concave and nearly straight.
     least = largest(active)
     height = largest(active + np.cbrt(cubes / wanted)) * (1 + SAFETY)
     for _ in range(100):
@@ -88,7 +86,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # nan in float64: high enough
+        height = height + np.fmax(step, 0.0)  # a step of nan means that it is high enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -98,9 +96,9 @@ def approach_bound(
 
 
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
-    """An upper bound on the approach [length] at every solution of total `load` [force].
+    """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with the trial loads `smooth_loads`.
+    It is `approach_bound` for the loads `smooth_loads`.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
@@ -115,7 +113,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     couplings: list[tuple[Indices | slice, Coupling]]
     if few:
         couplings = [(which, sources)]
-    elif sources.name == "lattice":  # one box for all
+    elif sources.name == "lattice":  # one box of sites for all
         couplings = [(slice(None), sources.onto(scene.contact_points))]
     else:
         couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]
@@ -130,7 +128,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] loads of this total, if the surface moves as under a smooth sphere."""
+    """(n,) [force] loads of this total if the surface moves as under a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
@@ -140,7 +138,7 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
     """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    Other bases are replaced by a sphere of mean curvature; flat bases have displacement 0.
+    Other shapes are replaced by a sphere of mean curvature; under a flat it is 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)
@@ -154,14 +152,14 @@ def all_that_could_touch(
     farthest: Callable[[float], float],
     load: float,
 ) -> tuple[Scene, float]:
-    """The scene with all asperities that could touch under a load, and a bound on its approach.
+    """The scene with all asperities that could touch under a load, and a bound on the approach.
 
-    scene_within : returns the scene within a distance from the axis [length]; a greater distance
-        only adds asperities
+    scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for a smaller one that keeps all trial loads: lambda is at
-    least the displacement c_i at every asperity.
+    The bound of a wide scene also holds for a narrower one with all asperities of the approximate
+    loads, as lambda of (2) of docs/theory/certificate.md is at least the displacement at every
+    asperity.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

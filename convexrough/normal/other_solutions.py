@@ -1,9 +1,4 @@
-"""Bounds that every other solution meets: docs/theory/crowded.md, "Other solutions".
-
-Two solutions have contact radii a and b. With t_i = (2 / pi) m_i, m = (2/3) (a^2 + a b + b^2) /
-(a + b), they are equal if t_i + t_j <= r_ij for all pairs, or if another proof shows that A plus
-the diagonal 1 / (pi E* t_i) is semidefinite.
-"""
+"""Bounds that every other solution satisfies: docs/theory/crowded.md, "Other solutions" and (1)."""
 
 from __future__ import annotations
 
@@ -15,8 +10,8 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
-#: Contact radius over the distance to the nearest neighbour up to which another solution covers a
-#: summit: the root of m(x, 1) = pi / 4, rounded down.
+#: If contact radii are at most this fraction of the distance to the nearest neighbour, every other
+#: solution covers a summit: the root a of m = pi / 4 for b = 1 in (1), rounded down.
 ROOMY = 0.52
 
 
@@ -25,11 +20,11 @@ class OtherSolutions(NamedTuple):
 
     possible: bool
     crowding: float  # lower bound on their crowding; infinite if there are none
-    cover: bool  # each of them has a disc over its nearest neighbour's summit
+    cover: bool  # in each of them a disc covers the nearest neighbour's summit
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """The bounds for loads (n,) up to `near` and approaches up to `approach_bound`."""
+        """The bounds for loads (n,) up to `near`, and approaches up to `approach_bound`."""
         A = problem.influence
         perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
         a, most = (_radii(problem, loads) for loads in (near, problem.bounds(approach_bound)))
@@ -45,13 +40,12 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:
-    """(n,) [length] contact radii under loads, rounded up."""
     radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
     return radii
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """m, such that scale / t is the mean stiffness from contact radius a to b; grows with both."""
+    """The mean m of (1) for contact radii a and b; it increases with both."""
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

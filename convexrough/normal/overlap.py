@@ -1,11 +1,12 @@
 """Bounds on the convexity of crowded contacts, by overlapping shells about the asperities.
 
-docs/theory/crowded.md, "Shells that overlap". For asperities of lengths t_i = scale / h_i and any
-radii s_i, with U the energy of two shells of charge 1, the matrix
+docs/theory/crowded.md, "Shells that overlap". Local stiffnesses h are given as lengths
+t_i = 1 / (pi E* h_i). For distances r_ij, any radii s_i, and the energy U_ij of two shells of
+charge 1 with these radii, the matrix
 
     S_ij = (1 - t_i / s_i) on the diagonal,  (t_i t_j)^(1/2) (1 / r_ij - U_ij) off it,
 
-is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
+is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S  for H = diag(h) and the compliance operator A.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t, the cheapest first; factor for nearly singular pairs; most by which a
-#: neighbour's radius is smaller, over its distance. Heuristics: the proof allows any radii.
+#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and the largest
+#: decrease of radii to a neighbour, over its distance. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -31,7 +32,7 @@ NEAREST = 8
 #: Largest number of pairs of shells for each asperity, limited by memory.
 MOST_PAIRS = 200
 
-#: Shells wider than this many times the median are searched one by one: for speed only.
+#: Shells wider than this many times the median are searched one by one. It affects speed only.
 WIDE = 2.0
 
 #: Largest number of asperities: an elimination takes 5 s at 100,000, and a proof needs several.
@@ -39,7 +40,7 @@ MOST_ELIMINATED = 200_000
 
 
 class Overlaps(NamedTuple):
-    """Pairs of shells that overlap."""
+    """Pairs of overlapping shells."""
 
     first: Indices
     second: Indices
@@ -48,7 +49,7 @@ class Overlaps(NamedTuple):
 
 
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
-    """The largest mu for which  H + A >= mu H  is proved, else 0; lengths t = scale / h."""
+    """The largest of `margins` mu for which  H + A >= mu H  is proved, else 0; lengths : (n,) t."""
     points = influence.points
     if len(points) > MOST_ELIMINATED:
         return 0.0
@@ -92,7 +93,7 @@ class Nearest(NamedTuple):
         return cls(distances, which, closest, meeting)
 
     def wide_radii(self, lengths: Array, width: float) -> Array:
-        """(n,) radii of shells, for `closest` below 1."""
+        """(n,) radii of shells; each `closest` must be below 1."""
         radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
         covering: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
         return np.asarray(np.maximum(radii, covering))
@@ -104,7 +105,7 @@ def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
 
     tree = cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
-    wide = np.flatnonzero(radii > usual)  # few: searched one by one
+    wide = np.flatnonzero(radii > usual)  # searched one by one
     reach = radii[wide] + float(radii.max(initial=0.0))
     counts = tree.query_ball_point(points[wide], reach, return_length=True)
     many = tree.count_neighbors(tree, 2.0 * usual) + int(np.sum(counts))

@@ -1,11 +1,13 @@
-"""The normal contact problem in its own units: energy, gap, residual, bounds, convexity.
+"""The normal contact problem in scaled units: energy, gap, residual, bounds, convexity.
 
 docs/theory/convexity.md, "The model", (1) and (2):
 
     minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
 
-with D_i = D0 + d_i prescribed (approach control), or with sum P_i prescribed and D0 the multiplier
-of that constraint (load control). Its first-order conditions are the contact law
+for the loads P, with the coefficients k of the local law, the compliance operator A, and
+D_i = D0 + d_i for the approach D0 and the offsets d. Either D0 is prescribed (approach control), or
+sum P_i is, with D0 as the multiplier of this constraint (load control). The first-order conditions
+are the contact law
 
     P >= 0,   g = k P^(2/3) + A P - D >= 0,   P_i g_i = 0.
 """
@@ -48,7 +50,7 @@ FITTED = 0.9
 CHUNK = 2**14
 
 
-#: Change of loads relative to the largest, up to which its float64 product with A gives 29 digits.
+#: Largest change of loads, over the largest load, whose float64 product with A gives 29 digits.
 NEARBY = 1e-13
 
 #: 1 / pi to 66 digits.
@@ -60,9 +62,9 @@ REDUCTION = 1e-7
 
 
 class Data(NamedTuple):
-    """The numbers of a problem as balls, in own units.
+    """The numbers of a problem as balls, in scaled units.
 
-    coefficients : (n,) k of the local law, or (1,) where all are equal;  offsets : (n,) d
+    coefficients : (n,) k, or (1,) where all are equal;  offsets : (n,) d
     scale        : () 1 / (pi E*)
     """
 
@@ -73,14 +75,12 @@ class Data(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NormalProblem:
-    """The asperities of a scene that could touch, and what is prescribed, in the problem's units.
+    """The asperities of a scene that could touch, and what is prescribed, in scaled units.
 
     candidates    : (n,) their indices in the scene; all others carry no load in any solution
-    coefficients  : (n,) k of the local law
-    offsets       : (n,) d_i = D_i - D0
+    coefficients, offsets, influence : (n,) k, (n,) d, and the compliance operator A
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    influence     : A
-    shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
+    shells        : (n,) 1 / (pi E* s_i) for radii s_i: A with these on the diagonal is semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     approach_bound : upper bound on D0 at any solution
@@ -105,7 +105,7 @@ class NormalProblem:
 
     @cached_property
     def exact(self) -> Data:
-        """The scene's data to thirty digits."""
+        """The data of the scene to thirty digits."""
         scene, units = self.scene, self.units
         constants = (
             scene.sphere_radius,
@@ -123,16 +123,16 @@ class NormalProblem:
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
     def at_load(self, load: Ball) -> NormalProblem:
-        """The same asperities under a prescribed total load, up to that at `approach_bound`."""
+        """The problem of the same asperities under a total load, up to that at `approach_bound`."""
         return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
 
     def at_approach(self, approach: Ball) -> NormalProblem:
-        """The same asperities at a prescribed approach, up to `approach_bound`."""
+        """The problem of the same asperities at an approach, up to `approach_bound`."""
         prescribed = float(approach.value)
         return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
 
     def _like(self, other: NormalProblem) -> NormalProblem:
-        """Another problem of the same asperities, with the data that depend only on these."""
+        """This problem with cached data copied from another problem of the same asperities."""
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
@@ -159,17 +159,17 @@ class NormalProblem:
         return self.influence.sums(loads) * self.exact.scale
 
     def plain_product(self, loads: Pair) -> Ball:
-        """(n,) A P of loads that are not negative, to the digits of float64."""
+        """(n,) A P for loads >= 0, to the digits of float64."""
         product, off = self.influence.apply(loads.high), self.influence.rounding(loads.high)
         most = np.maximum(product, 0.0) + off.of(product)
         errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
         return Ball.around(product, errors * (1 + SAFETY))
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
-        """(n,) a correction of the unknowns of the normal map, by one Newton step.
+        """(n,) the change of the unknowns delta of docs/theory/newton.md in one Newton step.
 
-        slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) of the normal map
-        enough : a reduction of the defect by this factor is enough
+        slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) F(delta), which the step reduces to 0
+        enough : accept a step that reduces the defect by this factor
         """
         return correct(
             self.influence,
@@ -181,13 +181,13 @@ class NormalProblem:
         )
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """A P of other loads nearby: accurate where that is cheap, else from the change alone."""
+        """A P for `others`, loads close to `loads`, from the difference if that is cheap."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
-        most = self.row_norm * float(np.linalg.norm(change.high))  # of A |change|, by Cauchy
+        most = self.row_norm * float(np.linalg.norm(change.high))  # bounds A |change|
         error = (off.relative + 2 * ROUNDOFF) * most + off.each
         return product + Ball.around(moved, error * (1 + SAFETY))
 
@@ -215,9 +215,8 @@ class NormalProblem:
     ) -> NormalProblem:
         """The problem of a scene. `approach` [length] or `load` [force] is given, exactly one.
 
-        influence : compliance operator; None for the cheapest exact one
-        highest   : [length] an upper bound on the approach under this load, where one is known;
-            else `highest_approach` finds one
+        influence : compliance operator; None for the cheapest
+        highest   : [length] upper bound on the approach under this load; default `highest_approach`
         """
         checks.exactly_one("approach", approach, "load", load)
         offsets, errors = scene.offsets, scene.offset_errors
@@ -255,7 +254,7 @@ class NormalProblem:
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
-        """The problem of some of the candidates; all others carry no load."""
+        """The problem in which all but some of the candidates carry no load."""
         return replace(
             self,
             candidates=self.candidates[which],
@@ -267,7 +266,7 @@ class NormalProblem:
         )
 
     def widened(self, which: Indices) -> NormalProblem:
-        """The problem of these asperities of the scene, which include all candidates."""
+        """The problem whose candidates are these asperities of the scene, more than before."""
         scene, units = self.scene, self.units
         coefficients = hertz.local_coefficient(
             scene.material.contact_modulus, scene.relative_radii[which]
@@ -291,7 +290,7 @@ class NormalProblem:
         return replace(self, shells=shells)
 
     def energy(self, loads: Array, displacement: Array) -> float:
-        """Phi(P), with D0 = 0 under load control; `displacement` is A P."""
+        """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""
         local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
         prescribed = self.offsets + (self.approach or 0.0)
         return float(local + loads @ (0.5 * displacement - prescribed))
@@ -302,9 +301,9 @@ class NormalProblem:
         return local + displacement - self.offsets - approach
 
     def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
-        """The residual of the contact law: the largest |g_i| where loaded and -g_i elsewhere.
+        """The residual of the contact law: the largest of |g_i| where P_i > 0 and -g_i elsewhere.
 
-        displacement : A P, if known
+        displacement : (n,) A P, if known
         """
         if displacement is None:
             displacement = self.influence.apply(loads)
@@ -312,19 +311,19 @@ class NormalProblem:
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
     def bounds(self, approach_bound: float) -> Array:
-        """(n,) U_i = (max(D_i, 0) / k_i)^(3/2), the largest loads of solutions with D0 <= bound."""
+        """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on loads of solutions with this D0."""
         rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
 
     def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
-        """h_i = (2/3) k_i P_i^(-1/3): the local part of the Hessian, 1 / (2 E* a_i)."""
+        """(n,) h_i = (2/3) k_i P_i^(-1/3), the local part of the Hessian; it is 1 / (2 E* a_i)."""
         with np.errstate(divide="ignore"):
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
         return h
 
     def smooth_indentation(self) -> Array:
-        """Initial indentations: the offsets less the surface displacement under a smooth sphere."""
+        """(n,) initial indentations: offsets less the displacement under a smooth sphere."""
         scene, load = self.scene, self.load
         if load is None:
             load = alone = float(self.bounds(self.approach_bound).sum())
@@ -338,19 +337,15 @@ class NormalProblem:
         return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
-        """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
-
-        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta:
-        (3) of docs/theory/convexity.md.
-        """
+        """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
         return float(self.convexity_at(self.stiffness(loads)))
 
     def convexity_at(self, stiffness: Array) -> Any:
-        """`convexity_number` up to the loads with this stiffness; (m, 1) for rows."""
+        """The `convexity_number` at loads with this stiffness; (m, 1) for rows."""
         return largest(self.shells / stiffness) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
-        """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R), by axes."""
+        """(n,) the offsets as pairs of float64 numbers: z - r^2 / (2 R), by axes."""
         return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
 
     def _twofold_offsets(self, which: Indices) -> Pair:
@@ -365,12 +360,10 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """Upper bound on D0 at every solution of load control, from any trial loads.
+        """Upper bound on D0 at every solution under load control, as `load_control.approach_bound`.
 
-        (2) of docs/theory/certificate.md.
-
-        weights      : (n,) trial loads, not negative, not all zero
-        displacement : A times weights
+        weights      : (n,) approximate loads, not negative, not all 0
+        displacement : (n,) A times weights
         """
         assert self.load is not None
         displacement = displacement + self.influence.rounding(weights).of(displacement)
@@ -378,13 +371,13 @@ class NormalProblem:
         return float(approach_bound(weights, displacement, self.coefficients, least, self.load))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
-        """Values of the candidates, set among zeros for all other asperities of the scene."""
+        """(N,) values of the candidates, and 0 for all other asperities of the scene."""
         return among_zeros(values, self.candidates, len(self.scene))
 
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Mean curvature of the base, k^3 of a unit of curvature, and 1 / (pi E*), in own units."""
+    """Mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*), in scaled units."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)
@@ -392,7 +385,6 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
 
 
 def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
-    """The local coefficients k of tip radii (n,)."""
     curvature, cubed, _ = _constants(*constants)
     return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
 
@@ -404,6 +396,6 @@ def _even_coefficient(tip: float, *constants: Any) -> Ball:
 
 
 def _middle(values: Array) -> float:
-    """The median of about a thousand evenly spaced values, which need not be accurate."""
+    """About the median of the values, from a thousand of them."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])

@@ -1,10 +1,9 @@
-"""The proof that a solution exists near trial loads, and bounds on its distance.
+"""The proof that a solution exists near given loads, and bounds on the distance to it.
 
-The steps: choose a box of loads on which the energy is convex (`boxes`); apply the theorem of
-`convex.theorem` on it; apply the theorem again on a smaller box, which the first result
-proves to hold the solution; bound the approach and the indentations; and bound the loads again
-through the indentations. Symbols are those of docs/theory/certificate.md: loads P, approach D0,
-compliance operator A, local Hessian H; a star marks the solution.
+docs/theory/certificate.md and one-theorem.md: the theorem on a box of loads on which the energy is
+convex (`boxes`), and again on a smaller box that the first result proves to hold the solution.
+P are the loads, D0 the approach, A the compliance operator, H the local Hessian; a star marks the
+solution.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
-#: Number of boxes of touching asperities that are tried, and the ratio of a box to the last error
-#: bounds. Each box is larger than the one before or has more asperities. Both values are heuristic.
+#: Number of boxes of touching asperities that are tried, and the ratio of a box to the latest error
+#: bounds. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
 #: Relative error above which loads are also bounded through their indentations.
@@ -44,7 +43,7 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the indices of the candidates that cause it."""
+    """The reason why nothing is proved, and the indices of the candidates that cause this."""
 
     reason: str
     which: Indices
@@ -52,15 +51,14 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """A proved solution, as balls over the n candidates of `problem`, in its units.
+    """A proved solution, as balls over the n candidates of `problem`, in scaled units.
 
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
     distance  : bound on || P - P* ||_H
     stiffness : (n,) diagonal of H
-    loads     : (n,) the loads of the solution
-    indentation : (n,) its indentations; negative values are gaps
-    approach  : its approach
+    loads, indentation : (n,) of the solution; negative indentations are gaps
+    approach  : of the solution
     """
 
     problem: NormalProblem
@@ -90,7 +88,7 @@ class Proved:
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on the error of A P at the m points to which `coupling` maps loads."""
+        """(m,) bounds on the errors of A P at the m points to which `coupling` maps loads."""
         missing = self.trial.missing.size * self.problem.largest_entry
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
@@ -132,7 +130,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution in this box, or (n,) bounds on load errors that are too large for the box."""
+    """The solution in this box, or bounds (n,) on load errors, which are too large for the box."""
     at_first = errors_in(problem, box, state)
     if not stays_in(box, state, at_first):
         return at_first
@@ -166,7 +164,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
     moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
-    shift = _approach_error(problem, state, errors, moved)
+    shift = _approach_error(problem, box, state, errors, moved)
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
@@ -185,12 +183,10 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """The part of the total load that the trial loads P lack: (1 + t) P have the prescribed total.
+    """The effect of a difference between prescribed total and sum: docs/theory/one-theorem.md.
 
-    The factor 1 + t adds (2/3) t k P^(2/3) + t A P to D0 + d in the contact law. The
-    approach takes up a constant part, and the rest enters the residuals.
-
-    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals
+    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals, where
+        (1 + t) P have the prescribed total
     """
 
     loads: Array
@@ -211,12 +207,11 @@ class _Missing(NamedTuple):
         return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
 
     def errors(self, within: Any, stiffness: Array) -> Array:
-        """(n,) bounds on the errors of the loads."""
         return np.asarray(within / np.sqrt(stiffness) * (1 + SAFETY) + self.loads)
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The loads; where it is smaller, the ball (indentation / k)^(3/2) replaces an inexact load."""
+    """The loads; the ball (indentation / k)^(3/2) replaces an inexact load if it is smaller."""
     which = np.nonzero(loads.radius > POOR * loads.mid.high)
     if len(which[0]) == 0:
         return loads
@@ -231,13 +226,20 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     return Ball(Pair(parts[0], parts[1]), parts[2])
 
 
-def _approach_error(problem: Problem, state: Trial, errors: Array, moved: Any) -> Any:
-    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
+def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
+    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
+
+    If none is: D0* is at most this where gaps are not negative, and touching begins at -max d.
+    """
     if problem.load is None:
         return state.approach.radius
-    least = state.loads.high - errors
+    least, exact = state.loads.high - errors, problem.exact
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.stiffness(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
-    closest = each.min(axis=-1, initial=np.inf, keepdims=each.ndim > 1)
+    above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
+    above = np.where(box.fixed_open, np.inf, above)
+    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
+    below = state.approach.upper - (-exact.offsets.upper).min(**across)
+    closest = np.minimum(each.min(**across), np.maximum(above.min(**across), below))
     return closest * (1 + 4 * SAFETY) + state.approach.radius

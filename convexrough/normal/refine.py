@@ -1,11 +1,11 @@
-"""The contact law on balls, and Newton's corrections of given loads to thirty digits.
+"""The contact law on balls, and Newton's method that refines loads to thirty digits.
 
 Functions take a problem, with arrays (n,), or m problems in rows, with arrays (m, n); quantities
 with one number per problem are then (m, 1).
 
-With loads P known as pairs, the residual  k P^(2/3) + A P - d - D0  is a ball, whose radius bounds
-the errors of the data, the product and the arithmetic. A correction is one Newton step on the
-normal map (docs/theory/newton.md) in float64 from a residual in pairs.
+The residual  k P^(2/3) + A P - d - D0  of loads P known as pairs is a ball, whose radius bounds
+the errors of the data, the product and the arithmetic. A correction is one step of
+docs/theory/newton.md in float64.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from convexrough.numbers.kernels import residual
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.sphere import hertz
 
-#: Largest number of corrections: each squares the error, or reduces it by conjugate gradients.
+#: Largest number of corrections.
 CORRECTIONS = 12
 
 #: Fraction of the residual's rounding error to which corrections reduce the residual.
@@ -46,9 +46,9 @@ Problem: TypeAlias = NormalProblem | Stack
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Loads of the candidates, and their residuals in the contact law, in the problem's units.
+    """Loads of the candidates, and their residuals in the contact law, in scaled units.
 
-    loads   : (n,) P;  product : (n,) A P
+    loads, product : (n,) P and A P
     local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
     approach : D0, prescribed, or under a prescribed load the one that fits best
@@ -65,12 +65,12 @@ class Trial:
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """(n,) true where a load is not 0."""
+        """(n,) True where the load is not 0."""
         return np.asarray(self.loads.high > 0)
 
     @cached_property
     def excess(self) -> Array:
-        """(n,) violations of the contact law."""
+        """(n,) violations of the contact law: |gap| where loaded, and the overlap elsewhere."""
         return excess(self.gap, self.inside)
 
     def frozen(self) -> Trial:
@@ -84,7 +84,7 @@ class Trial:
 
     @property
     def indentation(self) -> Ball:
-        """(n,) D0 + d - A P: indentations of these loads, minus gaps where negative."""
+        """(n,) indentations D0 + d - A P of these loads, minus gaps where negative."""
         problem = self.problem
         if problem.load is None:
             return problem.exact_depths - self.product
@@ -105,7 +105,7 @@ class Trial:
 
 
 def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
-    """The contact law at loads with known A P and known difference from the prescribed total."""
+    """The residuals of loads with known A P and known difference from the prescribed total."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
@@ -121,12 +121,12 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
 
 
 def refines(problem: NormalProblem) -> bool:
-    """True if thirty digits cost no more than the solution itself."""
+    """True if refinement to thirty digits costs no more than the solution."""
     return not problem.influence.stored or len(problem) <= FEW
 
 
 def refined(problem: Problem, best: Trial) -> Trial:
-    """The trial whose residual further corrections do not halve."""
+    """The loads, corrected until a correction no longer halves the residual."""
     size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
     for _ in range(CORRECTIONS):
@@ -154,7 +154,7 @@ def refined_loads(problem: Problem, loads: Array) -> Trial:
 
 
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
-    """One Newton step on the normal map, in the rows that are still to do.
+    """One Newton step, in the rows `todo`.
 
     enough : factor by which the residual must be reduced: a number, or (m,) for rows
     """
@@ -188,17 +188,14 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads scaled to the prescribed total, and the small part of the total that they lack.
-
-    The largest load is adjusted so that only its rounding is lacking.
-    """
+    """The loads scaled to the prescribed total, and the rounding by which they miss it."""
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.total
     total = problem.total.mid
     if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
-        power = -np.frexp(largest(loads.high))[1]  # of two: no factor overflows
+        power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         loads = loads * (total / sums(loads))
     missing = total - sums(loads)

@@ -22,10 +22,10 @@ from convexrough.roundoff import SAFETY
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Problems in m rows, in their own units: arrays (m, n), or (n,) where all rows share them.
+    """Problems in m rows, in scaled units: arrays (m, n), or (n,) where all rows share them.
 
     coupled : slices of the rows, each with a problem whose compliance operator these rows share
-    exact  : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
+    exact   : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
     exact_load, exact_approach : (m, 1) the prescribed quantity; the other one is None
     """
 
@@ -45,34 +45,34 @@ class Stack:
 
     @property
     def load(self) -> Array | None:
-        """(m, 1)"""
+        """(m, 1) the prescribed loads, or None."""
         return None if self.exact_load is None else self.exact_load.value
 
     @property
     def total(self) -> Ball:
-        """(m, 1)"""
+        """(m, 1) the prescribed loads."""
         assert self.exact_load is not None
         return self.exact_load
 
     @property
     def depth(self) -> Ball:
-        """(m, 1)"""
+        """(m, 1) the prescribed approaches."""
         assert self.exact_approach is not None
         return self.exact_approach
 
     @cached_property
     def exact_depths(self) -> Ball:
-        """(m, n) D, the indentations prescribed by the approaches."""
+        """(m, n) D, the prescribed approaches plus the offsets."""
         return self.exact.offsets + self.depth
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) as in `NormalProblem`."""
+        """(m, 1) bounds on the norms of the rows of A."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) as in `NormalProblem`."""
+        """(m, 1) bounds on the entries of A."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
@@ -114,7 +114,7 @@ class Stack:
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
-        """(m, 1) as in `NormalProblem`."""
+        """(m, 1) convexity numbers at loads with this stiffness."""
         return np.asarray(largest(self.shells / stiffness) * (1 + SAFETY))
 
     def stiffness(self, loads: Array) -> Array:
@@ -122,9 +122,10 @@ class Stack:
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 
     def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
-        """(m, n) the step of `convex.newton_step.correct`; nan in rows with an indefinite matrix.
+        """(m, n) one Newton step; nan in rows with an indefinite matrix.
 
-        slopes : (m, n) c = dP/dn;  todo : (m,) rows that need a step; the others get 0
+        slopes, defect : (m, n) as in `NormalProblem.correct`
+        todo   : (m,) rows that need a step; the others get 0
         enough : not used, because a factorisation leaves only rounding errors
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import

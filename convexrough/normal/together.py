@@ -1,7 +1,6 @@
-"""Many normal problems, one in each row of an array, solved and proved in one computation.
+"""Many normal problems, one in each row of an array, solved and proved together.
 
-Newton's method, the refinement in pairs of float64 numbers and the theorem treat all rows at once.
-The caller solves rows one by one that the cheapest proof does not cover.
+Rows that the cheapest proof does not cover are left out; the caller solves them one by one.
 """
 
 from __future__ import annotations
@@ -29,18 +28,18 @@ STEPS = 30
 #: Squared radius of a rough contact over that of Hertz's smooth contact. A heuristic.
 WIDER = 1.1
 
-#: Newton's method ends where the expected residual is below this fraction of the norm of the
+#: Newton's method ends if the expected residual is below this fraction of the norm of the
 #: indentations. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: Largest size of an array (rows, asperities): some dozens of such arrays are in use at once.
+#: Largest size of an array (rows, asperities), because dozens of them are in use at once.
 NUMBERS = 2**17
 
 quietly = np.errstate(all="ignore")
 
 
 class Rows(NamedTuple):
-    """The fields of `level.Level` for k levels: (k,) or (k, n), in the problems' own units."""
+    """The fields of `level.Level` for k levels: (k,) or (k, n), in scaled units."""
 
     load: Ball
     approach: Ball
@@ -76,13 +75,13 @@ class Solved:
 
     @cached_property
     def total(self) -> Ball:
-        """(m,) the sums of the loads of each row, with error bounds."""
+        """(m,) the total load of each row."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * np.sqrt(summed(1.0 / self.stiffness)) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
-        """The solution in row k, which is that of `problem`, in the box that all rows share."""
+        """The solution in row k, for the problem of this row, in the box that all rows share."""
         it, of = self.trial, problem
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
         return Proved(
@@ -121,7 +120,7 @@ class _Pressed(NamedTuple):
 def pressed(stack: Stack, guess: Array) -> Array:
     """(m, n) loads by full steps of Newton's method; nan in rows that do not converge.
 
-    guess : (m, n) indentations, in each row at least one of them positive
+    guess : (m, n) indentations, at least one positive in each row
     """
     state, before = _pressed(stack, guess), np.full(len(stack), np.inf)
     for _ in range(STEPS):
@@ -153,9 +152,7 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions of all rows, `good` where they are proved in one box.
-
-    Rows with a residual above rounding or with an undecided status are not `good` either.
+    """The solutions of all rows; `good` are accurate ones with a proved status of all asperities.
 
     prescribed, squares, reach : arguments of `guessed`;  box : default `widest`
     """
@@ -193,7 +190,7 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
     local = (s * stack.coefficients * np.cbrt(s) ** 2).sum(axis=1, keepdims=True)
     coupled = (s * displacement).sum(axis=1, keepdims=True)
     x = np.sqrt(work / local)
-    for _ in range(8):  # from the right of the root of a convex function
+    for _ in range(8):  # Newton's method from the right of the root
         x = x - (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
 

@@ -1,4 +1,4 @@
-"""The problem's own units, in which normal problems and friction are solved."""
+"""Scaled units, in which the numbers of normal problems and of friction are about 1."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from convexrough.errors import InputError
 
 @dataclass(frozen=True)
 class Units:
-    """Units in which the problem's numbers are about 1.
+    """Scaled units of length and force: numbers of a problem are about 1 in them.
 
-    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
-    power) by them is exact.
+    They are powers of two of the scene's units, that of force a power of eight, so that scaling a
+    float64 number (and its 2/3 power) is exact.
     """
 
     length: float  # [length] of approach

@@ -1,8 +1,8 @@
 """Balls: numbers known to within a radius. A formula on balls gives its value and an error bound.
 
-The midpoint of a ball is a pair of float64 numbers, its radius a float64 number. Every operation
-returns a ball that contains the result for every choice of numbers in the operands.
-Where nothing is known (an overflow, a divisor that may be 0) the radius is infinite.
+The midpoint of a ball is a pair of float64 numbers, the radius a float64 number. Every operation
+returns a ball that contains the result for every choice of numbers in the operands. The radius is
+infinite where nothing is known: after an overflow, or if a divisor may be 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ UP = 1.0 + 2.0**-40
 #: Upper bound on the underflow error of one operation on pairs.
 TINY = 2.0**-1000
 
-#: Numbers known exactly. They become balls of radius 0, but a Fraction is rounded.
+#: Numbers known exactly, which become balls of radius 0. Only a Fraction is rounded.
 Exact: TypeAlias = "float | int | Fraction | Array | Pair"
 
 #: Elementwise function of midpoints and radii that returns a midpoint and a radius.
@@ -52,7 +52,7 @@ class Ball:
 
     @classmethod
     def exact(cls, value: Exact) -> Ball:
-        """Balls of numbers known exactly; a Fraction has the rounding error as its radius."""
+        """Balls of numbers known exactly; the radius of a Fraction covers its rounding error."""
         if isinstance(value, Fraction):
             pair = Pair.nearest(value)
             return cls.around(pair, PAIR_ROUNDOFF * abs(pair.high) + TINY)
@@ -84,7 +84,6 @@ class Ball:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of the arrays."""
         return self.radius.shape
 
     def __len__(self) -> int:
@@ -173,21 +172,21 @@ class Ball:
         return Ball(Pair(self.mid.high * unit, self.mid.low * unit), self.radius * unit)
 
     def positive_part(self) -> Ball:
-        """max(x, 0), with errors of at most r for |x - m| <= r."""
+        """max(x, 0); the error is at most the radius."""
         above = self.mid.high > 0
         high, low = (np.where(above, part, 0.0) for part in self.mid)
         return Ball(Pair(high, low), np.where(self.upper <= 0, 0.0, self.radius))
 
     def sqrt(self) -> Ball:
-        """Square roots of the positive parts, with errors of at most min(r / m^(1/2), r^(1/2))."""
+        """Square roots of the positive parts."""
         return elementwise(_root(Pair.sqrt, np.sqrt), self)
 
     def cbrt(self) -> Ball:
-        """Cube roots of the positive parts, with errors of at most min(r / m^(2/3), r^(1/3))."""
+        """Cube roots of the positive parts."""
         return elementwise(_root(Pair.cbrt, np.cbrt), self)
 
     def two_thirds(self) -> Ball:
-        """x^(2/3) of the positive parts, with errors of at most min(r / m^(1/3), r^(2/3))."""
+        """x^(2/3) for the positive parts x."""
         return elementwise(_root(Pair.two_thirds, lambda x: np.cbrt(x) ** 2), self)
 
     @quietly
@@ -227,13 +226,13 @@ def joined(balls: Sequence[Ball]) -> Ball:
 
 
 def as_ball(value: Ball | Exact) -> Ball:
-    """The ball itself, or numbers as balls."""
+    """A ball unchanged, or numbers as balls."""
     return value if isinstance(value, Ball) else Ball.exact(value)
 
 
 @quietly
 def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
-    """operation(mid, radius, mid, radius, ...) of each number; large arrays in parallel.
+    """The result of operation(mid, radius, mid, radius, ...), in several threads if it is large.
 
     Operands of unequal size, except single numbers, are broadcast in one call, not in parallel.
     """
@@ -261,7 +260,7 @@ def _flat(ball: Ball) -> Ball:
 
 
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
-    """The result, with midpoint 0 and infinite radius where the midpoint is not finite."""
+    """The result, with the midpoint 0 and infinite radius where the midpoint is not finite."""
     high, low, radius = np.asarray(mid.high), np.asarray(mid.low), np.asarray(radius)
     if math.isfinite(np.add.reduce(radius, axis=None)):
         return Pair(high, low), radius
@@ -276,14 +275,14 @@ def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """|x y - X Y| <= (|X| + dx) dy + dx |Y|; an exact 0 times any ball has radius TINY or so."""
+    """|x y - X Y| <= (|X| + dx) dy + dx |Y| for numbers x, y within dx, dy of X, Y."""
     product = x * y
     radius = np.fmax((np.abs(x.high) + dx) * dy, 0.0) + np.fmax(dx * np.abs(y.high), 0.0)
     return product, (radius * UP + _lost(product)) * UP
 
 
 def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y."""
+    """x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y for numbers x, y within dx, dy of X, Y."""
     quotient = x / y
     least = np.abs(y.high) * (2.0 - UP) - dy
     radius = (dx + np.fmax(np.abs(quotient.high) * UP * dy, 0.0) + TINY) / least
@@ -291,7 +290,7 @@ def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Elementwise:
-    """A concave power f of positive parts: |f(x) - f(m)| <= min(r f(m) / m, f(r))."""
+    """A concave power f; |f(x) - f(m)| <= min(r f(m) / m, f(r)) where |x - m| <= r."""
 
     def root(x: Pair, dx: Array) -> tuple[Pair, Array]:
         safe, above = positive(x)

@@ -10,14 +10,14 @@ from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_product, two_sum
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
-    """k P^(2/3) + v - D of each asperity; loads below 0 count as 0."""
+    """k P^(2/3) + v - D for each asperity; loads below 0 count as 0."""
     return elementwise(_residual, k, loads, displacement, depth)
 
 
 def _residual(
     k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array, D: Pair, dD: Array
 ) -> tuple[Pair, Array]:
-    """Rounding errors: about 20 squared roundoffs of `sizes` by low parts, below 64 by all else."""
+    """The residual; the rounding error is below 64 squared roundoffs of `sizes`."""
     safe, loaded = positive(P)
     power = safe.two_thirds()
     slope = power.high / safe.high

@@ -1,8 +1,8 @@
-"""Double-double numbers: unevaluated sums of two float64 numbers, some 31 decimal digits.
+"""Double-double numbers: unevaluated sums of two float64 numbers, with about 31 decimal digits.
 
-The error-free sums and products of float64 numbers are those of Knuth and Dekker (Numer. Math. 18
-(1971) 224); they need neither fused operations nor longer numbers. Error bounds are relative and
-hold away from underflow and overflow (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
+Sums and products without errors are those of Knuth and Dekker (Numer. Math. 18 (1971) 224), without
+fused operations or longer numbers. Error bounds are relative; they hold if nothing underflows or
+overflows (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import numpy as np
 from convexrough import threads
 from convexrough.arrays import Array, Number, frozen
 
-#: Bound on the relative error of one operation on pairs. In squared roundoffs, it is 3 for a sum, 5
-#: for a product, and below 64 for quotients and roots, which are one Newton step from float64.
+#: Bound on the relative error of one operation on pairs. In squared roundoffs, the error is at most
+#: 3 for a sum, 5 for a product, and 64 for a quotient or root (one Newton step from float64).
 PAIR_ROUNDOFF = 2.0**-98
 
 #: Largest number of terms that are summed at once.
 MANY = 2**18
 
-#: Number of elements that are processed at once; they fit in a cache.
+#: Number of elements that are processed together, which fit in a cache.
 CHUNK = 2**14
 
 #: Mask of the sign, the exponent and the first 26 significant bits of a float64 number.
@@ -38,7 +38,7 @@ class Pair(NamedTuple):
 
     @classmethod
     def exact(cls, values: Number) -> Pair:
-        """Pairs of float64 numbers, with low parts 0."""
+        """float64 numbers as pairs whose low parts are 0."""
         high = np.asarray(values, dtype=np.float64)
         return cls(high, np.zeros_like(high))
 
@@ -87,8 +87,8 @@ class Pair(NamedTuple):
     def inverse_root(self) -> Pair:
         """1 / sqrt(x) with a relative error below 2^-98; 0 where x is 0.
 
-        With y = 1 / sqrt(x) in float64, and e = 1 - x y^2 computed to within 2^-104, the result is
-        y (1 + e / 2). Its truncation error is about 3 e^2 / 8, and |e| < 2^-51.
+        Let y be 1 / sqrt(x) in float64, and e = 1 - x y^2, computed to within 2^-104. The result is
+        y (1 + e / 2), with an error of about 3 e^2 / 8, and |e| < 2^-51.
         """
         with np.errstate(divide="ignore"):
             first = 1.0 / np.sqrt(self.high)
@@ -104,7 +104,7 @@ class Pair(NamedTuple):
         return Pair(*_settled(root, left / (3.0 * square)))
 
     def two_thirds(self) -> Pair:
-        """x^(2/3) of positive numbers: c^2 + 2 c d for the cube root c + d (d^2 is negligible)."""
+        """x^(2/3) of positive numbers: c^2 + 2 c d, with the cube root c + d and a tiny d."""
         root, square, rest, left = self._cube_root()
         return Pair(*_settled(square, rest + left / (1.5 * root)))
 
@@ -140,7 +140,7 @@ class Pair(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
-    """(length,) numbers, read-only; `part` computes each slice of them, on all cores."""
+    """(length,) read-only numbers; `part` computes slices of the numbers, in several threads."""
     found = Pair(np.empty(length), np.empty(length))
 
     def compute(some: slice) -> None:
@@ -158,7 +158,7 @@ def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
 
 
 def two_product(a: Number, b: Number) -> tuple[Number, Number]:
-    """The rounded product, and its error with a relative error of one roundoff."""
+    """The rounded product, and the error of it to within one roundoff."""
     total = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return total, ((a1 * b1 - total) + a1 * b2 + a2 * b1) + a2 * b2

@@ -1,1 +1,1 @@
-"""The example of the source paper (Dini and Hills 2009): its numbers and its figures."""
+"""The example of the source paper (Dini and Hills 2009): numbers and figures."""

@@ -1,15 +1,14 @@
 """The source paper's appendix [A1]-[A15], for comparison: slips from the surface displacements.
 
-Forces and stick discs are those of `shear` (Ciavarella and Jaeger). The slip of an asperity follows
-from the surface displacement u at its centre, the sum of [A3] and [A4] over all asperities. The
-mean of u over the asperities that do not slide ("adhered") approximates the displacement of distant
-points. The slip of a sliding asperity is the difference of this mean and its own u.
+Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
+is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
+("adhered") approximates the displacement of distant points. The slip of a sliding asperity is the
+difference of this mean and u.
 
 In theory u is the same at all adhered asperities. The computed values differ slightly, because
 [A3] and [A4] spread each force over a disc and `shear` uses point forces, and, unless Poisson's
 ratio is 0, because displacements decay more slowly along the shear than across it, which `shear`
-averages. So slips differ around a ring of asperities and may be backwards. Their sums over
-hexagonal and square rings do not depend on Poisson's ratio, except for the factor c_t.
+averages. So slips differ around a ring of asperities and may be backwards.
 
 Nothing here is certified. Displacements and energies are for both bodies, twice the paper's.
 """
@@ -38,8 +37,7 @@ def displacements(state: ShearState) -> Array:
 def slips(state: ShearState) -> Array:
     """(n,) [length] slips of sliding asperities, 0 for others; forward slip has the sign of Q.
 
-    At |Q| = f P no asperity adheres. The largest displacement, that of the last asperity to slide,
-    then replaces the mean.
+    If all asperities slide, the largest displacement replaces the mean.
     """
     u, adhered, sliding = displacements(state), _adhered(state), _sliding(state)
     slips = np.zeros(len(u))
@@ -50,10 +48,7 @@ def slips(state: ShearState) -> Array:
 
 
 def scatter(state: ShearState) -> float:
-    """Standard deviation over mean of the displacements of adhered asperities, in theory 0.
-
-    The result is nan if nothing is displaced or no asperity adheres.
-    """
+    """Standard deviation over mean of u at adhered asperities, in theory 0; nan if undefined."""
     u = displacements(state)[_adhered(state)]
     return float(u.std() / abs(u.mean())) if u.any() else float("nan")
 

@@ -25,7 +25,7 @@ from convexrough.plots.style import (
     title,
 )
 
-#: Amplitude Q / (f P) at which the curves of the paper's Fig. 9 cross, by the paper "about" this.
+#: Amplitude Q / (f P) at which, by the paper, the curves of its Fig. 9 cross.
 READ_CROSSING = 0.37
 
 

@@ -44,7 +44,7 @@ def results() -> list[Result]:
 
 
 def crossover(contact: cr.Contact) -> float:
-    """The Q_max / (f P) above which a cycle of the rough contact loses more than a smooth one."""
+    """The Q / (f P) above which a cycle of the rough contact loses more than a smooth one."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     limit = 0.5 * contact.load
@@ -57,7 +57,7 @@ def crossover(contact: cr.Contact) -> float:
 
 
 def compare(found: list[Result]) -> dict[str, Any]:
-    """The paper's numbers (None if not printed) and the computed ones, by names."""
+    """The paper's numbers (None if not printed) and the computed ones, by name."""
     pressed, sheared, cycled = found
     contact, named = pressed.contact, lettered(pressed.contact)
     onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)

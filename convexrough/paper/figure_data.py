@@ -22,7 +22,6 @@ def figure_data(found: PaperStates) -> dict[str, Columns]:
 
 
 def _at_half(found: PaperStates) -> dict[str, Columns]:
-    """The tables of Figs. 3 to 6: the pressure, and the state at half of gross sliding."""
     contact, half = found.contact, found.half
     smooth = cr.smooth(contact.scene, load=contact.load)
     x = np.linspace(-1.3, 1.3, 2001) * smooth.contact_radius
@@ -69,7 +68,6 @@ def _at_half(found: PaperStates) -> dict[str, Columns]:
 
 
 def _loading(found: PaperStates) -> dict[str, Columns]:
-    """The tables of Figs. 7 to 9: first loading, loops at half of gross sliding, and energies."""
     path, loop = found.path, found.loop
     smooth = cr.smooth(found.contact.scene, load=found.contact.load)
     return {

@@ -140,10 +140,7 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
 
 
 def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) -> None:
-    """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre.
-
-    Radii have equal steps of Hertz's pressure in the slip annulus, and of its shape in stick discs.
-    """
+    """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre."""
     contact = state.contact
     touching = contact.loads > 0
     a, c = contact.contact_radii, np.where(state.status == "sliding", 0.0, state.stick_radii)
@@ -166,7 +163,6 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 
 
 def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
-    """The figure of f p and q along y = 0, of the asperities and of the smooth sphere."""
     contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()

@@ -14,7 +14,7 @@ from convexrough.scene.rings import rings
 #: Q / (f P) of the paper's Figs. 4 to 6 and 8.
 SHARE = 0.5
 
-#: Forces Q / (f P) of first loading, denser near gross sliding; and amplitudes of the cycles.
+#: Forces Q / (f P) of loading from rest, denser near gross sliding; and amplitudes of the cycles.
 FRACTIONS = np.union1d(np.linspace(0.0, 1.0, 51), 1.0 - np.linspace(0.0, 1.0, 31) ** 2)
 AMPLITUDES = np.union1d(
     np.concatenate((np.geomspace(1e-3, 0.0125, 6), np.linspace(0.0125, 1.0, 80))),
@@ -26,12 +26,12 @@ AMPLITUDES = np.union1d(
 class PaperStates:
     """The results that the figures and their tables show.
 
-    limit  : [force] f P
+    limit  : [force] friction limit f P
     named  : touching asperities by ring, from the axis outwards; the last ring is A
     onsets : (n,) Q / (f P) at which each asperity starts to slide
-    half   : state at half of gross sliding;  steady, loop : cycle between plus and minus this force
-    path   : first loading at Q / (f P) = `fractions`, which include the onsets of all rings
-    cycles : steady cycles at AMPLITUDES
+    half   : state at half of the limit;  steady, loop : cycle between plus and minus this force
+    path   : loading from rest to Q / (f P) = `fractions`, which include the onsets of all rings
+    cycles : steady cycles at `AMPLITUDES`
     """
 
     contact: cr.Contact

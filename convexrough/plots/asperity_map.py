@@ -28,7 +28,7 @@ from convexrough.plots.style import (
     round_ticks,
 )
 
-#: Numbers from which discs are pixels inside a vector file, and from which a mosaic replaces them.
+#: From DENSE discs on, vector files contain pixels; from CROWDED on, a mosaic replaces the discs.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.
@@ -71,7 +71,7 @@ class Window(NamedTuple):
         return self.x - self.half, self.x + self.half, self.y - self.half, self.y + self.half
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """(n,) true where a point lies inside."""
+        """(n,) True where a point lies inside."""
         away: Array = np.abs(points - (self.x, self.y)).max(axis=1)
         return away < self.half
 
@@ -85,14 +85,14 @@ def draw_map(
     smooth: Sequence[float] = (),
     window: Window | None = None,
 ) -> Window:
-    """The window of a map that is drawn here: discs at points, faint dots at points without one.
+    """Draw a disc at each point with a radius and a faint dot at each other one; return the window.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
     window : part of the plane to show; default `map_window`
 
-    From `CROWDED` discs on, a mosaic replaces them: each pixel has the mean colour of the nearest
-    asperity's layers, white if this asperity has no disc.
+    From `CROWDED` discs on, a mosaic replaces them: each pixel has the mean colour of the
+    asperities inside it, else of the nearest one, or is white if that has no disc.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, window = whole > 0, window or map_window(points, whole, length, smooth)
@@ -114,7 +114,7 @@ def draw_map(
 
 
 def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
-    """Draw the map of a contact, with the outline of its smooth reference."""
+    """Draw the map of a contact, with the outline of the smooth contact under the same load."""
     points = scale.contact.scene.contact_points
     return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
 
@@ -122,7 +122,7 @@ def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
 def draw_values(
     axes: Axes, scale: Scale, values: Array, name: str, *, signed: bool = False
 ) -> None:
-    """Draw the discs of a contact in the colours of their values, and a named colour bar.
+    """Draw the discs of a contact in the colours of `values`, and a named colour bar.
 
     signed : the colours run from dark for negative values to light for positive ones
     """
@@ -201,7 +201,7 @@ def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) one radius for the chosen points, about 0.42 of their spacing; 0 for the others."""
+    """(n,) one radius for the chosen points, about 0.42 of the spacing; 0 for the others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     size = float(np.ptp(points, axis=0).max()) or 1.0
@@ -215,7 +215,7 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
-    """The square round all discs (without discs, all points) and the smooth outline, plus 6 %."""
+    """The square about all discs (without discs, all points) and the smooth outline, plus 6 %."""
     points, radii = length.of(points), length.of(radii)
     outline = [length.of(axis) for axis in smooth]
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
@@ -246,16 +246,13 @@ def _blended(layers: Sequence[Layer], whole: Array) -> Array:
 def _draw_mosaic(
     axes: Axes, points: Array, shades: Array, shown: NDArray[np.bool_], window: Window
 ) -> None:
-    """Draw each pixel in the colour of the nearest asperity, or the mean of several inside it.
-
-    The mean avoids moire patterns between pixels and asperities.
-    """
+    """Draw each pixel in the mean colour of the asperities inside it, else of the nearest one."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     left, right, bottom, top = window.sides
     steps = 2.0 * window.half * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(left + steps, bottom + steps), axis=-1)
-    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # no asperity so near: outside
+    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # larger distances are outside
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
     visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
     image = np.vstack((visible, np.zeros(4)))[nearest]

@@ -1,4 +1,4 @@
-"""The main picture of a result, drawn into axes of the caller."""
+"""The main picture of a result, drawn into given axes."""
 
 from __future__ import annotations
 
@@ -59,15 +59,15 @@ from convexrough.verdict import Verdict
 
 
 def plot(result: object, axes: Axes | None = None) -> Axes:
-    """Draw the main picture of a result, and return the axes it is in.
+    """Draw the main picture of a result; return the axes.
 
-    result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, or the plane of loads where P varies; Fretting: map of slip amplitudes;
-        LoadPath: Q against X at constant load, else the plane of loads; MemoryCurve: the plane of
-        loads; Gradient: map of derivatives; Verdict: map of wrongly claimed asperities;
-        Comparison, PathComparison: times of the solvers or methods; PhaseLosses: loss against
-        phase; Shakedown: map of the factors; Surface, Summits: map; Provability: contacts by
-        pruning
+    result : a Contact: map of pressure; ShearState, VectorShearState: map of stick and slip;
+        Cycle: loop, or the plane of loads where the normal load varies; Fretting: map of slip
+        amplitudes; LoadPath: shear force against displacement at constant load, else the plane of
+        loads; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
+        wrongly claimed asperities; Comparison, PathComparison: times of the solvers or methods;
+        PhaseLosses: loss against phase; Shakedown: map of factors; Surface, Summits: map;
+        Provability: contacts against pruning
     axes   : matplotlib axes; default: those of a new figure, which notebooks show
 
     Raises InputError for anything else.
@@ -87,7 +87,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(result: object) -> str:
-    """A small picture of a result as an HTML image; for a cycle or path, the map of its status."""
+    """A small picture of a result as an HTML image; for a cycle or path, the map of statuses."""
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
@@ -127,7 +127,6 @@ def _draw_path(path: LoadPath, axes: Axes) -> None:
 
 
 def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
-    """Draw the time [s] of each solver, or the reason why it has no answer."""
     rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
         if seconds is None:

@@ -1,6 +1,6 @@
 """`between`: a path with additional points, for figures of curved loops.
 
-It solves normal problems. Figures call it only if these points were not computed before.
+Figures call it only if these points are not known, because it solves normal problems.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from convexrough.friction.path import LoadPath, history, load_path
 
-#: Largest number of points, of asperities times points, and of steps between two points.
+#: Largest numbers of points, of asperities times points, and of steps between two points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
 #: Number of segments at varying load up to which points are added; each needs a solution.
@@ -19,7 +19,7 @@ MOST_SEGMENTS = 24
 
 
 def between(path: LoadPath) -> LoadPath:
-    """The path with points added between its own; the path itself if these cost too much."""
+    """The path with points added between the given ones; unchanged if these cost too much."""
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
     if not path.load_constant:
@@ -29,7 +29,7 @@ def between(path: LoadPath) -> LoadPath:
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))
-    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # close together at the ends
+    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # denser at the ends
     pieces = [
         np.vstack((a + part[:, None] * (b - a), b))
         for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))

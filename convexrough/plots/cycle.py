@@ -51,9 +51,9 @@ def cycle_figures(
     loops      : the loop of each cycle; None to compute them
     asperities : asperities with loops; default: one at each distance from the centre, at most 6
 
-    "hysteresis" : the loops of the cycles, with the smooth sphere's; of more than 4 cycles, those
-        of about the whole, 3/4, 1/2 and 1/4 of the widest range. Also loops of chosen asperities
-        in the cycle of the widest range
+    "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles, those with
+        about the whole, 3/4, 1/2 and 1/4 of the widest range. Also loops of the asperities in the
+        cycle of the widest range
     "loss" : energy against amplitude, for cycles of several ranges
     """
     if not cycles:
@@ -81,10 +81,7 @@ def cycle_figures(
 
 
 def _spread(amplitudes: Sequence[float]) -> list[int]:
-    """Indices of the loops to draw: all, or of many those near 1/4, 1/2, 3/4 and 1 of the widest.
-
-    amplitudes : in rising order
-    """
+    """Indices of the loops to draw: all, or of many about 1/4, 1/2, 3/4 and 1 of the widest."""
     if len(amplitudes) <= MOST_LOOPS:
         return list(range(len(amplitudes)))
     parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
@@ -146,7 +143,7 @@ def loops_figure(
 def draw_loop(
     axes: Axes, scale: Scale, X: Array, Q: Array, slope: float = 0.0, *, smooth: bool = False
 ) -> None:
-    """Q against X less a slope times Q, of the asperities or of the smooth contact."""
+    """Draw Q against X less a slope times Q, of the asperities or of the smooth contact."""
     rough: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
     other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
     look = other if smooth else rough
@@ -154,10 +151,10 @@ def draw_loop(
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
-    """X [length] of the smooth sphere at the forces of a steady loop, from a maximum and back.
+    """[length] displacements X of the smooth sphere at the forces of a steady loop.
 
-    From a turning point Q1, X = X1 + 2 X((Q - Q1) / 2) with X(Q) that of first loading; first
-    loading goes to the larger of the two forces.
+    From a turning point (Q1, X1), X = X1 + 2 X0((Q - Q1) / 2), where X0 is the displacement after
+    loading from rest, which goes to the larger of the two forces at the ends.
     """
     turn = int(np.argmin(forces))
     maximum, minimum = forces[0], forces[turn]
@@ -176,7 +173,7 @@ def _draw_asperity_loops(
     cycle: Cycle,
     scale: Scale,
 ) -> None:
-    """Q_i / (f P_i) against X_i + slip_i: an asperity that slides runs along +-1."""
+    """Draw Q_i / (f P_i) against X_i + slip_i; an asperity that slides runs along +-1."""
     limits = scale.limit * cycle.contact.loads / cycle.contact.load
     kept = loop.asperities.tolist()
     for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
@@ -196,7 +193,6 @@ def ring_colour(order: int, count: int) -> Any:
 
 
 def _range(cycle: Cycle, scale: Scale) -> str:
-    """The range of a cycle, in fractions of f P."""
     high, low = cycle.maximum / scale.limit, cycle.minimum / scale.limit
     if high == -low:
         return f"±{high:.4g}"

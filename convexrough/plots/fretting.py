@@ -1,4 +1,4 @@
-"""Fretting of each asperity: slip, energy and tractions, as maps."""
+"""Maps of fretting: slip, energy and tractions of each asperity."""
 
 from __future__ import annotations
 
@@ -48,7 +48,6 @@ def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
 
 
 def _largest(values: Array) -> float:
-    """The largest of the values that are known."""
     return float(values.max(initial=0.0, where=np.isfinite(values)))
 
 

@@ -1,4 +1,4 @@
-"""Which asperities matter: a map of derivatives by their heights."""
+"""Map of the derivatives of a result with respect to the heights of asperities."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from convexrough.plots.style import SINGLE, title
 
 
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
-    """The map of the derivatives by heights.
+    """The map of derivatives by heights.
 
-    "gradient" : contact discs, in the colour of D0 / J times dJ / dz; open asperities as dots
-    of : symbol of the differentiated number, as a formula
+    "gradient" : contact discs, in the colour of D0 / J times dJ / dz, with the approach D0 and the
+        number J; open asperities as dots
+    of : symbol of J, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
     scale = Scale(gradient.contact)
@@ -24,7 +25,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
 
 
 def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
-    """Draw derivatives by heights: dark where a taller asperity lowers the number, else light."""
+    """Draw derivatives by heights: dark where a taller asperity reduces the number, else light."""
     parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"

@@ -1,4 +1,4 @@
-"""Figures in the plane of load P and T = Q / f: paths, memory curves, closed paths, losses."""
+"""Figures in the plane of normal load P and T = Q / f, with shear force Q and friction f."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ MOST_FACTORS = 5
 def steady_figures(found: Cycle) -> Figures:
     """The figure of a closed path.
 
-    "steady" : the path in the load plane, with the two lines that fix the point (L*, T*), and the
-        status of each asperity in every later cycle
+    "steady" : the path in the load plane, with the two lines that fix the point (L*, T*) below
+        which the state never changes, and the status of each asperity in every later cycle
     """
     figure = Figure(figsize=(DOUBLE, 3.5), layout="constrained")
     plane, place = figure.subplots(1, 2)
@@ -103,7 +103,7 @@ def draw_path(axes: Axes, path: LoadPath) -> None:
 
 
 def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
-    """Draw one memory curve: its vertices and its front."""
+    """Draw the vertices and the front of one memory curve."""
     unit = _plane(axes, float(curve.load))
     axes.plot(*_vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
     if curve.front is None:
@@ -132,7 +132,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
-    """The measure of both axes, which are labelled here; |T| = P (gross sliding) is drawn."""
+    """Label both axes and draw |T| = P (gross sliding); return the measure of both axes."""
     unit = measure(most, force_unit, "P_m")
     for sign in (1.0, -1.0):
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,

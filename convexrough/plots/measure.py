@@ -1,10 +1,10 @@
 """Units of the axes of figures: SI units with prefixes, or quantities of the smooth contact.
 
-Where the scene names its units, axes are in SI with the prefix that suits them. Where it does not,
+Where the scene names its units, axes are in SI units with suitable prefixes. Where it does not,
 lengths are in a_H and pressures in p0 (contact radius and peak pressure of the smooth sphere under
-the same load), shear forces in f P, displacements in X0 and energies in W0. Where the base has no
-smooth reference, lengths are in the radius r_c of the circle that holds all contacts, and
-pressures in the mean pressure on this circle.
+the same load), shear forces in f P, and displacements and energies in X0 and W0 of `Scale`. Where
+there is no finite smooth contact, lengths are in the radius r_c of the circle that holds all
+contacts, and pressures in the mean pressure on this circle.
 """
 
 from __future__ import annotations
@@ -105,10 +105,10 @@ def _prefixed(step: int, name: str) -> str:
 
 
 class Scale:
-    """The measures of a contact's figures, and its smooth reference.
+    """The measures of a contact's figures, and the smooth contact under the same load.
 
-    sphere : the smooth sphere or ellipsoid under the same load, or None
-    axes   : its semi-axes [length];  centre : (2,) [length] origin of distances
+    sphere : the smooth sphere or ellipsoid, or None
+    axes   : semi-axes [length] of the smooth contact;  centre : (2,) [length] origin of distances
     """
 
     def __init__(self, contact: Contact) -> None:
@@ -143,15 +143,15 @@ class Scale:
 
     @cached_property
     def limit(self) -> float:
-        """f P [force]."""
+        """[force] the friction limit f P."""
         return checks.friction(self.contact.scene.friction) * self.contact.load
 
     @cached_property
     def travel(self) -> float:
-        """X0 [length]: X at gross sliding, of the smooth contact; without one, of this contact."""
+        """[length] X0: X at gross sliding of the smooth contact; without one, of this contact."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
-        scene = self.contact.scene  # by Ciavarella and Jaeger, c_t f the approach from first touch
+        scene = self.contact.scene  # X0 = c_t f times the approach from first touch
         c_t = float(mindlin.ratio(scene.material.poisson_ratio))
         first = self.contact.approach + float(scene.offsets.max())
         return checks.friction(scene.friction) * c_t * first

@@ -1,4 +1,4 @@
-"""Figures that notebooks display without pyplot, and `save` in formats of journals."""
+"""Figures that notebooks display without pyplot, and `save`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from convexrough.errors import InputError
 FORMATS = ("png", "svg", "pdf")
 LEAST_DPI, MOST_DPI = 50, 600
 
-#: Keep text as text: as it is in SVG, as TrueType in PDF; fixed ids, so that files can be compared.
+#: Keep text as text in SVG and as TrueType in PDF, with fixed ids, so that files can be compared.
 REAL_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "convexrough"}
 
 

@@ -42,14 +42,14 @@ MOST_MAPS = 8
 
 
 def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
-    """The figures of a load path, or the one of a history, which has constant load.
+    """The figures of a load path, or of a history, which has constant load.
 
     fine : the path with the additional points of `between`; None to compute them
 
-    "history" : Q against X, its steps numbered where they are few and in darkening colours; and
-        the energy lost since the beginning against the step
+    "history" : shear force Q against displacement X, with numbered steps if they are few; and the
+        energy lost since the beginning against the step
     "path" : the same, and the points in the load plane with the memory curve at some of them
-    "path_stick_slip" : which asperities stick and which slide, at some of its points
+    "path_stick_slip" : which asperities stick and which slide, at some of the points
     """
     if path.load_constant and not path.contact.loads.any():
         return no_contact("history")
@@ -71,7 +71,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
 
 def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
-    """Draw Q against X."""
+    """Draw shear force against displacement."""
     x, q = scale.displacement, scale.force
     _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
     mark_points(axes, x.of(path.displacements), q.of(path.forces))

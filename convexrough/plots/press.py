@@ -39,9 +39,9 @@ def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact, by stems of file names.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3); where this line crosses few asperities, the peak
-        pressures of all asperities against their distance from the centre
-    "loads"    : load of each touching asperity by its distance from the centre
+        sphere (Dini & Hills 2009, Fig. 3); if few asperities lie on this line, instead of the
+        profile the peak pressures of all asperities against the distance from the centre
+    "loads"    : load of each touching asperity against the distance from the centre
     """
     if not contact.loads.any():
         return no_contact("pressure", "loads")
@@ -70,10 +70,10 @@ def pressure_figure(scale: Scale) -> Figure:
 
 
 def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
-    """The colours and the window of a map of contact pressures, which is drawn with its bar.
+    """Draw a map of contact pressures with a colour bar; return the colours and the window.
 
-    Each pressure p0 sqrt(1 - s^2) is a stack of discs in equal steps of pressure. Where there are
-    many, each disc has the colour of its peak.
+    Each pressure p0 sqrt(1 - s^2) is a stack of discs in equal steps of pressure. If there are
+    many discs, each has the colour of the peak.
     """
     contact = scale.contact
     peaks = scale.pressure.of(fields.peak_pressures(contact))
@@ -97,7 +97,6 @@ def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
 
 
 def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
-    """Pressure along y = 0, of the asperities and of the smooth sphere."""
     contact, (left, right, *_) = scale.contact, window.sides
     edge = max(-left, right) * scale.length.size
     x = abscissae(contact.scene.contact_points, contact.contact_radii, edge)
@@ -111,7 +110,6 @@ def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
 
 
 def _draw_peaks(axes: Axes, scale: Scale) -> None:
-    """Peak pressures of all asperities against their distance from the centre."""
     touching = scale.contact.loads > 0
     r = distances(scale)[touching]
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
@@ -147,7 +145,7 @@ def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> None
 
 
 def census(contact: Contact) -> str:
-    """A line that says how many asperities touch, and what of that is proved."""
+    """A line that says how many asperities touch, and for how many this is proved."""
     text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
     return text + not_proved(contact.certificate.scope, contact.status)
 
@@ -158,7 +156,7 @@ def _loads_figure(scale: Scale) -> Figure:
     axes = figure.subplots()
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # every asperity is: show those with a load
+    if contact.certificate.scope == "none":  # mark asperities with a load
         unsure &= touching
     r, share = distances(scale), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)
@@ -178,15 +176,11 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Draw the percentage of the load that the smooth sphere exerts on the cell of an asperity.
-
-    100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the median cell of the touching asperities;
-    nothing if fewer than seven of these have a whole cell, or the base is not a sphere.
-    """
+    """Draw 100 p(r) A / P of the smooth sphere, with the median A of at least seven whole cells."""
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points
-    sample = np.argsort(np.hypot(*points.T))[:5000]  # of very many, those nearest to the axis
+    sample = np.argsort(np.hypot(*points.T))[:5000]  # at most 5000, nearest the axis
     areas = fields.cell_areas(points[sample])
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:

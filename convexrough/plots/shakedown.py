@@ -1,4 +1,4 @@
-"""Limits of shakedown: asperity by asperity, and over the amplitudes of load and shear."""
+"""Figures of shakedown limits: of each asperity, and against the amplitudes of load and shear."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from convexrough.plots.style import (
     title,
 )
 
-#: Points of the map along each of its axes.
+#: Number of points of the map along each axis.
 FINE = 240
 
 
 def shakedown_figures(found: Shakedown) -> Figures:
     """The figures of a shakedown limit, with dimensionless forces.
 
-    "shakedown" : largest factor of the path at which each asperity stops sliding, and the first one
-    "shakedown_map" : number of asperities that slide in every cycle if load and shear amplitudes
+    "shakedown" : the largest factor of the path at which each asperity stops sliding
+    "shakedown_map" : number of asperities that slide in every cycle, if load and shear amplitudes
         have different factors; at constant load, if shear forces have different means. Only of
-        kind "exact", which gives every onset
+        kind "exact"
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found)
@@ -47,7 +47,7 @@ def shakedown_figures(found: Shakedown) -> Figures:
 
 
 def draw_factors(axes: Axes, found: Shakedown) -> None:
-    """Each asperity in the shade of its factor; by "vector", which has one for all, of its slip."""
+    """Draw each asperity in the shade of its factor; of kind "vector", of its slip."""
     vector = found.kind == "vector"
     known, points = np.isfinite(found.factors), found.scene.contact_points
     values = np.linalg.norm(found.mechanism, axis=-1).max(axis=0) if vector else found.factors
@@ -69,13 +69,13 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
 
 
 def _onsets(found: Shakedown) -> Array:
-    """(k,) sigma_i over P0 of the asperities whose factor is known, in falling order."""
+    """(k,) onsets sigma_i over P0 of the asperities whose factor is known, in descending order."""
     fall = _fall(found, np.array(1.0), np.array(1.0))
     return np.sort(1.0 - found.factors[np.isfinite(found.factors)] * float(fall))[::-1]
 
 
 def _fall(found: Shakedown, along: Array, across: Array) -> Array:
-    """(P0 - L*) / P0 where p and t are scaled apart, by factors of the same shape."""
+    """(P0 - L*) / P0 if load and shear amplitudes have different factors, `along` and `across`."""
     f = found.scene.friction or 1.0
     p, t = found.load_amplitudes, found.force_amplitudes / f
     reached = [
@@ -86,7 +86,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """How many of those whose onset is known slide for ever; hatched: all slide, or pulled off."""
+    """The map of how many asperities slide for ever; hatched where all slide or are pulled off."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0

@@ -1,4 +1,4 @@
-"""The map of a friction state: asperities that slide, and those that stick in part."""
+"""Maps of friction states: asperities that slide, and those that slip in part."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ MOST_PANELS = 12
 def shear_figures(states: Sequence[ShearState]) -> Figures:
     """The maps of friction states of one contact, at most 12, evenly chosen.
 
-    "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
-        the smooth sphere's contact and stick discs under the same forces
+    "stick_slip" : contact discs with stick discs inside, sliding asperities, open ones; and
+        contact and stick disc of the smooth sphere under the same forces
     """
     if not states:
         return Figures()
@@ -80,7 +80,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
-    """Draw contact discs, stick discs and open dots, and the outlines of the smooth sphere's."""
+    """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact."""
     radii, points = state.contact.contact_radii, state.contact.scene.contact_points
     draw_contact(axes, scale, status_layers(state.status, radii, state.stick_radii))
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
@@ -106,7 +106,7 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
 
 
 def _doubtful(state: State) -> Any:
-    """(n,) true for asperities to mark; those with a load if nothing is proved."""
+    """(n,) True for asperities to mark: undecided ones, or all with a load if nothing is proved."""
     unsure = state.status == "undecided"
     return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
 

@@ -1,4 +1,4 @@
-"""The slider page: one HTML file that shows states of first loading, computed beforehand.
+"""The slider page: one HTML file that shows states after loading from rest, computed beforehand.
 
 The page steps through these states and shows their numbers unchanged. It only computes loops, by
 Masing's rule (docs/theory/paths.md).
@@ -29,14 +29,14 @@ from convexrough.tabular.columns import bound
 FORCES = {2_500: 101, 20_000: 51}
 FEWEST_FORCES = 21
 
-#: Largest numbers of discs (and of dots for open asperities), and of asperities with their own
-#: curves: a page stays below 2 MB.
+#: Largest numbers of discs (and of dots for open asperities), and of asperities with curves. They
+#: keep a page below 2 MB.
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
 @dataclass(frozen=True)
 class Slides:
-    """The states of the page: first loading to fractions of f P, and steady cycles."""
+    """The states of the page: loading to fractions of the friction limit, and steady cycles."""
 
     contact: Contact
     fractions: Array
@@ -45,7 +45,7 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The slides of a contact. Raises InputError without friction or a spherical base."""
+        """The slides of a contact. Raises InputError without friction or a sphere."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
@@ -55,27 +55,25 @@ class Slides:
 
 
 def slider_html(slides: Slides, proved: Sequence[str]) -> str:
-    """The page.
-
-    proved : lines that say what is proved of the contact
-    """
+    """The page as text; proved : lines that say what is proved of the contact."""
     found = json.dumps(slider_data(slides, proved), separators=(",", ":"))
     template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
 
 
 def slider_data(slides: Slides, proved: Sequence[str]) -> dict[str, Any]:
-    """The data of the page: lengths of the map in a_H, forces in f P, displacements in X0.
+    """The data of the page, with five digits.
 
-    Numbers have five digits. `stick` has a row per force and a column per disc:
-    the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
+    Lengths are in a_H, forces in f P, displacements in X0 of `plots.measure`. `stick` has a row per
+    force and a column per disc: the stick radius in thousandths of the contact radius, 0 where
+    sliding, -1 where undecided.
     """
     contact, fractions, steady, loading = (
         slides.contact, slides.fractions, slides.steady, slides.loading
     )  # fmt: skip
     limit = checks.friction(contact.scene.friction) * contact.load
     touching = np.flatnonzero(contact.loads)
-    # Nothing is divided by nothing where no asperity touches.
+    # Avoid a division by 0 where no asperity touches.
     sphere = smooth(contact.scene, load=contact.load) if contact.load else None
     a_H = sphere.contact_radius if sphere else 1.0
     X0 = float(sphere.displacement(limit)) if sphere else 1.0
@@ -113,14 +111,13 @@ def _forces(touching: int) -> int:
 
 
 def _some(which: Indices, most: int) -> Indices:
-    """At most this many indices, chosen at random without a pattern, by a fixed seed."""
+    """At most this many indices, chosen at random with a fixed seed."""
     if len(which) <= most:
         return which
     return np.sort(np.random.default_rng(0).choice(which, most, replace=False))
 
 
 def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
-    """Data of the whole contact and of the smooth sphere under the same load, at each force."""
     moved = np.array([each.displacement_amplitude for each in steady])
     stuck = np.cbrt(1.0 - fractions)
     return {
@@ -142,7 +139,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
 def _stick(
     contact: Contact, loading: LoadPath, steady: list[Cycle], shown: Indices
 ) -> list[list[int]]:
-    """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
+    """Stick radius over contact radius in thousandths, 0 where sliding, -1 where undecided."""
     left = np.maximum(1.0 - _shares(contact, loading, shown), 0.0)
     rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
     statuses = np.array([each.status[shown] for each in steady])
@@ -152,13 +149,12 @@ def _stick(
 
 
 def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
-    """(m, k) Q_i / (f P_i)."""
+    """(m, k) shear forces over friction limits."""
     limits = checks.friction(contact.scene.friction) * contact.loads[which]
     return np.asarray(loading.asperity_forces[:, which] / limits)
 
 
 def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) -> dict[str, Any]:
-    """Curves and proofs of the asperities with their own curves."""
     x, y = contact.scene.asperities.positions[which].T
     certificate = contact.certificate
     return {
@@ -180,7 +176,7 @@ def _digits(values: ArrayLike) -> Any:
 
 
 def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]]:
-    """Rows of a symbol, its value and its meaning."""
+    """A row for each symbol, with its value and meaning."""
     length, force = (f" {unit}".rstrip() for unit in units)
     return [
         ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
@@ -194,7 +190,7 @@ def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]
 
 
 def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str]:
-    """Sentences that say which of many asperities the page leaves out."""
+    """Sentences about asperities that the page leaves out."""
     said = []
     if shown < touching:
         said.append(f"{shown:,} of {touching:,} touching asperities are drawn, by lot and larger.")

@@ -87,7 +87,7 @@ def disc_handle(colour: str, text: str) -> Line2D:
 
 
 def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
-    """Write a small text next to a place, readable on any ground."""
+    """Write a small text next to a place, readable on any background."""
     x, y = np.asarray(place)
     box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
     axes.annotate(text, (x, y), xytext=(6, 6), textcoords="offset points", fontsize=TICK - 1,
@@ -101,7 +101,7 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
 
 
 def no_contact(*stems: str) -> Figures:
-    """Figures of these names that say that nothing touches."""
+    """Figures with these names that say that nothing touches."""
     figures = {stem: Figure(figsize=(SINGLE, 2.6), layout="constrained") for stem in stems}
     for figure in figures.values():
         say_nothing(figure.subplots())
@@ -109,13 +109,13 @@ def no_contact(*stems: str) -> Figures:
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
-    """Remove the ticks of an empty panel, and write the reason into it."""
+    """Write a reason into an empty panel, and remove the ticks."""
     axes.set(xticks=[], yticks=[])
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
 
 
 def not_proved(scope: str, status: Any) -> str:
-    """What is not proved of a state, in brackets; "" if everything is proved."""
+    """A text in brackets on what is not proved of a state; "" if everything is proved."""
     if scope == "none":
         return " (not proved)"
     unsure = int((status == "undecided").sum())
@@ -128,10 +128,7 @@ def shades_of(count: int, low: float = 0.3) -> Array:
 
 
 def mark_points(axes: Axes, x: Array, y: Array) -> None:
-    """Draw dots; if there are few, number them. Dots at one place share a label.
-
-    Each number is on the first of eight sides, from the top, that is free of dots and labels.
-    """
+    """Draw dots; if they are few, number them next to the dots. Dots at one place share a label."""
     if len(x) <= MOST_DOTS:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:
@@ -165,10 +162,7 @@ def _inches(axes: Axes) -> Array:
 
 
 def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
-    """Draw the density of points, darker for more, and the median of y along x.
-
-    top : upper end of y
-    """
+    """Draw the density of points and the median of y along x; `top` is the upper end of y."""
     columns = int(np.clip(len(x) / 50, 20, 80))
     rows = int(np.clip(len(x) / 50, 20, 60))
     span = (float(x.min()), float(x.max()))

@@ -1,4 +1,4 @@
-"""Figures of a measured surface: its map with the summits, their histograms, and how to prune."""
+"""Figures of a measured surface: map with summits, histograms, and results against pruning."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def surface_figures(
 
     "map"         : heights, summits, and the contacts of a pressed surface
     "histograms"  : histograms of summits, with the curves that spectral moments predict
-    "provability" : contacts, crowding and model error by pruning, if `curve` is given
+    "provability" : contacts, crowding and model error against pruning, if `curve` is given
 
     maxima  : all summits of this surface;  summits : those left by pruning
     contact : the contact of the summits left by pruning
@@ -73,7 +73,7 @@ def surface_figures(
 
 
 def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
-    """The image of the heights in greys, drawn with labelled axes."""
+    """Draw the heights in greys, with labelled axes; return the image."""
     width, height = surface.size
     whole = (-width / 2, width / 2, -height / 2, height / 2)
     image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
@@ -85,7 +85,6 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
 
 
 def _label_places(axes: Axes, surface: Surface) -> None:
-    """Label the axes of a map, in a unit that suits its visible part."""
     most = axes.get_xlim()[1]
     label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
           _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
@@ -112,7 +111,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """Contacts, crowding and model error by pruning, shaded where they are unreliable.
+    """Contacts, crowding and model error against pruning, shaded where they are unreliable.
 
     chosen : the pruning that a dotted line marks
     """
@@ -166,7 +165,6 @@ def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> 
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
-    """The figure of the whole map, or of the part with the contacts if there are any."""
     figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
     axes = figure.subplots()
     image = draw_surface(axes, surface)
@@ -189,10 +187,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """Half the width of the contacts, drawn with the smooth contact and the most crowded pair.
-
-    Discs have their true size, or a smallest visible one.
-    """
+    """Draw contacts, smooth contact and most crowded pair; return half the contacts' width."""
     points, radii = contact.scene.contact_points, contact.contact_radii
     touching, scale = contact.loads > 0, Scale(contact)
     reach = np.abs(points - scale.centre).max(axis=1) + radii
@@ -208,7 +203,6 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    """The histograms of heights, tip radii and eccentricities, of all maxima and of those left."""
     figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     moments, level = surface.moments, summits.origin.level
@@ -251,7 +245,7 @@ def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
 
 
 def _bins(values: Array) -> Array:
-    """The edges of bins for all values; bins around the value if all are equal."""
+    """Edges of bins for all values; if all are equal, of bins around the value."""
     low, high = float(values.min()), float(values.max())
     size = max(abs(low), abs(high)) or 1.0
     room = high - low if high - low > 1e-9 * size else size
@@ -266,7 +260,7 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
     length = measure(size, unit)
 
     def said(value: float, _: float) -> str:
-        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # 0 with its rounding
+        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # remove rounding errors of 0
         return f"{shown:.9g}".replace("-", "\N{MINUS SIGN}")
 
     axis.set_major_formatter(said)

@@ -38,8 +38,8 @@ MARKS = ["o", "X"]
 def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Figures:
     """The figure of a verdict.
 
-    "verdict" : map of the proved statuses, marks on wrongly claimed asperities and indices of the
-        likeliest suspects; a second map for shear forces, if they are claimed
+    "verdict" : map of the proved statuses, with marks on wrongly claimed asperities and indices of
+        the likeliest suspects; a second map for shear forces, if they are claimed
     """
     claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
     width = SINGLE if len(claims) == 1 else DOUBLE

@@ -1,4 +1,4 @@
-"""Write all programs of a scene to one folder, with an index."""
+"""`write_programs`: all programs of a scene in one folder, with an index."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS.
-
-CBF has its own writer here: among the Python packages that write it, MOSEK and COPT are commercial,
-and PICOS (2.6) fails on every problem. The tests read each format back with its library.
-"""
+"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS."""
 
 from __future__ import annotations
 
@@ -31,7 +27,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
     upper = program.quadratic.toarray()
     rows = program.constraints.toarray()
     equal = program.lower == program.upper
-    none = np.array(None)  # as Problem.save writes what is not there
+    none = np.array(None)  # what Problem.save writes for missing data
     file = io.BytesIO()
     np.savez_compressed(
         file,
@@ -169,6 +165,6 @@ def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
 
 
 def _counted(entries: list[tuple[Any, ...]]) -> list[str]:
-    """The number of entries that are not 0, then one line for each of them, without rounding."""
+    """The number of nonzero entries, then one line for each of them, without rounding."""
     lines = [" ".join(map(repr, entry)) for entry in entries if entry[-1] != 0]
     return [str(len(lines)), *lines]

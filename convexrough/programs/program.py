@@ -91,7 +91,7 @@ class Program(Record):
         return self.energy_unit * (sign * objective + self.constant)
 
     def save(self, path: Path | str) -> None:
-        """Write the program to a file in the format of its ending.
+        """Write the program to a file, in the format of the file's ending.
 
         cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
         bristles    : .mps or .npz (qpsolvers, dense)
@@ -151,7 +151,7 @@ def program(
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
-    """The program of a problem, given the loads (n,) of its solution in the problem's units."""
+    """The program of a problem, given the loads (n,) of its solution in scaled units."""
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)
@@ -207,7 +207,6 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
 
 
 def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
-    """The minimum of the objective, evaluated at the solution of the contact problem."""
     p = own[boxes.members]
     t = np.cbrt(p / boxes.loads)
     powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]

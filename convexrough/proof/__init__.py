@@ -1,4 +1,4 @@
-"""Proofs as files, for `convexrough.checker` or another checker (docs/theory/proof-file.md)."""
+"""Proof files for `convexrough.checker` or another checker (docs/theory/proof-file.md)."""
 
 from convexrough.proof.proof import NearState, Proof, ShearedState, prove, refuse_many
 

@@ -1,7 +1,8 @@
-"""Candidates for the convexity argument of a proof: boxes of contact radii, and spheres (shells).
+"""Candidates for the convexity argument of a proof: boxes of contact radii, and shells.
 
 They are computed in floating point and need not be valid. The checker verifies each in exact
-arithmetic; if it refuses one, the next is tried.
+arithmetic; if it refuses one, the next is tried. docs/theory/proof-file-steps.md, "Convexity on the
+box", defines box, shells and convexity number.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from scipy.spatial.distance import cdist
 from convexrough.arrays import Array
 from convexrough.scene.scene import Scene
 
-#: Relative distance of the ends of a box from the radii of any solution, and smallest end relative
-#: to the largest: room for the bounds. First for accurate radii, then for rough ones.
+#: Relative distance from the radii of any solution to the upper ends of a box, and smallest upper
+#: end divided by the largest. The first pair is for accurate radii, the second for rough ones.
 ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
 #: Relative room for rounding in this module.
@@ -28,14 +29,14 @@ ROUNDING = 1e-9
 #: Convexity numbers tried with overlapping shells, and with Cholesky factorisation.
 CROWDED = (0.9, 0.99, 0.999, 0.9999)
 
-#: Weight of the contact radii in the sizes of fitted shells; the rest is half the distances.
+#: Weight of the contact radii in the radii of fitted shells; the other weight is on distances.
 FITTED = 0.9
 
-#: Radii of overlapping shells over the smallest radii that suffice without overlap.
+#: Radii of overlapping shells, divided by the smallest radii that are enough without overlap.
 WIDTHS = (2.0, 4.0, 8.0)
 
-#: Relative distance of the ends of a box from the radii, if all asperities that do not touch are
-#: fixed open: for radii to thirty digits, for float64 numbers, and for rough ones.
+#: Relative distance from the radii to the upper ends of a box in which all asperities that do not
+#: touch are fixed open: for radii with thirty digits, for float64 numbers, and for rough ones.
 LEEWAY = (1e-12, 1e-6, 1e-2)
 
 #: The box, the convexity number and the shells of an argument.
@@ -43,11 +44,11 @@ Reason = tuple[Array, float, Array | None]
 
 
 class Argument(NamedTuple):
-    """Claim: for 0 <= a <= box the Hessian is at least 1 - convexity_number of its local part.
+    """The claim that the energy is strongly convex for contact radii 0 <= a <= box.
 
     box     : (n,) [length] 0 for asperities that are fixed open
-    shells  : (n,) [length] radii of spheres that overlap little; None for a Cholesky factorisation
-    ceiling : [length] a number above all (A P)_i, for a bound on the approach; None if prescribed
+    shells  : (n,) [length] radii of shells; None for a Cholesky factorisation
+    ceiling : [length] a number above all (A P)_i; None if the approach is prescribed
     """
 
     box: Array
@@ -58,7 +59,7 @@ class Argument(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution, and the prescribed approach or load over E*."""
+    """Contact radii (n,) [length] near a solution, and the prescribed approach or load / E*."""
 
     scene: Scene
     radii: Array
@@ -67,14 +68,14 @@ class TrialState:
 
     @cached_property
     def apart(self) -> Array:
-        """(n, n) [length] distances, infinite from an asperity to itself."""
+        """(n, n) [length] distances, with infinity on the diagonal."""
         distances: Array = cdist(self.scene.contact_points, self.scene.contact_points)
         np.fill_diagonal(distances, np.inf)
         return distances
 
     @cached_property
     def loads(self) -> Array:
-        """(n,) loads over E*, scaled to the prescribed total."""
+        """(n,) loads / E*, scaled to the prescribed total."""
         loads: Array = 4 * self.radii**3 / (3 * self.scene.relative_radii)
         return loads if self.load is None else loads * (self.load / loads.sum())
 
@@ -97,7 +98,7 @@ class TrialState:
 
     @cached_property
     def ceiling(self) -> tuple[float | None, float]:
-        """`Argument.ceiling`, and the bound on the approach of every solution that follows."""
+        """`Argument.ceiling`, and the bound on the approach of every solution that it gives."""
         if self.approach is not None:
             return None, self.approach
         loaded = self.loads > 0
@@ -111,7 +112,7 @@ class TrialState:
         return float(best), bound - drop + ROUNDING * (bound + abs(drop))
 
     def arguments(self) -> Iterator[Argument]:
-        """The arguments that hold in floating point, the most general first."""
+        """The arguments that are valid in floating point, the most general first."""
         top = self.ceiling[0]
         for argument in self._tried():
             yield Argument(*argument, top)
@@ -172,7 +173,7 @@ class TrialState:
             return
 
     def _fitted(self, room: Array) -> Array:
-        """(n,) shells s = 0.9 a / c + 0.1 room, with the largest (a_i + a_j) / r_ij as c."""
+        """(n,) shells 0.9 a / c + 0.1 room, with the largest (a_i + a_j) / r_ij as c."""
         able = np.flatnonzero(room)
         a = self.radii[able]
         crowding = float(((a[:, None] + a) / self.apart[np.ix_(able, able)]).max(initial=0.0))
@@ -181,7 +182,7 @@ class TrialState:
         return np.where(room > 0, FITTED * self.radii / crowding + (1 - FITTED) * room, 0.0)
 
     def _local(self, box: Array, shells: Array) -> Iterator[Reason]:
-        """Arguments on a box that ends half-way between these radii and the end of convexity."""
+        """Arguments on a box that ends half-way between the radii and the limit of convexity."""
         end = np.pi / 2 * shells
         number = float((self.radii[box > 0] / end[box > 0]).max(initial=0.0))
         if number < 1:

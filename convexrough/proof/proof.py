@@ -1,4 +1,4 @@
-"""`prove`: proofs of contacts and friction states, for a checker that trusts no computed number."""
+"""`prove`: proofs of contacts and friction states, for a checker in exact arithmetic."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class ShearedState(Protocol):
 class NearState(NamedTuple):
     """Loads near a solution, with any number of digits.
 
-    loads : (n,) [force] in the order of the scene's asperities
-    approach : [length]; None to compute it from the loads
+    loads    : (n,) [force] in the order of the scene's asperities
+    approach : [length]; None to compute the approach from the loads
     """
 
     loads: Sequence[Fraction]
@@ -46,12 +46,10 @@ class NearState(NamedTuple):
 
     @classmethod
     def given(cls, loads: Array) -> NearState:
-        """The state with these loads (n,) [force]."""
         return cls(list(map(Fraction, loads.tolist())), None)
 
     @classmethod
     def of(cls, level: Level, n: int) -> NearState:
-        """The state of a level, for a scene of n asperities."""
         found, units = [Fraction(0)] * n, level.problem.units
         if level.trial is None:
             return cls(found, None)
@@ -67,7 +65,7 @@ class Proof(Record):
     """A checked proof: statuses of all asperities, and bounds on loads, gaps, forces and losses.
 
     document : contents of the proof file (docs/theory/proof-file.md)
-    proved   : summary in words, as the checker prints it
+    proved   : summary in sentences, as the checker prints it
     """
 
     document: dict[str, Any]
@@ -76,7 +74,7 @@ class Proof(Record):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file that `convexrough check` and `python checker.py` read.
 
-        path : file name; if writing fails an existing file remains unchanged
+        path : file name; if writing fails, an existing file remains unchanged
         """
         with replacing(Path(path)) as temporary:
             temporary.write_text(json.dumps(self.document, indent=0) + "\n", encoding="utf-8")
@@ -92,13 +90,14 @@ def prove(
 ) -> Proof:
     """A proof of the solution near given loads, which may come from any source.
 
-    loads : (n,) [force] not negative, in the order of the scene's asperities; or a `NearState`
-    approach, load : [length], [force]; exactly one is prescribed
-    sheared : friction states to prove with the loss of their cycles from -Q to Q, as pairs of the
-        shear force Q [force] and loads near the solution at the load P - Q / f
+    loads    : (n,) [force] not negative, in the order of the scene's asperities; or a `NearState`
+    approach : [length] prescribed approach, if no load is given
+    load     : [force] prescribed load P, if no approach is given
+    sheared  : friction states to prove, with the losses of cycles from -Q to Q; each is a pair of
+        the shear force Q [force] and the `NearState` at the load P - Q / f
 
-    The checker computes the bounds in exact arithmetic, so proving takes as long as checking:
-    about a minute for 3,000 asperities.
+    A proof takes as long as the check, which computes the bounds: about a minute for 3,000
+    asperities.
 
     Raises InputError for invalid values and for scenes too large for the checker; ProofError if no
     solution is proved, because the loads are too inaccurate or the contacts overlap too much.
@@ -142,7 +141,7 @@ def refuse_many(scene: Scene) -> None:
 
 
 def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
-    """The contents of the file, with the scene only."""
+    """The contents of the file, with the scene but without argument, states and claims."""
     scene = trial.scene
     x, y = scene.asperities.positions.T
     given = {
@@ -184,19 +183,19 @@ def _place(
 
 
 def _cube_root(x: Fraction) -> Fraction:
-    """The cube root to about thirty digits."""
+    """The cube root with about thirty digits."""
     near = Fraction(math.cbrt(x))
     return near + (x - near**3) / (3 * near**2) if near else near
 
 
 def _digits(x: Fraction) -> list[str]:
-    """A number as a list of one or two float64 numbers in hexadecimal, which are its sum."""
+    """One or two float64 numbers in hexadecimal, whose sum is x to about thirty digits."""
     high, low = Pair.nearest(x)
     return [high.hex(), low.hex()] if low else [high.hex()]
 
 
 def _written(value: Any) -> Any:
-    """A value as JSON: float64 in hexadecimal, intervals as pairs rounded outwards."""
+    """A value as JSON: numbers in hexadecimal, intervals as pairs that are rounded outwards."""
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, dict):
@@ -209,7 +208,7 @@ def _written(value: Any) -> Any:
 
 
 def _beyond(bound: Fraction, end: float) -> str:
-    """The nearest float64 on the side of `end`, in hexadecimal."""
+    """The bound rounded towards `end` to a float64 number in hexadecimal."""
     value = float(bound)
     if (Fraction(value) - bound) * int(math.copysign(1, end)) < 0:
         value = math.nextafter(value, end)

@@ -1,4 +1,4 @@
-"""The report of `compare`, as a summary for programs and as aligned lines."""
+"""The report of `compare`: a summary for programs, and aligned lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate",
 
 
 def comparison_summary(comparison: Comparison, within: float) -> Summary:
-    """The summary of a comparison, in the scene's units; `within` as in `Comparison`."""
+    """The summary of a comparison; `within` is as for `Comparison.disagreeing`."""
     return headed(
         compare=[_entry(entry) for entry in comparison.entries],
         contradictions=list(comparison.contradictions),
@@ -42,7 +42,7 @@ def _entry(entry: Entry) -> Summary:
 
 
 def steps(comparison: Comparison) -> list[list[Any]]:
-    """The logged iterations: a row for each, below a heading."""
+    """A table of the logged iterations: headings, then a row for each iteration."""
     names = ["step", "objective", "residual"]
     rows = [
         [entry.solver, *(step[name] for name in names)]

@@ -14,7 +14,7 @@ BELOW_LIMIT = 1 - 1e-9
 
 
 def prove_results(results: Sequence[Result]) -> Proof:
-    """The proof of the contact, of each shear force and of the amplitude of each cycle.
+    """The proof of the contact, of each shear force, and of the shear amplitude of each cycle.
 
     Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is proved.
     """

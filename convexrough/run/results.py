@@ -1,7 +1,7 @@
 """The results folder, which is written under a temporary name and then renamed.
 
-A folder with contents is changed only with `force`: when the new files are complete, they replace
-the files of the earlier run, which `files.json` lists. Other files stay.
+A folder with contents is changed only with `force`: the complete new files then replace the files
+that `files.json` of the earlier run lists. Other files stay.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
     force : accept a folder with contents
     said  : entries of `files.json` besides the names of files
 
-    Raises FileError, before the body, if `folder` cannot be written or replaced.
+    Raises FileError, before the body runs, if `folder` cannot be written or replaced.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
     with file_errors(folder, "hold results"):
@@ -68,7 +68,6 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
 
 
 def _moved(new: Path, folder: Path) -> None:
-    """Rename the new folder, or move its files into a folder that exists."""
     if not folder.is_dir():
         os.replace(new, folder)
         return
@@ -81,7 +80,6 @@ def _moved(new: Path, folder: Path) -> None:
 
 
 def _earlier(folder: Path) -> list[str]:
-    """The files of an earlier run; empty where its list cannot be read."""
     try:
         files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
         return [MANIFEST, *map(str, files)]
@@ -90,7 +88,7 @@ def _earlier(folder: Path) -> list[str]:
 
 
 def origin(source: SceneFile) -> Summary:
-    """The origin of results: the files read with their hashes, the seed, and versions."""
+    """The origin of results: hashes of the files read, the seed, and the versions of packages."""
     return {
         "scene": str(source.path),
         "inputs": dict(source.inputs),
@@ -112,7 +110,7 @@ def write_results(
     more: Mapping[str, Any] | None = None,
     **saved: Any,
 ) -> list[Path]:
-    """Write all tables, figures, and summary.json with `more`; return the paths.
+    """Write all tables, figures, and summary.json with the entries `more`; return the paths.
 
     saved : formats and dpi of figures, as for `write_figures`
 
@@ -132,9 +130,9 @@ def write_results(
 
 
 def slider_page(pressed: Result) -> str:
-    """An HTML page with a slider for the shear force; its states are computed in this call.
+    """An HTML page with a slider for the shear force; this call computes the states on it.
 
-    Raises InputError if the scene has no friction, or another base than a sphere.
+    Raises InputError if the scene has no friction, or another shape than a sphere.
     """
     from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
 
@@ -147,7 +145,7 @@ def write_json(path: Path, summary: Summary) -> Path:
 
 
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
-    """Write each table, name -> columns, as NAME.csv; return the paths."""
+    """Write each table of columns as NAME.csv; return the paths."""
     return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
 
 
@@ -168,12 +166,12 @@ def write_figures(
             with replacing(path) as temporary:
                 save(figure, temporary, kind, dpi)
             written.append(path)
-            figure.set_layout_engine("none")  # laid out once: the second file takes half the time
+            figure.set_layout_engine("none")  # saves the layout of later files
     return written
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
-    """Write CSV whose numbers read back unchanged, or .npz for many rows; return the path."""
+    """Write CSV, or .npz for many rows, with numbers that read back unchanged; return the path."""
     arrays = [np.asarray(values) for values in columns.values()]
     if len(arrays[0]) > MOST_CSV_ROWS:
         path = path.with_suffix(".npz")

@@ -1,4 +1,4 @@
-"""Scene files: TOML files that describe a scene and what to compute for it."""
+"""Scene files: TOML files that describe a scene and what to compute."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 MOST_MISTAKES = 50
 
 
-#: Largest scene file [bytes]; the positions of many asperities belong in a separate file.
+#: [bytes] size of the largest accepted scene file.
 MOST_BYTES = 2**25
 
-#: Columns of a file of summits; the scene file may give other headers for them.
+#: Columns of a file of asperities, unless the scene file names others.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
 
-#: Most parts of a dotted key: the time and memory of tomllib grow with their square.
+#: Largest number of parts of a dotted key: time and memory of tomllib grow with the square.
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
@@ -52,15 +52,15 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SceneFile(Record):
-    """The contents of a scene file: the scene, and the stages to compute for it.
+    """The contents of a scene file: the scene, and the stages to compute.
 
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the load, if the extent of the
         asperities was chosen for it; else None
-    influence : compliance operator; None for the cheapest exact one
-    stages : the tables that compute something, by name; the first is [normal]
-    text   : the file itself;  seed : seed of its random heights and radii, or None
-    convert : whether columns in other units are converted or refused
+    influence : compliance operator; None for the cheapest
+    stages : the tables that request results, by name; the first is [normal]
+    text   : text of the file;  seed : seed of its random heights and radii, or None
+    convert : True if columns in other units are converted, False if they are refused
     inputs : the SHA-256 of each file that was read, by path
 
     >>> file = cr.read_scene(new_scene)
@@ -83,7 +83,7 @@ class SceneFile(Record):
     convert: bool
 
     def problem(self) -> NormalProblem:
-        """The normal contact problem of the file, assembled."""
+        """The normal contact problem of the file."""
         return NormalProblem.assemble(
             self.scene,
             approach=self.approach,
@@ -96,13 +96,17 @@ class SceneFile(Record):
         """The contact that the file prescribes. Raises what `press` raises."""
         return solve(self.problem(), self.solver)
 
+    def cautions(self, contact: Contact) -> Iterator[str]:
+        """Warnings about stages that do not fit the contact, before they are computed."""
+        return (each for stage in self.stages.values() for each in stage.cautions(contact))
+
     def compute(self, contact: Contact) -> list[Result]:
         """The results of all stages; the first is the pressed contact."""
         return [stage.compute(contact) for stage in self.stages.values()]
 
 
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
-    """Read and check a scene file.
+    """The contents of a scene file, checked.
 
     asperities : asperities that replace those of the file
 
@@ -177,7 +181,7 @@ def digest(path: Path) -> str:
 
 
 def parsed(path: Path, text: str) -> dict[str, Any]:
-    """The tables of a file. Raises FileError where it is not TOML, or empty."""
+    """The tables of a file with this text. Raises FileError if it is not TOML, or empty."""
     if key := _DOTTED.search(text):
         line = text.count("\n", 0, key.start()) + 1
         raise FileError(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
@@ -199,7 +203,7 @@ def has_sweep(path: Path) -> bool:
 class Layouts(NamedTuple):
     """Functions that make asperities.
 
-    summits : reads them from a file;  regular : makes a pattern, without random parts
+    summits : reads asperities from a file;  regular : makes a pattern, without random parts
     """
 
     summits: Callable[..., Asperities]
@@ -219,9 +223,9 @@ READ = Layouts(read_summits, _regular)
 def build_scene(
     path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
 ) -> tuple[Scene, float | None]:
-    """The scene of checked tables, and `SceneFile.highest_approach`.
+    """The scene that checked tables describe, and `SceneFile.highest_approach`.
 
-    path    : the scene file, for messages; paths in it are relative to its folder
+    path    : the scene file, for messages; paths in the tables are relative to its folder
     layouts : functions that make the asperities
     asperities : asperities that replace those of the tables
 
@@ -256,7 +260,6 @@ def build_scene(
 
 
 def _material(study: Study) -> Material:
-    """The material of the contact, from one table or from those of both bodies."""
     from convexrough.run.study import BodiesTable
 
     def of(body: Any) -> Material:
@@ -273,7 +276,10 @@ def _material(study: Study) -> Material:
 def _lattice(
     layout: LatticeTable, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
-    """The scene up to the distance `within`, or else with all asperities that could touch."""
+    """The scene with asperities up to the distance `within`, or with all that could touch.
+
+    These could touch as [normal] prescribes, or under the largest load of a stage.
+    """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
@@ -295,19 +301,25 @@ def _lattice(
 
     if layout.within is not None:
         return scene(layout.within), None
-    if (approach := study.normal.approach) is not None:
-        return scene(farthest(approach)), None
-    assert study.normal.load is not None  # exactly one of the two
-    return all_that_could_touch(scene, farthest, study.normal.load)
+    approach, load = study.normal.approach, study.normal.load or 0.0
+    found: list[tuple[Scene, float | None]] = []
+    if approach is not None:
+        found.append((scene(farthest(approach)), None))
+    else:
+        found.append(all_that_could_touch(scene, farthest, load))
+    most = max((stage.highest_load for stage in study.stages.values()), default=0.0)
+    if most > load:
+        found.append((all_that_could_touch(scene, farthest, most)[0], None))
+    return max(found, key=lambda each: len(each[0]))
 
 
 @contextmanager
 def _blamed_on(path: Path, table: str) -> Iterator[None]:
-    """Name the file and the table in the InputErrors of the body."""
+    """Name the file and the table in InputErrors of the body."""
     try:
         yield
     except InputError as error:
-        if error.where:  # in another file, already named
+        if error.where:  # the error names another file
             raise
         what = f"[{table}] {error.what}"
         where = str(path)

@@ -1,9 +1,9 @@
 """Base classes of stages and of their results.
 
-A stage is a table of the scene file, with its checks. It computes a result from a pressed contact;
-printed lines, tables, figures and the summary are derived from that result. A new stage needs a
-subclass of `Stage` and one of `Result` in a file of `run/stages`, and a line in `STAGES` there;
-docs/architecture.md shows one of 40 lines.
+A stage is a table of the scene file that requests a result, with its checks. It computes the
+result from a pressed contact; printed lines, tables, figures and the summary are derived from the
+result. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
+an entry in `STAGES` there; docs/architecture.md shows an example with 40 lines.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.plausibility import ARRAY, CUT_OFF, array_extent, at_the_rim
 from convexrough.plottable import Plottable
 from convexrough.record import Table, rows_of, singular
 from convexrough.run.values import FileTable
@@ -32,10 +33,10 @@ if TYPE_CHECKING:
 Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 
-#: Statuses of asperities; as keys, the number of asperities with that status.
+#: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: Names of the numbers that have a physical dimension, by dimension; others are dimensionless.
+#: Names of numbers, by physical dimension; numbers without an entry are dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
@@ -46,7 +47,11 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: Number of rows that are printed of a table of steps: the last ones.
+#: Loads of a stage further from that of [normal] than by this factor get a warning, and shear
+#: forces below this fraction of the friction limit.
+FAR, SLIGHT = 100.0, 2e-3
+
+#: At most this many rows of a table of steps are printed, the last ones.
 MOST_PRINTED = 20
 
 
@@ -55,14 +60,43 @@ class Stage(FileTable):
 
     name       : name of the table
     frictional : True if it needs the table [friction]
-    numbers    : numbers of its summary, by name, that a sweep can measure
-    labels     : keys of a row that identify it, where there are several rows
+    numbers    : names of numbers in its summary that a sweep can measure
+    labels     : keys that identify a row, where there are several rows
     """
 
     name: ClassVar[str]
     frictional: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load that the table names; 0 if the load is that of [normal]."""
+        return 0.0
+
+    @property
+    def highest_force(self) -> float:
+        """[force] the largest shear force that the table names as a force, not as a fraction."""
+        return 0.0
+
+    def cautions(self, contact: Contact) -> Iterator[str]:
+        """Warnings about loads and forces that do not fit the pressed contact."""
+        load, name, known = self.highest_load, f"[{self.name}]", contact.load
+        if not load:
+            return
+        if known and not 1 / FAR <= load / known <= FAR:
+            yield (
+                f"{name} has loads up to {load:.4g}, and [normal] a load of {known:.4g}: check the "
+                f"units of both, and reference in {name}"
+            )
+        if 0 < self.highest_force < SLIGHT * checks.friction(contact.scene.friction) * load:
+            yield (
+                f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
+                "the friction limit at the largest load: check the units of the forces"
+            )
+        extent = array_extent(contact.scene, load)
+        if len(contact.scene) >= ARRAY and extent is not None and extent < CUT_OFF:
+            yield f"under the loads of {name} {at_the_rim(extent)}"
 
     def compute(self, contact: Contact) -> Result:
         """The result of this stage for a pressed contact. Raises InputError and SolverError."""
@@ -78,9 +112,9 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, or the attribute of this name.
+    """The number of asperities with the status `name`, else this attribute of `found`.
 
-    The attribute is that of the result or else of its certificate.
+    An attribute that `found` lacks is that of `found.certificate`.
     """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)
@@ -88,7 +122,7 @@ def number(found: Any, name: str) -> Any:
 
 
 def numbers_of(found: Any, names: Sequence[str]) -> Summary:
-    """The numbers of a result with these names, as Python numbers and lists."""
+    """Numbers of `found` by these names, as Python numbers and lists."""
     return {name: plain(number(found, name)) for name in names}
 
 
@@ -98,7 +132,7 @@ class Result(Table, Plottable):
 
     stage   : the stage that was computed
     contact : the pressed contact
-    found   : results of the package: one for each row, or a single one with arrays along steps
+    found   : objects such as ShearState, one for each row, or one object with arrays along steps
 
     Subclasses set `printed` (headings of the printed columns, by key), `title` (of the printed
     table), `digits` (of printed numbers) and `steps` (True if only the last rows are printed).
@@ -115,7 +149,7 @@ class Result(Table, Plottable):
 
     @property
     def name(self) -> str:
-        """Name of the table in the scene file, the key in the summary and the CSV file."""
+        """Name of the table in the scene file, of the key in summary.json, and of the CSV file."""
         return self.stage.name
 
     @property
@@ -124,7 +158,7 @@ class Result(Table, Plottable):
         return self.contact.scene.units
 
     def rows(self) -> list[Summary]:
-        """Rows of numbers and texts by key; by default one row for each of `found`."""
+        """Rows of numbers and texts by key; by default one row for each object in `found`."""
         return [numbers_of(each, self.stage.numbers) for each in self.found]
 
     @cached_property
@@ -137,7 +171,7 @@ class Result(Table, Plottable):
         return self.known
 
     def doubts(self) -> Iterator[str]:
-        """The reasons why this result is not certified, one line each."""
+        """The reasons why this result is not certified, one line for each."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
             yield f"not certified: {unsure} statuses in {self.name} undecided"
 
@@ -155,7 +189,7 @@ class Result(Table, Plottable):
         return {}
 
     def prepare(self, *, figures: bool) -> None:
-        """Compute what tables and figures need, so that writing them solves nothing."""
+        """Compute what tables and figures need, so that writing them needs no further solution."""
         _ = self.known
 
     def lines(self) -> list[str]:
@@ -173,7 +207,7 @@ class Result(Table, Plottable):
         return self.printed
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """Draw the main figure of the last of `found`; return the axes."""
+        """Draw the main figure of the last object in `found`; return the axes."""
         axes = self.found[-1].plot(axes, **options)
         return axes
 
@@ -186,7 +220,7 @@ class Result(Table, Plottable):
 
 
 class Steps(Result):
-    """The result of a stage with consecutive steps: one result with arrays along the steps."""
+    """The result of a stage with consecutive steps: one object with an entry for each step."""
 
     steps = True
 
@@ -194,7 +228,7 @@ class Steps(Result):
         return rows_of(self.columns_of_steps())
 
     def columns_of_steps(self) -> Columns:
-        """One array along the steps for each number of the stage, by name."""
+        """Each number of the stage as an array with an entry for each step, by name."""
         (found,) = self.found
         arrays = {singular(name): name for along in found._along.values() for name in along}
         return {
@@ -204,7 +238,7 @@ class Steps(Result):
 
     @cached_property
     def fine(self) -> Any:
-        """The same path with intermediate points, for figures."""
+        """The path of this result with intermediate points, for figures."""
         from convexrough.plots.between import between  # matplotlib: only when it draws
 
         return between(self.found[0])
@@ -220,7 +254,7 @@ class Steps(Result):
         return path_figures(self.found[0], fine=self.fine)
 
     def summary(self) -> Summary:
-        """A list along the steps for each number."""
+        """Each number of the stage as a list with an entry for each step."""
         return {key: [row[key] for row in self.known] for key in self.known[0]}
 
 
@@ -248,7 +282,7 @@ def repeated(labels: Columns, tables: Sequence[Columns]) -> Columns:
 
 
 def unit_of(name: str, units: UnitNames) -> str:
-    """The unit of a number of this name; "" if it has none or the scene names no units."""
+    """The unit of the numbers with this name; "" if they have none or the scene names no units."""
     length, force = units.length, units.force
     both = length and force
     return {
@@ -260,6 +294,6 @@ def unit_of(name: str, units: UnitNames) -> str:
 
 
 def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
-    """The title, with the units of the printed quantities that the scene names."""
+    """The title, with those units of printed quantities that the scene names."""
     named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
     return f"{title}  ({', '.join(named)})" if named else title

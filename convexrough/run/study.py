@@ -1,6 +1,6 @@
 """The tables of a scene file as one model: the type of each key, and messages for all mistakes.
 
-`read_scene` imports this when a file is read, and not before.
+`read_scene` imports this module when a file is read, and not before.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from convexrough.run.values import (
     Switch,
     Text,
     TipRadius,
+    Variation,
     Whole,
     expected,
     phrased,
@@ -93,7 +94,7 @@ class LatticeTable(FileTable):
     tip_radius: TipRadius
     within: NonNegative | None = None
     height_std: NonNegative = 0.0
-    tip_radius_cv: NonNegative = 0.0
+    tip_radius_cv: Variation = 0.0
     seed: Whole | None = None
     geometry: Geometry = "closest"
 
@@ -117,7 +118,7 @@ class UnitsTable(FileTable):
 
     @property
     def names(self) -> UnitNames:
-        """The units; without a unit of force, that of pressure times length squared."""
+        """The units; the unit of force is by default that of pressure times length squared."""
         pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
         made = force_of(pressure, length) if pressure and length else ""
         return UnitNames(self.length.strip(), self.force.strip() or made)
@@ -178,13 +179,13 @@ class Study(FileTable):
 
     @property
     def stages(self) -> dict[str, Stage]:
-        """The stages that the file asks for, in the order of results."""
+        """The stages that the file requests, in the order of results."""
         found = {name: getattr(self, name) for name in STAGES}
         return {name: stage for name, stage in found.items() if stage is not None}
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: unknown or missing tables, and tables that require each other."""
+        """Mistakes: unknown or missing tables, and tables that require others."""
         for name, keys_within in keys.items():
             if name == "sweep":
                 yield name, "[sweep]: many scenes, which `convexrough sweep` computes"
@@ -203,7 +204,7 @@ class Study(FileTable):
         yield from _unbounded(*(keys.get(name) for name in ("asperities", "normal", "sphere")))
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        """A modulus that no solid has, where units are named."""
+        """A mistake for a modulus that no solid has, if units are named."""
         material, unit = self.material, self.units.names.unit("pressure")
         if unit is None:
             return
@@ -232,7 +233,7 @@ def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
     if math.inf in (radius if isinstance(radius, list) else [radius]):
         yield (
             "asperities",
-            ("[asperities] within: missing, needed with a flat base or a cylinder (infinite)"),
+            ("[asperities] within: missing, needed with a flat or a cylinder (infinite)"),
         )
     elif (
         isinstance(lattice.get("tip_radius"), list)
@@ -278,7 +279,6 @@ def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list
 
 
 def _said(model: type[Study], error: Any) -> str:
-    """The message of a mistake, on one line; each message names its table."""
     table, *inner = error["loc"]
     if error["type"] == "missing" and not inner:
         keys = ", ".join(REQUIRED[str(table)].model_fields)

@@ -1,4 +1,4 @@
-"""summary.json, which `--json` prints, with the printed report and the exit status."""
+"""summary.json, which `--json` prints, the printed report, and the warnings."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SCHEMA = 2
 
 
 def headed(**contents: Any) -> Summary:
-    """A summary: the schema, the version of the package, and these contents."""
+    """A summary of these contents, with the schema and the version of the package."""
     return {"schema": SCHEMA, "version": __version__, **contents}
 
 
 def summarise(results: Iterable[Result]) -> Summary:
-    """The summary of a run: the result of each stage, in the scene's units."""
+    """The summary of a run: the results of all stages, in the scene's units."""
     return headed(**{result.name: result.summary() for result in results})
 
 
@@ -32,7 +32,7 @@ def describe(results: Iterable[Result]) -> list[str]:
 
 
 def warnings(results: Iterable[Result]) -> Iterator[str]:
-    """Warnings: what is not proved, and where the model does not hold."""
+    """Warnings about results that are not proved and about limits of the model."""
     for result in results:
         yield from result.doubts()
         if isinstance(result, NormalResult):

@@ -1,4 +1,4 @@
-"""Reading of text files, and of the table of asperities that a scene file names."""
+"""Reading of text files, and of the file of asperities that a scene file names."""
 
 from __future__ import annotations
 

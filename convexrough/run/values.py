@@ -1,6 +1,6 @@
 """Types of the values in a scene file, and messages for all mistakes at once.
 
-Only modules that define tables import this one: pydantic takes 0.1 s to import.
+Only modules that define tables import this one, because pydantic takes 0.1 s to import.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from convexrough.checks import PHASE, SIZED, is_phase, is_sized, nearest
+from convexrough.checks import PHASE, SIZED, VARIATION, is_phase, is_sized, is_variation, nearest
 
-#: Symbols that a user may have written as keys, and the keys to suggest for them.
+#: Keys that a user may have written, and the keys to suggest.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
-MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # forces in Python
+MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # names in Python
 
 #: A mistake: the key ("" for the whole table) and the message.
 Mistake = tuple[str, str]
 
 
 def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
-    """What a message says after "expected", of a wrong type or where `holds` is false."""
+    """A validator whose messages say "expected", with this phrase; it also requires `holds`."""
 
     def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
         try:
             if holds(result := validated(value)):
                 return result
         except ValidationError as error:
-            if error.errors()[0]["type"] == "expected":  # said already, inside
+            if error.errors()[0]["type"] == "expected":  # an inner validator has a message
                 raise
         raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
 
     return WrapValidator(check)
 
 
-#: Where the file has a list, the second; tags in brackets are not said.
+#: Of the types "number" and "list", the one that the file has; messages omit tags in brackets.
 NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
 
 _SIZED = expected(SIZED, is_sized)
@@ -61,6 +61,7 @@ NonNegative = Annotated[
     float, expected("a number that is not negative", lambda value: value >= 0), _SIZED
 ]
 Ratio = Annotated[float, expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
+Variation = Annotated[float, expected(VARIATION, is_variation)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Phase = Annotated[float, expected(PHASE, is_phase)]
@@ -93,7 +94,7 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table: numbers are finite, no text or truth value stands for one, no other keys."""
+    """A table of a file: numbers are finite and are not texts or truth values; no other keys."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
@@ -104,7 +105,7 @@ class FileTable(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
-        """Those of single values, of keys beside each other, and of a table right in itself."""
+        """All mistakes: in single values, in which keys are given, and between values."""
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
         found: list[InitErrorDetails] = []
@@ -140,7 +141,7 @@ class FileTable(BaseModel):
                 yield needed, f"missing, needed with {key}"
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        """Mistakes that only show between values each right by itself."""
+        """Mistakes in values that are only wrong together."""
         yield from ()
 
 

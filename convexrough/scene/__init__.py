@@ -1,1 +1,1 @@
-"""The scene: material, asperities and their patterns, and the sphere or another base."""
+"""The scene: a sphere or another pressed body, asperities and their patterns, and material."""

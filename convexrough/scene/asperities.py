@@ -59,7 +59,7 @@ class Asperities(Record):
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
-        Both share data that depend only on the positions, such as lattice and distances.
+        The results share data that depend only on the positions, such as distances.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -73,15 +73,13 @@ class Asperities(Record):
     ) -> Asperities:
         """These asperities with random heights and tip radii; arguments as for `hexagonal`.
 
-        Both share data that depend only on the positions, as with `with_tips`.
-
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
         >>> print([f"{asperities.heights[0]:.1e}" for asperities in rough])
         ['1.3e-07', '3.5e-07', '1.9e-07']
         """
         height_std = checks.non_negative("height_std", height_std)
-        tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
+        tip_radius_cv = checks.variation("tip_radius_cv", tip_radius_cv)
         if height_std == 0 and tip_radius_cv == 0:
             return self
         n, seed, heights, radii = len(self), checked_seed(seed), self.heights, self.tip_radii
@@ -140,7 +138,7 @@ class Asperities(Record):
         seed          : of the random numbers; required with height_std or tip_radius_cv
 
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
-        asperities and does not change the others, nor their random heights and radii.
+        asperities and leaves the others unchanged, with their random heights and radii.
         """
         rough = (height_std, tip_radius_cv, seed)
         return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)

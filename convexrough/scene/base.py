@@ -1,7 +1,7 @@
-"""The shape of the body that is pressed on asperities: sphere, ellipsoid, cylinder or flat.
+"""The shape of the pressed body: a sphere, an ellipsoid, a cylinder or a flat.
 
 It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, a flat
-base R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
+R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 from convexrough import checks
 from convexrough.errors import InputError
 
-#: R of a sphere or flat, or (Rx, Ry) of another base.
+#: R of a sphere or flat, or (Rx, Ry) of another shape.
 Radius: TypeAlias = float | tuple[float, float]
 
 
@@ -33,10 +33,7 @@ def along(radius: Radius) -> tuple[float, float]:
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """The finite radii R, each with the axes (0 is x, 1 is y) along which the base has it.
-
-    The drop of the base at r is the sum of |part of r along these axes|^2 / (2 R) over them.
-    """
+    """The finite radii R, each with the axes (0 is x, 1 is y) along which the shape has it."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]
@@ -46,19 +43,18 @@ def curved(radius: Radius) -> list[tuple[float, slice]]:
 def named(radius: Radius) -> str:
     """The name of the shape."""
     if not curved(radius):
-        return "a flat base"
+        return "a flat"
     if not isinstance(radius, tuple):
         return "a sphere"
     return "a cylinder" if math.inf in radius else "an ellipsoid"
 
 
 def sphere_radius(radius: Radius, what: str) -> float:
-    """The radius of a sphere. Raises InputError for other bases."""
+    """The radius of a sphere. Raises InputError for other shapes."""
     if isinstance(radius, tuple) or not curved(radius):
-        raise InputError(what, found=named(radius), expected="a scene whose base is a sphere")
+        raise InputError(what, found=named(radius), expected="a sphere")
     return radius
 
 
 def _length(what: str, value: Any) -> float:
-    """A radius, checked to be positive; it may be inf."""
     return math.inf if value == math.inf else checks.positive(what, value)

@@ -13,19 +13,19 @@ from convexrough.arrays import Array
 from convexrough.cached import Cached
 from convexrough.checks import SMALLEST
 
-Sites = NDArray[Any]  # of whole numbers
+Sites = NDArray[Any]  # whole numbers
 
-#: Points may differ from the sites of a lattice by this part of the largest coordinate, a little
-#: more than rounding of coordinates computed in float64.
+#: Largest difference of points from the sites of a lattice, over the largest coordinate: a little
+#: more than the rounding of coordinates.
 SITE_ERROR = 32 * 2.0**-53
 
-#: They may also differ by at most this part of the spacing; error bounds of products include it.
+#: Largest difference over the spacing, which error bounds of products include.
 CLOSEST = 1e-7
 
 #: Lattices with a spacing below this part of the largest coordinate are not used.
 FINEST = 1e-12
 
-#: Lattices with more than so many sites per point are not used: a heuristic, for speed.
+#: Lattices with more sites per point are not used. A heuristic, for speed.
 SPARSEST = 50
 
 
@@ -35,7 +35,7 @@ class Lattice(Cached):
 
     origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2, reduced up to rounding
     site_error : [length] bound on the difference of each coordinate of the points from its site
-    shrink, unshrunk : the exact basis is shrink * unshrunk; None without `shrunk`
+    shrink, unshrunk : the exact basis is shrink * unshrunk; None unless made by `shrunk`
     """
 
     origin: Array
@@ -45,7 +45,7 @@ class Lattice(Cached):
     unshrunk: Array | None = None
 
     def shrunk(self, factor: Fraction) -> Lattice:
-        """The lattice of the points times a factor, rounded up to a few times."""
+        """The lattice of the points times a factor; `site_error` includes the rounding of both."""
         assert self.unshrunk is None
         times = float(factor)
         site_error = 2.0 * times * self.site_error
@@ -53,7 +53,7 @@ class Lattice(Cached):
 
     @property
     def exactly(self) -> list[list[Fraction]]:
-        """The basis without rounding."""
+        """The basis without rounding, as fractions."""
         given = self.basis if self.unshrunk is None else self.unshrunk
         return [[self.shrink * Fraction(x) for x in row] for row in given.tolist()]
 
@@ -67,14 +67,14 @@ class Lattice(Cached):
     def through(cls, points: Array) -> Lattice | None:
         """The lattice on which these points (n, 2) lie, up to rounding, each on a different site.
 
-        The result is None without such a lattice, or if its spacing is too small for float64.
+        None if there is none, or if the spacing is too small for float64.
         """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points, relative to their middle: this decouples both.
+        # Fit origin and basis to all points. Relative to the middle of the points both decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
@@ -104,15 +104,11 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 
 
 def _shortest(points: Array) -> Array | None:
-    """The two shortest vectors (2, 2) between points near the origin; None if all are on a line.
-
-    For points on a lattice with not too many sites missing this is its reduced basis (Lagrange and
-    Gauss).
-    """
+    """The reduced basis (2, 2), from points near the origin; None if these are on a line."""
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]
-    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # squares of squares
+    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # limits powers
     points = (nearby[:, None] - nearby).reshape(-1, 2) / unit
     squares = (points**2).sum(axis=1)
     near = np.argsort(squares)

@@ -14,12 +14,11 @@ from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.scene.patterns import Pattern
 
-#: For more asperities than this a lattice is searched before nearest neighbours are computed.
+#: For more asperities than this a lattice is sought before nearest neighbours are computed.
 MANY = 5000
 
 
-#: Coordinates of points made on a lattice may differ from its sites by this part of the largest:
-#: three roundoffs of making them, and the rounding in `Lattice.sites`.
+#: Largest difference of points made on a lattice from its sites, over the largest coordinate.
 MADE_SITE_ERROR = 16 * 2.0**-53
 
 
@@ -27,7 +26,7 @@ MADE_SITE_ERROR = 16 * 2.0**-53
 class Layout(Cached):
     """Distinct points (n, 2) [length] in the plane, with data that depend only on them.
 
-    made : the lattice on which they were made, and their i and j (n, 2); None to search for one
+    made : the lattice on which they were made, with i and j (n, 2); None to search for one
     """
 
     points: Array
@@ -53,12 +52,12 @@ class Layout(Cached):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice on which all points lie, each on a different site; None without one."""
+        """The lattice on which all points lie, each on a different site; None if there is none."""
         return Lattice.through(self.points) if self.made is None else self.made[0]
 
     @cached_property
     def sites(self) -> Sites | None:
-        """(n, 2) i and j of each point on the lattice; None without one."""
+        """(n, 2) i and j of each point on the lattice; None if there is none."""
         if self.made is not None:
             return self.made[1]
         return None if self.lattice is None else self.lattice.sites(self.points)
@@ -72,7 +71,7 @@ class Layout(Cached):
         return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
 
     def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
-        """The indices where `wanted` (n,) is true; of many points on a lattice, in its `order`."""
+        """The indices where `wanted` (n,) is True; for many points on a lattice, in `order`."""
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]

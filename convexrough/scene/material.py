@@ -65,7 +65,8 @@ class Material:
     def pair(cls, sphere: Material, base: Material) -> Material:
         """The material of two bodies of different materials.
 
-        sphere, base : material of each body, as `from_youngs` returns it
+        sphere, base : materials of the sphere (or another pressed body) and of the body with the
+            asperities, as `from_youngs` returns them
 
         Normal and tangential compliances are those of two equal bodies with
         2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by
@@ -86,7 +87,7 @@ class Material:
         part = G / (G + H)  # (1 / H) / (1 / G + 1 / H)
         coupled = ((1.0 - part) * (1.0 - 2.0 * nu) - part * (1.0 - 2.0 * mu)) / 2.0
         return cls(
-            modulus * (2.0 * other / (modulus + other)),  # exact where both are the same
+            modulus * (2.0 * other / (modulus + other)),  # exact for equal materials
             nu + part * (mu - nu),
             min(softer, default=None),
             mismatch=coupled / ((1.0 - part) * (1.0 - nu) + part * (1.0 - mu)),

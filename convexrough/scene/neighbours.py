@@ -8,8 +8,7 @@ from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
 
-#: Number of asperities per batch in `crowding`; each batch may reduce the pairs of the next. A
-#: heuristic, for speed.
+#: Number of asperities per batch in `crowding`. A heuristic, for speed.
 BATCH = 256
 
 #: Number of points up to which all distances are computed. It affects speed only.
@@ -27,10 +26,7 @@ def separations(points: Array, point_error: float = 0.0) -> Array:
 
 
 def crowding(points: Array, radii: Array) -> float:
-    """The largest (a_i + a_j) / r_ij over all pairs.
-
-    The search takes neighbours j with a_j <= a_i that are near enough to exceed the value so far.
-    """
+    """The largest (a_i + a_j) / r_ij over all pairs, with contact radii a and distances r."""
     from scipy.spatial import cKDTree
 
     if len(points) < 2:
@@ -58,7 +54,7 @@ def refuse_coincident(points: Array) -> None:
     if len(points) < 2:
         return
     distances = nearest_distances(points)
-    rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
+    rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # far above the rounding of points
     if (worst := float(distances.min())) <= rounding or worst < SMALLEST:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)

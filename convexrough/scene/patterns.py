@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 
-#: Random heights and log radii are normal, clipped at this many standard deviations (with a
-#: probability of 2e-9 per asperity), so that only a finite set of asperities can touch.
+#: Random heights and logarithms of radii are normal, clipped at this many standard deviations so
+#: that only finitely many asperities can touch.
 CUT_DEVIATIONS = 6.0
 
 
@@ -47,7 +47,7 @@ class Pattern:
         taken = norms <= limit
         i, j = (each - top for each in np.nonzero(taken))
         x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of norms
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # less than differences of norms, >= 1
         order = np.argsort(norms[taken] + turns)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
@@ -71,6 +71,6 @@ def checked_seed(seed: int | None) -> int:
 
 
 def cut_normal(count: int, seed: int, *, stream: int) -> Array:
-    """Standard normal numbers, clipped. Heights and radii use independent streams."""
+    """(count,) clipped standard normal numbers. Heights and radii use independent streams."""
     numbers = np.random.default_rng([seed, stream]).standard_normal(count)
     return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)

@@ -1,4 +1,4 @@
-"""The scene: a sphere or another base, asperities and materials, without loads and solutions."""
+"""The scene: a sphere or another shape, asperities and material, without loads and solutions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Geometry = Literal["summit", "closest"]
 class Scene(Record):
     """A sphere, the asperities on which it is pressed, and the material of both.
 
-    sphere_radius : [length] R of a sphere; inf for a flat base; a pair (Rx, Ry) for an ellipsoid
+    sphere_radius : [length] R of a sphere; inf for a flat; a pair (Rx, Ry) for an ellipsoid
         with axes along x and y, one of them inf for a cylinder
     friction      : Coulomb's coefficient f; required only for shear
     geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
@@ -70,18 +70,18 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Each finite radius [length] of the base, with the axes (0 is x, 1 is y) that have it."""
+        """Each finite radius [length], with the axes (0 is x, 1 is y) that have it."""
         return base.curved(self.sphere_radius)
 
     @property
     def curvature(self) -> float:
-        """[1 / length] curvature of the base: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
+        """[1 / length] curvature of the sphere: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
         Rx, Ry = base.along(self.sphere_radius)
         return (1.0 / Rx + 1.0 / Ry) / 2.0
 
     @property
     def mean_radius(self) -> float:
-        """[length] radius of the sphere with the mean curvature of the base; inf if it is flat."""
+        """[length] radius of a sphere with the same `curvature`; inf for a flat."""
         R = self.sphere_radius
         return 1.0 / self.curvature if isinstance(R, tuple) else R
 
@@ -98,7 +98,8 @@ class Scene(Record):
     def contact_points(self) -> Array:
         """(n, 2) [length] the point at which each asperity first touches.
 
-        It is the summit r_i, or r_i R / (R + rho_i) along each axis in the geometry "closest".
+        It is the summit r_i, or in the geometry "closest" r_i R / (R + rho_i) along each axis, with
+        the radius R of the sphere and the tip radius rho_i.
         """
         if self.geometry == "summit" or not self.curved:
             return self.asperities.positions
@@ -108,14 +109,14 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] R, or R + rho_i in the geometry "closest", for a radius R of the base."""
+        """(n,) [length] R, or in the geometry "closest" R + rho_i, for a radius R of the sphere."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
 
     @cached_property
     def contact_tails(self) -> Array | None:
-        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96 of these; None if exact."""
+        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96; None if all are 0."""
         points = self.asperities.positions
         if self.contact_points is points:
             return None
@@ -147,10 +148,10 @@ class Scene(Record):
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] drop of the base below its height on the axis.
+        """(n,) [length] distance of the undeformed sphere from its tangent plane on the axis.
 
-        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest". For a base with
-        two radii it is the sum of such terms in x and y.
+        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
+        r_i from the axis. With two radii it is the sum of such terms in x and y.
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
@@ -159,7 +160,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] offsets d_i = z_i - drop_i, the approach of each asperity less D0."""
+        """(n,) [length] offsets d_i = z_i - drop_i, with heights z_i: D0 + d_i is prescribed."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
@@ -168,9 +169,9 @@ class Scene(Record):
         return frozen(6 * 2.0**-53 * (np.abs(self.asperities.heights) + self.drops))
 
     def reach(self, approach: float) -> float:
-        """[length] distance from the axis beyond which no such asperity can touch.
+        """[length] distance from the axis beyond which none of these asperities can touch.
 
-        It is computed for the largest height and tip radius; inf on a flat base or a cylinder.
+        It is computed for the largest height and tip radius; inf on a flat or a cylinder.
         """
         return reach(
             approach,
@@ -191,7 +192,8 @@ def reach(
 ) -> float:
     """[length] distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho))).
 
-    If the base has two radii, R is the larger one.
+    D0 is the approach, z the height, R the radius of the sphere (the larger of two), rho the tip
+    radius.
     """
     radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)
     depth = approach + height

@@ -1,4 +1,4 @@
-"""Solvers of the normal problem: settings objects with a method `solve(problem)`.
+"""Solvers of the normal problem: objects with settings and a method `solve(problem)`.
 
 The libraries Clarabel, CVXPY and OSQP are imported when first used.
 """
@@ -36,7 +36,7 @@ SOLVERS: dict[str, Callable[[], Solver]] = {
 
 
 def named(solver: Solver | str | None) -> Solver:
-    """The given solver, the solver of this name, or Newton's method for None."""
+    """The given solver, the solver with this name, or Newton's method for None."""
     if solver is None:
         return Newton()
     if isinstance(solver, str) and solver in SOLVERS:

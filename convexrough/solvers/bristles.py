@@ -1,33 +1,34 @@
-"""The contact as one quadratic program, with Hertz's law as rows of bristles, solved with OSQP.
+"""The contact as one quadratic program for OSQP: each Hertz contact becomes a row of springs.
 
 In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
-value of a quadratic program. A row of independent springs, the bristles, lies on |x| <= b; its half
-has the stiffness 2 E* per length, and the bristle at x touches at the indentation x^2 / R_i:
+value of a quadratic program. Independent springs, the bristles, lie on |x| <= b. On each half they
+have the stiffness 2 E* per length, and the bristle at x touches at the indentation x^2 / R_i:
 
     (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
 
-with integrals over 0 <= x <= b, for every P whose contact radius is at most b. The minimiser at the
-indentation delta is f = 2 E* max(delta - x^2 / R_i, 0). With f constant on each of m equal cells,
-x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy. In the
-problem's units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
+with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
+delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
+cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
+In scaled units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
 h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its stiffness, and phi_ij m times the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
 P is exact where the contact ends on the edge of a cell; in between its error is at most
-0.375 B_i b / (b_i m^2), of second order in 1 / m.
+0.375 B_i b / (b_i m^2).
 
-Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the squares separate, and the program is
+Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator
+A,
 
     minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
 Its matrix is positive definite exactly if A + diag(h) is: the Hessian of the contact energy at the
-upper corner of the box P <= B, for any m. The box is that of the a priori bounds if a Cholesky
+upper ends of the box P <= B, for any m. The box is that of the a priori bounds if a Cholesky
 factorisation finds the matrix positive definite there. Otherwise it is cut at
-b_i = 0.99 (pi/2) s_i (s_i: half the distance to the nearest neighbour), where the shell lemma
-proves that the matrix is. The rows end at the box: an answer that reaches a cut face is refused.
+b_i = 0.99 (pi/2) s_i (s_i: half the distance to the nearest neighbour), where the shell lemma of
+docs/theory/convexity.md proves that the matrix is. An answer on a cut face of the box is refused.
 """
 
 from __future__ import annotations
@@ -54,16 +55,15 @@ from convexrough.solvers.programs import (
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: The convexity number S of a box that is cut to the convex range. The lemma proves the matrix
-#: definite for S below 1; the margin for rounding is a heuristic.
+#: The convexity number of a box that is cut; below 1 the matrix is definite. A heuristic.
 LARGEST_S = 0.99
 
-#: The part of the diagonal that is subtracted when Cholesky's factorisation decides whether the
-#: matrix is definite. A heuristic, far above the rounding of a factorisation.
+#: The part of the diagonal that is subtracted before a Cholesky factorisation decides whether the
+#: matrix is definite. A heuristic, far above rounding.
 MARGIN = 0.001
 
-#: Smallest box as a part of the largest. A heuristic: such small loads need not be resolved, and
-#: the stiffnesses of boxes, proportional to load^(-1/3), differ by at most a factor of a hundred.
+#: Smallest box over the largest. A heuristic: smaller loads need not be resolved, and stiffnesses,
+#: proportional to load^(-1/3), differ by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -71,15 +71,15 @@ SMALLEST_BOX = 1e-6
 class BristleQP:
     """A solver of the bristle program with OSQP (1.0 or newer) and polishing.
 
-    bristles    : m, over half the contact width of each asperity; the error of the loads is about
+    bristles    : m, number of cells over half the contact width; the error of the loads is about
         0.4 / m^2 of the largest load
     newton_step : end with one Newton step, which squares the error and costs little
-    tolerance   : absolute and relative tolerance of OSQP, in the problem's units; if OSQP finds the
-        right bristles in contact, polishing then solves their equations to rounding
+    tolerance   : absolute and relative tolerance of OSQP, in scaled units; if OSQP finds which
+        bristles carry forces, polishing then computes these to rounding
     verbose     : True to print OSQP's table of iterations
 
-    Raises TooDenseError where the contact leaves the convex range, and SolverError where OSQP is
-    missing or does not solve the program.
+    Raises TooDenseError where contacts are too crowded for a convex program, and SolverError where
+    OSQP is missing or does not solve the program.
     """
 
     bristles: int = 64
@@ -104,7 +104,7 @@ class BristleQP:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates in the problem's units. `start` is not used."""
+        """The loads of the candidates, in scaled units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.through(self.run)
         if self.newton_step:
@@ -124,7 +124,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
     m       : number of bristles in each row
     solver  : name of the solver, for error messages
-    box     : (n,) loads B;  cut : (n,) True where the box was cut to the convex range
+    box     : (n,) B;  cut : (n,) True where the box was cut to make the program convex
     hessian : (n, n) A + diag(h), positive definite
     """
 
@@ -142,7 +142,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, m, solver, *_convex_box(problem, solver))
 
     def apply(self) -> QuadraticProgram:
-        """The program. Rows of constraints: phi_ij, sum_j e_ij / m, and a prescribed total load."""
+        """The program. Its rows are phi_ij, sum_j e_ij / m, and the total load if prescribed."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
@@ -188,7 +188,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The box of loads, where it is cut to the convex range, and the definite A + diag(h)."""
+    """The box of loads, where it is cut to be convex, and the definite matrix A + diag(h)."""
     approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
@@ -213,7 +213,7 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
 
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
-    """A + diag(h) on the box; None unless Cholesky's method finds it definite with MARGIN."""
+    """A + diag(h) on the box; None unless Cholesky's method finds it definite with `MARGIN`."""
     root = np.sqrt(1.0 / problem.stiffness(box))
     scaled = problem.influence.matrix * root * root[:, None]
     np.fill_diagonal(scaled, 1.0 - MARGIN)

@@ -1,9 +1,9 @@
-"""The choice of boxes and the check of the answer, for all solvers of the cone program.
+"""The choice of boxes and the check of answers, for all solvers of the cone program.
 
-The lifted program (docs/theory/exact-cones.md) is exact in boxes 0 <= P_i <= B_i whose convexity
-numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five). A box that
-contains the a priori bound is used if it is small enough, and cut otherwise. If the solution
-reaches a cut face, five cones are tried; if it does so again, the scene is refused ("Which box").
+docs/theory/exact-cones.md, "Which box" and "Loads and gaps from the answer". The program is exact
+on boxes 0 <= P_i <= B_i of loads with convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i of at
+most 21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the
+solution reaches a cut face, five cones are tried; if it does so again, the scene is refused.
 """
 
 from __future__ import annotations
@@ -24,33 +24,31 @@ from convexrough.solvers.programs import ProgramAnswer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Asperities whose a priori bound, relative to the largest, is at most this are left out of the
-#: program; only a Newton step can give them a load. A heuristic: if it were too large, the check of
-#: the contact law, which includes all asperities, would fail.
+#: Asperities with an a priori bound below this part of the largest are left out of the program; a
+#: Newton step can give them a load. A heuristic: the answer is checked for all asperities.
 NEGLIGIBLE = 1e-12
 
-#: Ratio of the contact radius of a box to that of the a priori bound, where the convex range
-#: allows. On the bound itself an asperity without neighbours would be at t = 1, with both the slack
-#: and the multiplier 0: interior-point methods lose half their digits there. The value is a
-#: heuristic: any wider box would do, with a larger S.
+#: Contact radius at the end of a box over that of the a priori bound, unless the box is cut. If the
+#: box ended at the bound, an isolated asperity would have a slack and a multiplier of 0, where
+#: interior-point methods lose half their digits. A heuristic: any larger value would do.
 WIDENED = 1.1
 
-#: With a Newton step: the largest residual max |g| over |D0| + max |d_i| that is accepted. If the
-#: first step leaves more, a second is taken, as few, weakly coupled asperities sometimes need.
+#: With a Newton step: the largest accepted residual max |g| over |D0| + max |d_i|. If the first
+#: step leaves more, a second one follows.
 ACCURATE = 1e-13
 
-#: Without a Newton step: the largest max |P - P(D - A P)| over max P that is accepted, over the
-#: square root of the tolerance. An energy within the tolerance fixes the loads to its square root
-#: times a constant; ten is a heuristic for this constant.
+#: Without a Newton step: the largest accepted max |P - P(D - A P)| over max P, over the square root
+#: of the tolerance, because the error of loads is proportional to the root of that of the energy.
+#: The value is a heuristic.
 ROOTS = 10.0
 
 
 class TooDenseError(InputError):
-    """Asperities whose contacts leave the convex range, a_i < (pi/2) s_i.
+    """Asperities whose contact radii are too large for a convex program: a_i > (pi/2) s_i.
 
     asperities : (m,) their indices in the scene
-    ratios     : (m,) the contact radius that each asperity would reach with its neighbours kept in
-        the convex range, over (pi/2) s_i; s_i is half the distance to the nearest neighbour
+    ratios     : (m,) contact radius of each over (pi/2) s_i, if its neighbours stay below their
+        limits; s_i is half the distance to the nearest neighbour
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -69,10 +67,10 @@ class TooDenseError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class ConeBoxes:
-    """The asperities of a lifted program, their boxes, and the form of their cones.
+    """The asperities of a cone program, their boxes, and the form of their cones.
 
     members : (m,) candidates in the program
-    loads   : (m,) B_i, the loads at t = 1
+    loads   : (m,) B_i, upper ends of the boxes
     S       : (m,) convexity numbers of the boxes
     cut     : (m,) True where B_i is below the a priori bound
     five    : True for the five-cone form;  limit : largest S for which the form is exact
@@ -99,18 +97,18 @@ class ConeBoxes:
         return cls(members, loads, S, faces < bounds, five, limit)
 
     def energies(self, problem: NormalProblem) -> Array:
-        """k B^(5/3) (m,); the energy h of one asperity is this times (3/5) t^5 - (S/3) t^6."""
+        """(m,) k B^(5/3), the factor of (3/5) t^5 - (S/3) t^6 in the local energy at P = B t^3."""
         energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
         return energies
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
-        """The loads (n,) of all candidates from those of the members (m,), clipped to the boxes."""
+        """(n,) loads of all candidates from those of the members (m,), limited to the boxes."""
         everywhere = np.zeros(len(problem))
         everywhere[self.members] = np.clip(loads, 0.0, self.loads)
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The error for members that reach a cut face; `pressed` (m,) has their ratios, else 0."""
+        """The error for members on a cut face; `pressed` (m,) has their `ratios`, 0 for others."""
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -123,10 +121,9 @@ class ConeSolver(ABC):
     newton_step : end with a step of Newton's method, which reduces errors of some 1e-8 of the
         largest load to rounding; a second step follows if the first is not accurate enough
 
-    With Newton steps, touching asperities must have gaps  |g_i| <= 1e-13 (|D0| + max |d_i|)  and
-    open ones no larger overlap. Without, loads must satisfy
-    max |P - P(D - A P)| <= 10 sqrt(tolerance) max P.  Otherwise SolverError is raised, and
-    TooDenseError where the boxes of the convex range do not contain the solution.
+    After Newton steps the gaps must satisfy  |g_i| <= 1e-13 (|D0| + max |d_i|)  where loaded, and
+    -g_i <= the same elsewhere. Without them, max |P - P(D - A P)| <= 10 sqrt(tolerance) max P. Else
+    SolverError is raised, or TooDenseError if the cut boxes do not contain the solution.
     """
 
     tolerance: float = 1e-9
@@ -138,7 +135,7 @@ class ConeSolver(ABC):
     @property
     @abstractmethod
     def formulation(self) -> str:
-        """The name without the Newton step."""
+        """The name of the solver without its Newton step."""
 
     @abstractmethod
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
@@ -155,7 +152,7 @@ class ConeSolver(ABC):
     ) -> Solution:
         """The loads of the candidates, with four cones, or five if the solution reaches a cut face.
 
-        `start` is not used: the solvers choose their own starting point.
+        start : not used
         """
         try:
             return solve_in(self, problem, ConeBoxes.choose(problem))
@@ -166,7 +163,7 @@ class ConeSolver(ABC):
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
     """The checked solution with one form of the cones."""
     most = float(boxes.loads.sum())
-    if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
+    if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
         raise boxes.too_dense(problem, solver.name, pressed)
     return judged(solver, problem, boxes, solver.answer(problem, boxes))
@@ -175,9 +172,9 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> So
 def judged(
     solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes, answer: ProgramAnswer
 ) -> Solution:
-    """The answer as a solution, checked against the contact law. Raises as `ConeSolver` says.
+    """The answer as a solution, checked against the contact law. Raises what `ConeSolver` raises.
 
-    The sign of D - A P tells open asperities from lightly loaded ones ("What comes back").
+    The sign of D - A P separates open asperities from lightly loaded ones.
     """
     if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
         raise SolverError(
@@ -212,11 +209,7 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """The `ratios` (m,) of TooDenseError where a cut face stops an asperity; else 0.
-
-    The excess of its indentation over that of its box, and the distance of its load from the face,
-    both relative, are complementary: at the solution one of the two is 0.
-    """
+    """(m,) the `ratios` of TooDenseError for members that a cut face stops, 0 for others."""
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads
@@ -227,7 +220,7 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """One or two steps of Newton's method, from the loads or from `alone`, the loads P(D - A P).
+    """The solution after one or two Newton steps from `loads` or from `alone`, the P(D - A P).
 
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
     Each asperity starts from the more accurate of the two, also where a load is almost 0.

@@ -1,13 +1,8 @@
 """The contact law as one second-order cone program, solved with Clarabel.
 
-    minimise    sum e_i [(3/5 - S_i/3) y5_i + (S_i/3) z_i] + (1/2) p'M p - D'p
-    subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed.
-
-The unknowns are the loads p and, for each asperity, the lifted variables y1 to y5 and z. The loads
-lie in boxes 0 <= p <= B with convexity numbers S_i. D = D0 + d is the approach plus the offsets
-(under a prescribed load D0 is an upper bound on the approach), e = k B^(5/3) with the local
-coefficients k, and M = A + diag(shells) is positive semidefinite, with the compliance operator A.
-The loads of every solution satisfy the contact law (docs/theory/exact-cones.md).
+It is (1) of docs/theory/exact-cones.md: D = D0 + d is the approach (under a prescribed load an
+upper bound on it) plus the offsets, and M = A + diag(shells). The solution satisfies the contact
+law.
 """
 
 from __future__ import annotations
@@ -41,7 +36,7 @@ STOPPED = ("Solved", "AlmostSolved")
 class Conic(ConeSolver):
     """A solver of the cone program with Clarabel, an interior-point method.
 
-    tolerance      : tolerance of the duality gap and of feasibility, in the problem's units
+    tolerance      : tolerance of the duality gap and of feasibility, in scaled units
     max_iterations : largest number of iterations
     """
 
@@ -52,7 +47,7 @@ class Conic(ConeSolver):
         return "conic"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
-        """The loads and the approach that Clarabel returns for these boxes, not yet checked."""
+        """Clarabel's loads and approach for these boxes, not yet checked."""
         lifted = LiftedProgram.assemble(problem, boxes)
         raw = run_clarabel(
             lifted.apply(),
@@ -74,10 +69,9 @@ class Conic(ConeSolver):
 
 @dataclass(frozen=True, eq=False)
 class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
-    """The cone program on boxes 0 <= p <= B (docs/theory/exact-cones.md, "The lifted program").
+    """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are the loads p, then y2 to y5 and z (with five cones y1 to y5 and z), each in a
-    block of n.
+    The variables are p, then y2 to y5 and z (with five cones y1 to y5 and z), in blocks of n.
     """
 
     problem: NormalProblem
@@ -90,7 +84,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:
-        """The program: rows for the total load, if prescribed, then p = B y3, then the cones."""
+        """The program: rows for the total load if prescribed, for p = B y3, and for the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, boxes = self.problem, self.boxes

@@ -1,7 +1,7 @@
 """The contact law as one second-order cone program, written in CVXPY to be read.
 
-It is the program of `conic.py`, with the names of docs/theory/exact-cones.md. It is convex by
-CVXPY's rules (DCP), and CVXPY compiles it once for all approaches (DPP).
+It is the program of `conic.py`, with the names of docs/theory/exact-cones.md. It satisfies CVXPY's
+rules of convexity (DCP) and of parameters (DPP), so it is compiled once for all approaches.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class _Options(NamedTuple):
     steps: int
 
 
-#: Solvers that are not listed keep their own tolerance and limit. Clarabel, ECOS and QOCO are
-#: interior-point methods and take about twenty iterations; SCS is a first-order method and takes
-#: thousands. Tolerances are those of primal and dual feasibility and of the duality gap.
+#: Options of CVXPY's solvers; others keep their own tolerances and limits. Tolerances are those of
+#: primal and dual feasibility and of the duality gap. SCS, a first-order method, needs thousands of
+#: iterations; interior-point methods need about twenty.
 OPTIONS = {
     "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
     "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
@@ -58,8 +58,8 @@ PACKAGES = {
 class ConicCVXPY(ConeSolver):
     """A solver of the cone program through CVXPY, with any of its second-order cone solvers.
 
-    tolerance      : absolute and relative tolerance of feasibility and of the duality gap, in the
-        problem's units; a solver not named in `OPTIONS` keeps its own
+    tolerance      : absolute and relative tolerance of feasibility and of the duality gap, in
+        scaled units; a solver that `OPTIONS` does not name keeps its default
     max_iterations : largest number of iterations; None for 200 (SCS: 20,000)
     solver         : a name from `cvxpy.installed_solvers()`, in upper or lower case
     verbose        : True to print the output of CVXPY and of the solver
@@ -97,7 +97,7 @@ class ConicCVXPY(ConeSolver):
             options = dict.fromkeys(names.tolerances, self.tolerance) | {names.limit: steps}
         advice = "try more max_iterations, a larger tolerance, or another solver"
         try:
-            with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
+            with warnings.catch_warnings():  # the contact law shows the accuracy
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
                 program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
@@ -110,11 +110,8 @@ class ConicCVXPY(ConeSolver):
 
 
 def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
-    """The reason why CVXPY cannot use this solver, and what to do; None if it can.
-
-    A package is named only if the solver's name is correct.
-    """
-    from cvxpy.reductions.solvers import defines  # which solver knows which cones
+    """The reason why CVXPY cannot use this solver, and what to do; None if it can."""
+    from cvxpy.reductions.solvers import defines  # the cones that each solver accepts
 
     conic = defines.SOLVER_MAP_CONIC
     able = [name for name in conic if cp.SOC in conic[name].SUPPORTED_CONSTRAINTS]
@@ -138,7 +135,7 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
     """A compiled cone program as CVXPY objects, in the scaled units of `normal`.
 
-    settings : the solver;  normal : the contact problem;  boxes : bounds on its loads
+    settings : the solver;  normal : the contact problem;  boxes : bounds on the loads
     program  : the cvxpy.Problem
     D0       : cvxpy.Parameter: the approach, or its upper bound if the load is prescribed
     p        : cvxpy.Variable: the loads of `boxes.members`
@@ -163,7 +160,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @classmethod
     def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: ConeBoxes) -> LiftedModel:
-        """Program (1) of docs/theory/exact-cones.md; for five cones, (2) replaces its first."""
+        """Program (1) of docs/theory/exact-cones.md, or (2) with five cones."""
         cp = load_library("cvxpy", settings.name)
         i, n = boxes.members, len(boxes.members)
         checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
@@ -178,7 +175,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         energy = (
             (e * (3 / 5 - S / 3)) @ y5
             + (e * S / 3) @ z
-            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # its own check is known to fail on valid M
+            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # CVXPY's own check fails on some valid M
             - (D0 + d) @ p
         )
         link = p == cp.multiply(B, y3)
@@ -195,9 +192,10 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     def solve(self, approach: float | None = None) -> Solution:
-        """The solution of the program, compiled only once.
+        """The solution of the program, which is compiled only once.
 
-        approach : a new approach in units of `normal`, at most its `approach_bound`; or unchanged
+        approach : a new approach in scaled units, at most `normal.approach_bound`; default:
+            unchanged
         """
         normal = self.normal
         if approach is not None:
@@ -219,17 +217,17 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @property
     def loads(self) -> Array:
-        """(m,) loads of the last solution in units of `normal`, not checked."""
+        """(m,) loads of the latest solution in scaled units, not checked."""
         return np.array(self.p.value)
 
     @property
     def approach(self) -> float:
-        """The prescribed approach, or the one from the multiplier of the total load."""
+        """The prescribed approach, or that from the multiplier of the total load."""
         return float(self.D0.value - (0.0 if self.total is None else self.total.dual_value))
 
     @property
     def gaps(self) -> Array:
-        """(m,) gaps of the last solution, from the multipliers of `link`."""
+        """(m,) gaps of the latest solution in scaled units, from the multipliers of `link`."""
         gaps: Array = np.maximum(-self.link.dual_value, 0.0)
         return gaps
 
@@ -238,8 +236,6 @@ _LIFT = ("y1", "y2", "y3", "y4", "y5", "z")
 
 
 def _cones(cp: Any, y1: Any, y2: Any, y3: Any, y4: Any, y5: Any, z: Any, *, five: bool) -> Any:
-    """The cones of equations (1) and (2), each of the form x y >= w^2 with x, y >= 0."""
-
     def rotated(x: Any, y: Any, w: Any) -> Any:
         return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
 

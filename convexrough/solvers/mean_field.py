@@ -1,8 +1,8 @@
-"""A start for many asperities, from the mean displacement of each ring about the axis.
+"""Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-The asperities are sorted into rings, and the load of a ring is assumed to be spread evenly over it
-(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, for any heights and radii). The only unknown of
-a ring is its displacement w, and Newton's method solves  w = K P(w).
+With the loads P(w) at displacements w of rings about the axis, and the displacements K by unit
+loads spread evenly over the rings, Newton's method solves  w = K P(w)  (Greenwood and Tripp, J.
+Appl. Mech. 34 (1967) 153, for any heights and radii).
 """
 
 from __future__ import annotations
@@ -15,23 +15,20 @@ from convexrough.arrays import Array, Indices
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
-#: Largest number of rings, and mean number of asperities in a ring at least. Heuristics.
+#: Largest number of rings, and least mean number of asperities in a ring. Heuristics.
 RINGS, LEAST = 128, 150
 
-#: Approximate number of asperities that are evaluated; of more, an evenly spaced sample is.
+#: Approximate size of the evenly spaced sample of asperities that is used.
 SAMPLE = 50_000
 
-#: An evenly spread load includes the asperity's own share, which must be subtracted: this factor
-#: times the potential of a disc with the asperity's share of the area. Ewald's sums give 1.1002 for
-#: square and 1.1061 for hexagonal arrays; for other layouts it is a heuristic.
+#: The displacement by an evenly spread load includes that by the asperity's own share. It is this
+#: factor times that of a disc with the asperity's share of the area: 1.1002 for square and 1.1061
+#: for hexagonal arrays by Ewald's sums, and a heuristic for other layouts.
 OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """Indentations (n,) of the candidates in the problem's units, negative where open.
-
-    If the displacements of the rings are not found, the indentations are those of a smooth sphere.
-    """
+    """(n,) indentations in scaled units, negative where open; `smooth_indentation` if it fails."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
@@ -42,7 +39,7 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
 def _mean_field(problem: NormalProblem) -> Array:
     count = max(4, min(RINGS, len(problem) // LEAST))
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
-    # Rings of equal area; in the squared distance, sphere and displacement are nearly straight.
+    # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
     limits = float(squares.max()) * np.linspace(0.0, 1.0, count + 1)
     edges, middle = np.sqrt(limits), np.sqrt((limits[1:] + limits[:-1]) / 2.0)
     every = max(1, len(problem) // SAMPLE)
@@ -72,7 +69,7 @@ def _mean_field(problem: NormalProblem) -> Array:
         defect = w - K @ P
         system = np.eye(count) + K * c
         if problem.load is not None:
-            # one more unknown, the change of the approach, and one more equation, the load
+            # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
             missing = problem.load - float(P.sum())
             step = np.linalg.solve(system, np.append(-defect, missing))
@@ -89,10 +86,7 @@ def _mean_field(problem: NormalProblem) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Rings:
-    """For each asperity the ring before it, and its relative distance to the next ring.
-
-    An asperity counts for both rings, so that sums do not jump where it crosses an edge.
-    """
+    """For each asperity the ring before it and its relative distance to the next one."""
 
     first: Indices
     share: Array
@@ -100,24 +94,24 @@ class _Rings:
 
     @classmethod
     def of(cls, places: Array, count: int) -> _Rings:
-        """Asperities at squared distances `places` (n,), in units of the width of a ring."""
+        """The rings of asperities at squared distances `places` (n,), over a ring's width."""
         first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
         return cls(first, places - 0.5 - first, count)
 
     def sums(self, values: Array) -> Array:
-        """Sums (count,) over the rings. Outside the middles of all rings the nearest gets all."""
+        """(count,) sums over the rings; at both ends the nearest ring gets all."""
         outer = np.clip(self.share, 0.0, 1.0) * values
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]
         return total
 
     def between(self, values: Array) -> Array:
-        """Values (n,) at the asperities, interpolated linearly between the rings' middles."""
+        """(n,) values at the asperities, interpolated linearly between the middles of the rings."""
         return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
 
 
 def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
-    """Contact radius and radius of a smooth sphere at the approach, or under the load."""
+    """Contact radius and radius of a smooth sphere under the prescribed approach or load."""
     scene = problem.scene
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
     if problem.load is None:

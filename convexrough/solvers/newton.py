@@ -1,15 +1,9 @@
-"""Newton's method for pressing, on the normal map.
+"""Newton's method for the normal problem: docs/theory/newton.md.
 
-The unknown is delta: the indentation of a touching asperity, minus the gap of an open one. With
-P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
-
-    F(delta) = delta + A P(delta) - D = 0,
-
-which `convex.newton` solves: an asperity touches where its delta is positive
-(docs/theory/newton.md). In the convex range every step lowers the energy Phi(P(delta)).
-
-For many asperities the iteration includes only those near the contact. When it has ended, the gaps
-of the others are computed; if one of them is negative, the iteration goes on with more asperities.
+The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
+P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
+D = D0 + d of `NormalProblem`. For many asperities the iteration includes only those near the
+contact, until the others are found to be open.
 """
 
 from __future__ import annotations
@@ -28,27 +22,27 @@ from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: Number of candidates up to which the iteration includes all. It affects speed only.
+#: Number of candidates up to which the iteration includes all of them. It affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
 ACCURATE = 1e-12
 
-#: Asperities are near the contact if their gap is at most this part of the largest prescribed
-#: approach. It affects speed only: asperities that are left out are checked at the end.
+#: Asperities are near the contact if their gap is at most this part of the largest D_i. It affects
+#: speed only.
 MARGIN = 0.03
 
 
 @dataclass(frozen=True)
 class Newton:
-    """A solver with Newton's method on the normal map.
+    """A solver with Newton's method.
 
     tolerance : stop at  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|);  0 for
         the accuracy of float64
+    max_iterations : largest number of steps; SolverError is raised if they are not enough
 
-    Once that residual is below 1e-12 (|D0| + max_i |d_i|), the method also stops if it is small
-    compared with the rounding of A P, which the certificate includes, or if a step does not halve
-    it. Raises SolverError if `max_iterations` steps are not enough.
+    Once that residual is below 1e-12 (|D0| + max_i |d_i|), the method also stops if the residual is
+    small compared with the rounding of A P, or if a step does not halve it.
     """
 
     tolerance: float = 0.0
@@ -60,9 +54,9 @@ class Newton:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates in the problem's units, from any start >= 0."""
+        """The loads of the candidates in scaled units, from any start >= 0."""
         loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration stops early: this step refines
+        if self._refines(problem):  # the iteration has stopped early
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
@@ -70,7 +64,6 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
-        """The loads (n,), the approach and the number of steps."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -80,7 +73,7 @@ class Newton:
         iterations = 0
         while True:
             begin = indentation[near]
-            del indentation  # to save memory: vectors take half of it
+            del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
@@ -105,14 +98,14 @@ class Newton:
         near: Indices,
         indentation: Array,
     ) -> tuple[PressingState, int]:
-        """The solution for some of the candidates; all others carry no load."""
+        """The solution in which all candidates that are not `near` carry no load."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
-            if self._refines(problem):  # later changes are linear, and refinement makes them
+            if self._refines(problem):  # refinement does the rest, which is linear
                 stopping = replace(stopping, linear=negligible(indentation))
             return newton.solve(law, state, stopping)
         except SolverError as error:
@@ -122,7 +115,7 @@ class Newton:
 
 
 def newton_step(problem: NormalProblem, loads: Array) -> Solution:
-    """One step from the loads (n,) of another solver, in the problem's units, not negative.
+    """The solution after one step from the loads (n,) >= 0 of another solver, in scaled units.
 
     An error e of the loads becomes about e^2, and loads of open asperities become exactly 0.
     """
@@ -134,13 +127,12 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """Initial indentations: of the given loads (-1 where 0), or `start_indentation`."""
+    """Initial indentations: those under the given loads (-1 where 0), or `start_indentation`."""
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
 def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    """Loads and gaps of all candidates; those that are not near carry no load."""
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -1,4 +1,4 @@
-"""The law of contact for Newton's method: docs/theory/newton.md, "The normal map"."""
+"""The contact law in the form of `convex.newton`: docs/theory/newton.md, "The normal map"."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton's method may end at a defect of this part of the indentations: refinement then leaves
-#: about its square. A heuristic.
+#: Newton's method may end at a defect of this fraction of the indentations, which refinement about
+#: squares. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
 
@@ -24,7 +24,7 @@ class PressingState(NamedTuple):
     displacement: Array  # A P
     gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
     defect: Array  # F
-    approach: float  # D0, under load control its latest estimate
+    approach: float  # D0; under load control the latest estimate
     energy: float
     residual: float  # max |F|
     scale: float  # |D0| + max |d_i|
@@ -32,7 +32,7 @@ class PressingState(NamedTuple):
 
 @dataclass(frozen=True)
 class Pressing:
-    """The law of contact, for `convex.newton`.
+    """The contact law, in the form of `convex.newton`.
 
     farthest : max |d_i| over all candidates, also those that are not in the problem
     """
@@ -50,7 +50,7 @@ class Pressing:
         root = np.sqrt(ratio)
         loads = ratio * root
         displacement = problem.influence.apply(loads)
-        gap = indentation + displacement - problem.offsets  # less D0
+        gap = indentation + displacement - problem.offsets  # D0 is subtracted below
         approach = problem.approach
         if approach is None:
             approach = float(root @ gap / root.sum())
@@ -66,7 +66,7 @@ class Pressing:
         approach: float,
     ) -> PressingState:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
-        if self.problem.load is not None:  # Phi has the gap less D0
+        if self.problem.load is not None:  # Phi has D0 = 0 under load control
             energy += approach * float(loads.sum())
         # At an open asperity any delta <= 0 gives the same loads: take minus the gap, or 0.
         touching = loads > 0
@@ -97,7 +97,7 @@ class Pressing:
         )
 
     def gradient(self, state: PressingState) -> Array:
-        """The gap."""
+        """The gradient of the energy: the gap."""
         return state.gap
 
     def energy_rounding(self, state: PressingState) -> float:
@@ -107,7 +107,7 @@ class Pressing:
         return self.problem.influence.rounding(state.forces).negligible(state.displacement)
 
     def advice(self, state: PressingState) -> str:
-        """Advice that depends on the convexity number where the method stopped."""
+        """What to try, which depends on the convexity number where the method stopped."""
         number = self.problem.convexity_number(state.forces)
         if number < 1:
             return (
@@ -122,7 +122,7 @@ class Pressing:
 
 
 def negligible(indentation: Array) -> float:
-    """2-norm of a defect that is small enough for the iteration to end and refinement to follow."""
+    """The 2-norm of F at which the iteration may end and refinement follow."""
     return NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
 
 

@@ -1,8 +1,7 @@
 """Programs in standard form, their solution by libraries, and conversions to and from problems.
 
 A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
-and Boyd, J. Control Decis. 5 (2018) 42). A few lines per library run Clarabel, OSQP and the solvers
-of CVXPY: data in, raw answer out. docs/how-to/solvers.md adds another.
+and Boyd, J. Control Decis. 5 (2018) 42). docs/how-to/solvers.md adds another solver.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ Found = TypeVar("Found")
 
 
 class Reduction(ABC, Generic[Data, Raw, Found]):
-    """A problem as a program; its fields are the data that the conversion back needs.
+    """A problem as a program; the fields are the data that the conversion back needs.
 
-    A class method `assemble(problem, ...)` makes it. It raises an error that names the asperities
-    for which the program is not exact, or InputError where the program does not fit in memory.
+    The class method `assemble(problem, ...)` of a subclass makes it. It raises an error that names
+    the asperities for which the program is not exact, or InputError if memory is too small.
     """
 
     @abstractmethod
@@ -39,18 +38,18 @@ class Reduction(ABC, Generic[Data, Raw, Found]):
 
     @abstractmethod
     def invert(self, raw: Raw) -> Found:
-        """The answer to the problem, in its order and units, from that to the program."""
+        """The answer to the problem, in its order and units, from the answer to the program."""
 
     def through(self, run: Callable[[Data], Raw]) -> Found:
-        """The answer to the problem; `run` solves the program."""
+        """The answer to the problem; the function `run` solves the program."""
         return self.invert(run(self.apply()))
 
 
 class ConeProgram(NamedTuple):
     """minimise (1/2) x'P x + q'x  subject to  A x + s = b.
 
-    The first entries of s are 0. All others lie in second-order cones of three entries each,
-    s_1 >= || (s_2, s_3) ||.
+    The first `equalities` entries of s are 0. All others lie in second-order cones of three entries
+    each, s_1 >= || (s_2, s_3) ||.
     """
 
     quadratic: csc_matrix  # P, upper triangle
@@ -66,10 +65,10 @@ class ConeProgram(NamedTuple):
     def dual(self) -> ConeProgram:
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
-        The variables are v, one for each variable that is in P, then z. Entries of z at equalities
-        are free; second-order cones are their own duals. At any feasible point minus the objective
-        is a lower bound on the minimum of the program, and the largest such bound equals it. The
-        multipliers of the equations are then -x.
+        The variables are v, one for each variable with an entry in P, then z. Entries of z at
+        equalities are free. At any feasible point minus the objective is a lower bound on the
+        minimum of the program. At the solution it equals the minimum, and the multipliers of the
+        equations are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 
@@ -111,24 +110,24 @@ class QuadraticProgram(NamedTuple):
 
 
 class RawAnswer(NamedTuple):
-    """The answer of a solver to a program in standard form."""
+    """A solver's answer to a program in standard form."""
 
     x: Array
     multipliers: Array  # of the rows of A
     iterations: int
-    status: str  # the solver's own status
+    status: str  # as the solver names it
 
 
 class ProgramAnswer(NamedTuple):
     """The answer of a program to a normal problem, not yet checked."""
 
-    loads: Array  # of its members, in the problem's order and units
-    approach: float  # from the multiplier of the total load, if that is prescribed
+    loads: Array  # of the asperities in the program, in the problem's order and units
+    approach: float  # prescribed, or from the multiplier of the total load
     iterations: int
 
 
 def load_library(package: str, solver: str) -> Any:
-    """The module `package`, imported when first used; else a SolverError of `solver`."""
+    """The module `package`, imported when first used. Raises SolverError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -142,7 +141,7 @@ def load_library(package: str, solver: str) -> Any:
 def run_clarabel(
     program: ConeProgram, solver: str, tolerance: float, **settings: object
 ) -> RawAnswer:
-    """Solve a cone program by Clarabel, an interior-point method; `settings` are Clarabel's."""
+    """The answer of Clarabel, an interior-point method; `settings` are Clarabel's."""
     clarabel = load_library("clarabel", solver)
     chosen = clarabel.DefaultSettings()
     chosen.verbose = False
@@ -159,7 +158,7 @@ def run_clarabel(
 
 
 def _goes_on(info: Any) -> bool:
-    """Log a step of Clarabel; return False, so that it continues."""
+    """Log a step of Clarabel; False means that Clarabel shall continue."""
     residual = max(info.res_primal, info.res_dual, info.gap_rel)
     log_step("clarabel", info.iterations, info.cost_primal, residual)
     return False
@@ -172,7 +171,7 @@ def run_osqp(
     max_iterations: int,
     verbose: bool = False,
 ) -> RawAnswer:
-    """Solve a quadratic program by OSQP, a first-order method, with polishing of the active set."""
+    """The answer of OSQP, a first-order method that then polishes the active set."""
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
         what = f"OSQP {osqp.__version__} is too old"

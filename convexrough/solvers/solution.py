@@ -15,12 +15,11 @@ from convexrough.record import Record
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Record):
-    """Loads of the candidates and the approach, in the problem's units.
+    """Loads of the candidates and the approach, in scaled units.
 
-    residual : residual of the contact law, as in `problem.residual`; with a trial, an upper bound
-        on that of the trial's loads
-    refine   : True if the loads may be corrected to more digits; False if they are to be certified
-        as they are
+    residual : residual of the contact law, as `problem.residual`; with a trial, an upper bound on
+        the residual of the loads of the trial
+    refine   : True if the loads may be corrected to more digits; False to certify them unchanged
     trial    : these loads to more digits, if the solver has computed them; else None
     """
 
@@ -48,7 +47,7 @@ class Solution(Record):
 
 
 class Solver(Protocol):
-    """The interface of solvers: frozen settings. Poor answers are not returned: SolverError."""
+    """The interface of solvers: frozen settings. SolverError replaces inaccurate answers."""
 
     @property
     def name(self) -> str: ...

@@ -1,4 +1,4 @@
-"""The default start of Newton's method."""
+"""The default initial indentations of Newton's method."""
 
 from __future__ import annotations
 
@@ -11,26 +11,24 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.sphere import hertz
 
-#: Largest number of candidates whose start uses a product with A. It affects speed only.
+#: Largest number of candidates for which a product with A is used. It affects speed only.
 FEW = 1000
 
-#: Ratio of the squared contact radii of a rough and a smooth sphere, from the source paper's scene.
-#: A heuristic; it affects speed only.
+#: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
 WIDER = 1.1
 
 
 def start_indentation(problem: NormalProblem) -> Array:
-    """Indentations (n,) of the candidates in the problem's units, negative where open."""
+    """(n,) indentations of the candidates in scaled units, negative where open."""
     if len(problem) > FEW:
         return mean_field_indentation(problem)
     return _on_hertz_pressure(problem)
 
 
 def _on_hertz_pressure(problem: NormalProblem) -> Array:
-    """Indentations D - A P for loads P = x^3 s proportional to the smooth sphere's pressure.
+    """D - A P for loads P = x^3 s, s = (1 - r^2 / a^2)^(1/2): like Hertz's pressure.
 
-    s = (1 - r^2 / a^2)^(1/2). x follows from a prescribed load, or minimises the energy at a
-    prescribed approach:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
+    x follows from a prescribed load, or minimises the energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
     """
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
     inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
@@ -44,7 +42,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
         return prescribed - problem.load / total * displacement
     local, coupled = float(s @ (problem.coefficients * np.cbrt(inside))), float(s @ displacement)
     x = math.sqrt(work / local)
-    for _ in range(8):  # from the right of the root of a convex function
+    for _ in range(8):  # Newton's method from the right of the root
         x -= (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
 

@@ -29,29 +29,29 @@ def width_under(force: Number) -> Number:
 
 
 def width_between(force: Number, left: Number) -> Number:
-    """x under a force t >= 0; `left` is 1 - t, with its own relative accuracy."""
+    """x under a force t >= 0; `left` is 1 - t, which keeps its relative accuracy."""
     s = np.cbrt(np.maximum(left, 0.0))
     return np.minimum(force, 1.0) / (1.0 + s + s * s)
 
 
 def force(x: Number) -> Number:
-    """t = 1 - s^3."""
+    """The shear force t = 1 - s^3."""
     s = 1.0 - x
     return x * (1.0 + s * (1.0 + s))
 
 
 def deflection(x: Number) -> Number:
-    """phi = 1 - s^2."""
+    """The deflection phi = 1 - s^2."""
     return x * (2.0 - x)
 
 
 def potential(x: Number) -> Number:
-    """The integral of phi over t."""
+    """The integral of phi over t from 0."""
     s = 1.0 - x
     return x * x * (0.4 + s * (0.8 + s * (1.2 + s * 0.6)))
 
 
 def loss(x: Number) -> Number:
-    """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], as in `mindlin.loss`."""
+    """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], as `mindlin.loss`."""
     s = 1.0 - x
     return x * x * x * (1.0 + s * (3.0 + s)) / 6.0

@@ -1,13 +1,6 @@
-"""A smooth ellipsoid on a half-space: Hertz's ellipse of contact, by Carlson's integrals.
+"""A smooth ellipsoid on a half-space: docs/theory/bodies.md, with Carlson's integrals.
 
-The pressure p0 sqrt(1 - x^2/a^2 - y^2/b^2) moves the surface under it by p0 a b / (2 E*) times the
-integral over w > 0 of (1 - x^2/(a^2 + w) - y^2/(b^2 + w)) / sqrt((a^2 + w)(b^2 + w) w). This must
-equal delta - x^2/(2 Rx) - y^2/(2 Ry). With p0 a b = 3 P / (2 pi) it does if
-
-    1/Rx = (P / (pi E*)) R_D(0, b^2, a^2),     1/Ry = (P / (pi E*)) R_D(0, a^2, b^2),
-    delta = (3 P / (2 pi E*)) R_F(0, a^2, b^2).
-
-Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; the integrals: DLMF 19.16.
+Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; the integrals R_D and R_F: DLMF 19.16.
 """
 
 from __future__ import annotations
@@ -16,7 +9,7 @@ import math
 
 
 def slenderness(ratio: float) -> float:
-    """b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1."""
+    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1."""
     from scipy.optimize import brentq
     from scipy.special import elliprd
 
@@ -31,7 +24,7 @@ def slenderness(ratio: float) -> float:
 def semi_axes(
     load: float, contact_modulus: float, radii: tuple[float, float]
 ) -> tuple[float, float]:
-    """[length] a along x and b along y."""
+    """[length] the semi-axes a along x and b along y."""
     from scipy.special import elliprd
 
     largest = max(radii)

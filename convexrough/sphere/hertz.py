@@ -1,7 +1,7 @@
 """One sphere on an elastically similar half-space: Hertz's law and its relatives.
 
-Arguments are scalars or arrays in consistent units. E* is the contact modulus, R the relative
-radius. Indentations are the approach of distant points of the two bodies.
+Arguments are scalars or arrays in consistent units: load P, contact modulus E*, relative radius R,
+contact radius a. Indentations delta are the approach of distant points of the two bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 """
 
@@ -18,23 +18,23 @@ LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
 
 
 def local_coefficient(contact_modulus: Number, radius: Number) -> Number:
-    """k of the local law  indentation = k load^(2/3),  k = (9 / (16 E*^2 R))^(1/3)."""
+    """The coefficient k = (9 / (16 E*^2 R))^(1/3) of the local law  indentation = k load^(2/3)."""
     return _cube_root(9.0 / (16.0 * contact_modulus**2 * radius))
 
 
 def indentation(load: Number, coefficient: Number) -> Number:
-    """delta = k P^(2/3)."""
+    """The indentation k P^(2/3)."""
     return coefficient * np.cbrt(load) ** 2
 
 
 def load(indentation: Number, coefficient: Number) -> Number:
-    """P = (max(delta, 0) / k)^(3/2); 0 for a separated sphere."""
+    """The load (max(delta, 0) / k)^(3/2); 0 for a separated sphere."""
     ratio = np.maximum(indentation, 0.0) / coefficient
     return ratio * np.sqrt(ratio)
 
 
 def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Number:
-    """a = (3 P R / (4 E*))^(1/3)."""
+    """The contact radius (3 P R / (4 E*))^(1/3)."""
     return _cube_root(3.0 * load * radius / (4.0 * contact_modulus))
 
 
@@ -46,12 +46,12 @@ def _cube_root(value: Number) -> Number:
 
 
 def peak_pressure(contact_radius: Number, contact_modulus: Number, radius: Number) -> Number:
-    """p0 = 2 E* a / (pi R), the same as (6 P E*^2 / (pi^3 R^2))^(1/3)."""
+    """The peak pressure p0 = 2 E* a / (pi R), the same as (6 P E*^2 / (pi^3 R^2))^(1/3)."""
     return 2.0 * contact_modulus * contact_radius / (np.pi * radius)
 
 
 def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) -> Number:
-    """p(r) = p0 sqrt(1 - r^2 / a^2) inside the contact, 0 outside."""
+    """The pressure p0 sqrt(1 - r^2 / a^2) inside the contact, 0 outside, at a distance r."""
     ratio = np.divide(distance, contact_radius)
     return peak_pressure * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
 
@@ -71,7 +71,7 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
 
 
 def less_sine(angle: Number) -> Number:
-    """x - sin(x), from its series for x < 1."""
+    """The difference x - sin(x), from its series for x < 1."""
     small = np.square(np.minimum(angle, 1.0))
     series = LESS_SINE[0]
     for coefficient in LESS_SINE[1:]:

@@ -1,9 +1,9 @@
 """The tangential law of one sphere at constant normal load (Cattaneo and Mindlin).
 
-Results are functions of t = Q / (f P), in units of c_t f threshold (displacements) and of
-c_t f^2 P threshold (energies), with the indentation threshold = k P^(2/3) and c_t from `ratio`.
-They are computed with the polynomials of `annulus`, so each is accurate relative to its own value,
-even if it is of third order in t.
+Arguments are t = Q / (f P), the shear force over the friction limit. Displacements are in units of
+c_t f threshold and energies in units of c_t f^2 P threshold, with the indentation
+threshold = k P^(2/3) and c_t from `ratio`. The polynomials of `annulus` keep the relative accuracy
+of each result, also where it is of third order in t.
 Source: Johnson, Contact Mechanics (1985), chapter 7.
 """
 
@@ -16,17 +16,17 @@ from convexrough.sphere import annulus
 
 
 def ratio(poisson_ratio: Number) -> Number:
-    """c_t = (2 - nu) / (2 (1 - nu)): tangential over normal compliance."""
+    """Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)) of tangential to normal compliance."""
     return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
 
 
 def deflection(t: Number) -> Number:
-    """phi(t) = 1 - (1 - t)^(2/3), of either sign: phi(-t) = -phi(t)."""
+    """The deflection phi(t) = 1 - (1 - t)^(2/3), of either sign: phi(-t) = -phi(t)."""
     return np.copysign(annulus.deflection(annulus.width_under(t)), t)
 
 
 def force(deflection: Number) -> Number:
-    """t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; +-1 for |phi| >= 1."""
+    """The force t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; +-1 for |phi| >= 1."""
     return np.copysign(annulus.force(annulus.width_at(deflection)), deflection)
 
 
@@ -36,9 +36,9 @@ def potential(t: Number) -> Number:
 
 
 def loss(t: Number) -> Number:
-    """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
+    """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
 
     A cycle between Q and -Q loses (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)) in both bodies, with
-    the shear modulus G and the contact radius a. This equals (24/5) c_t f^2 P threshold e.
+    the shear modulus G and the contact radius a.
     """
     return annulus.loss(annulus.width_under(t))

@@ -1,11 +1,9 @@
-"""`smooth`: closed forms of the equivalent smooth sphere, for comparison with a rough contact.
+"""`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
-The smooth sphere is the base of a scene without asperities, under the same load: Hertz's contact,
-with the theory of Cattaneo, Mindlin and Deresiewicz under shear. With the load P, friction f,
-t = Q / (f P), Mindlin's ratio c_t and the approach delta, tangential displacements are c_t f delta
-times the functions of t of `convexrough.sphere.mindlin`. All results are for both bodies.
-Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper, which
-gives displacements and losses of one body.
+The smooth sphere is the sphere of a scene without asperities, under the same load: Hertz's contact,
+with the theory of Cattaneo, Mindlin and Deresiewicz under shear. Results are for both bodies.
+Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper (Dini and
+Hills 2009), which gives displacements and losses of one body.
 """
 
 from __future__ import annotations
@@ -28,24 +26,24 @@ from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
-    """The base of a scene without asperities, a `SmoothSphere` or `SmoothEllipsoid`.
+    """The contact of a scene without asperities: a `SmoothSphere` or `SmoothEllipsoid`.
 
     load : [force] normal load P
 
-    Raises InputError for a flat base or a cylinder, which have no smooth contact of finite size.
+    Raises InputError for a flat or a cylinder, which have no smooth contact of finite size.
 
     >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # the rough one's is 5e-5
     4.184e-05
     """
     checks.instance("scene", scene, Scene)
     if (found := smooth_reference(scene, checks.positive("load", load))) is None:
-        expected = "a sphere or an ellipsoid: other bases have no smooth reference"
+        expected = "a sphere or an ellipsoid: other shapes have no smooth reference"
         raise InputError("scene", found=base.named(scene.sphere_radius), expected=expected)
     return found
 
 
 def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
-    """`smooth`, or None for bases without a smooth reference."""
+    """The result of `smooth`, or None for a flat or a cylinder."""
     if isinstance(scene.sphere_radius, tuple):
         return None if math.inf in scene.sphere_radius else SmoothEllipsoid(scene, load)
     return SmoothSphere(scene, load) if scene.curved else None
@@ -53,10 +51,11 @@ def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SmoothSphere(Record):
-    """A smooth sphere under a normal load P, and under shear forces at this load.
+    """A smooth sphere under a normal load P, and under shear forces Q at this load.
 
     Methods take numbers or arrays. Tangential results raise InputError if the scene has no friction
-    or a shear force exceeds f P.
+    or a shear force exceeds f P, the coefficient of friction times the load. nu is Poisson's ratio,
+    G the shear modulus.
 
     >>> whole = cr.smooth(scene, load=contact.load)
     >>> print(f"{whole.contact_radius:.4g}", f"{whole.displacement(0.25 * contact.load):.3g}")
@@ -70,7 +69,7 @@ class SmoothSphere(Record):
 
     @property
     def radius(self) -> float:
-        """[length] radius R; for an ellipsoid base see `SmoothEllipsoid.radius`."""
+        """[length] radius R; for an ellipsoid see `SmoothEllipsoid.radius`."""
         return self.scene.mean_radius
 
     @cached_property
@@ -99,15 +98,15 @@ class SmoothSphere(Record):
 
     @property
     def largest_force(self) -> float:
-        """[force] f P, at which gross sliding begins."""
+        """[force] the friction limit f P, at which gross sliding begins."""
         return self._friction * self.load
 
     def stick_radius(self, force: ArrayLike) -> Any:
-        """[length] c = a_H (1 - |Q| / (f P))^(1/3) under a shear force Q [force]."""
+        """[length] stick radius c = a_H (1 - |Q| / (f P))^(1/3) under a shear force [force]."""
         return self.contact_radius * np.cbrt(1.0 - np.abs(self._share("force", force)))
 
     def traction(self, distance: ArrayLike, force: ArrayLike) -> Any:
-        """[force / length^2] shear traction on first loading, at a distance r from the axis.
+        """[force / length^2] shear traction after loading from rest, at a distance r from the axis.
 
         It is f p0 [sqrt(1 - r^2/a_H^2) - (c/a_H) sqrt(1 - r^2/c^2)], the last root 0 for r > c.
         """
@@ -117,15 +116,17 @@ class SmoothSphere(Record):
         )
 
     def displacement(self, force: ArrayLike) -> Any:
-        """[length] X = (3 (2-nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)] on first loading."""
+        """[length] displacement along the shear after loading from rest.
+
+        X = (3 (2 - nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)].
+        """
         return self._largest_displacement * mindlin.deflection(self._share("force", force))
 
     def branch(self, force: ArrayLike, turning_force: float) -> Any:
-        """[length] displacement after first loading to `turning_force` and back to `force`.
+        """[length] displacement after loading from rest to `turning_force` and back to `force`.
 
         Masing's rule [14]-[15]: X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force
-        Q1 and the `displacement` X(Q) of first loading. A positive Q1 gives the unloading branch of
-        a cycle, a negative one the reloading branch.
+        Q1 and X of `displacement`.
         """
         turning = checks.finite("turning_force", turning_force)
         first = self.displacement(turning)
@@ -142,7 +143,7 @@ class SmoothSphere(Record):
         """[force length] energy lost per steady cycle between two shear forces, [16].
 
         It is W0 e((maximum - minimum) / (2 f P)), with the `energy_scale` W0 and the function e of
-        `mindlin.loss`. The minimum defaults to -maximum.
+        `mindlin.loss`. The default minimum is -maximum.
         """
         upper = self._share("maximum", maximum)
         lower = -upper if minimum is None else self._share("minimum", minimum)
@@ -158,7 +159,7 @@ class SmoothSphere(Record):
 
     @property
     def _largest_displacement(self) -> float:
-        """[length] c_t f delta = 3 (2 - nu) f P / (8 G a_H), the displacement at Q = f P."""
+        """[length] 3 (2 - nu) f P / (8 G a_H), the displacement at Q = f P."""
         ratio = mindlin.ratio(self.scene.material.poisson_ratio)
         return float(ratio * self._friction * self.approach)
 
@@ -180,10 +181,10 @@ class SmoothSphere(Record):
 class SmoothEllipsoid(SmoothSphere):
     """A smooth ellipsoid, with results like those of `SmoothSphere`.
 
-    Its contact is an ellipse with the semi-axes a, b. The contact radius is sqrt(a b), the distance
+    The contact is an ellipse with the semi-axes a, b. The contact radius is sqrt(a b), the distance
     of a point is s sqrt(a b) with s^2 = x^2/a^2 + y^2/b^2, and the stick zone is an ellipse of the
-    same shape. As in rough contacts, the ratio of tangential to normal compliance is approximated
-    by c_t, its mean over all directions; this is exact at nu = 0.
+    same shape. The ratio of tangential to normal compliance is approximated by its mean over all
+    directions, Mindlin's ratio; this is exact at nu = 0.
 
     >>> oval = cr.Scene((1.0, 2.0), scene.asperities, scene.material)
     >>> "{:.4g} {:.4g}".format(*cr.smooth(oval, load=contact.load).semi_axes)
@@ -194,7 +195,7 @@ class SmoothEllipsoid(SmoothSphere):
 
     @property
     def radius(self) -> float:
-        """[length] radius 9 P^2 / (16 E*^2 delta^3) of the sphere with the same approach."""
+        """[length] radius of the sphere with the same load and approach."""
         return 9.0 * self.load**2 / (16.0 * self._modulus**2 * self.approach**3)
 
     @cached_property

@@ -1,12 +1,12 @@
 """One sphere under a shear force along x: traction and tangential displacement of the surface.
 
-In the theory of Cattaneo and Mindlin, with t = Q / (f P), the contact radius a and the stick radius
-c = a (1 - |t|)^(1/3), the traction is
+In the theory of Cattaneo and Mindlin, with t = Q / (f P), the peak pressure p0, the contact radius
+a and the stick radius c = a (1 - |t|)^(1/3), the traction is
 
     q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)],    the last root 0 for r > c.
 
-Both terms become equal as t -> 0. The functions below do not subtract them, but use
-1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from `mindlin.deflection`, and so keep their relative accuracy.
+Both terms become equal as t -> 0. The functions use 1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from
+`mindlin.deflection`, and so keep their relative accuracy.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 7.
 """
 
@@ -62,7 +62,7 @@ def surface_displacement(
     )  # a^2 - c^2, an area over pi like all areas here
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
-    sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a), and so on
+    sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a)
     cosine_a = np.sqrt(np.maximum(r_squared - a_squared, 0.0))
     sine_c = np.sqrt(np.maximum(np.square(sine_a) - b_area, 0.0))
     cosine_c = np.sqrt(np.square(cosine_a) + b_area)

@@ -1,12 +1,12 @@
-"""The contact of a whole map by boundary elements, for comparison with its asperities.
+"""The contact of a whole map by boundary elements, for comparison with the asperity model.
 
 Each pixel is a rectangle of uniform pressure p on an elastic half-space. The contact law is
 
     p >= 0,    g = K p - h >= 0,    p g = 0
 
 for each pixel, with the gap g, the overlap h of the undeformed bodies at the approach, and the
-compliance operator K of the half-space. Pressures only increase gaps, so pixels with h <= 0 are
-open.
+compliance operator K of the half-space. Pixels with h <= 0 are open, as pressures only increase
+gaps.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class HalfSpace:
     """The operator from pressures on pixels to displacements at their centres, of both bodies.
 
     A pixel of unit pressure displaces the surface by (1 / (pi E*)) times the integral of 1/r over
-    it, in the closed form of Love (1929). The product is a convolution, computed by Fourier
-    transforms on a grid twice as wide, which avoids periodic images.
+    it, in the closed form of Love (1929). Fourier transforms on a grid twice as wide, which avoids
+    periodic images, compute the product.
     """
 
     def __init__(
@@ -47,13 +47,13 @@ class HalfSpace:
         sizes = zip(steps, pixel[::-1], strict=True)
         edges = [(np.arange(each.max() + 2) - 0.5) * size for each, size in sizes]
         y, x = edges[0][:, None], edges[1]
-        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # d2/dxdy of it is 1/r
+        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # its d2/dxdy is 1/r
         influence = np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)
         # An even kernel has a real transform.
         self.symbol = fft.rfft2(influence[np.ix_(*steps)], workers=1).real.copy()
 
     def displacement(self, pressure: Array) -> Array:
-        """The displacements K p. Rows that are zero, or not needed, are not transformed."""
+        """[length] the displacements K p."""
         (rows, columns), (down, across) = self.shape, self.padded
         waves = fft.fft(fft.rfft(pressure, across, axis=1, workers=1), down, axis=0, workers=1)
         waves *= self.symbol
@@ -62,7 +62,7 @@ class HalfSpace:
 
 
 def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float = ACCURACY) -> Array:
-    """The pressures that solve the contact law, by conjugate gradients on the touching pixels.
+    """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
     The method of Polonsky and Keer (Wear 231, 1999) at a given approach: each step sets negative
     pressures to 0 and adds pixels on which the bodies overlap; after an addition the directions
@@ -101,7 +101,7 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Whole(Table):
-    """The contact of a whole map by boundary elements, and of its asperities at the same approach.
+    """The contact of a whole map by boundary elements, and of the asperities at the same approach.
 
     contact   : contact of the asperities
     pressures : (ny, nx) [force/length^2] pressures on the pixels
@@ -144,7 +144,7 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits; its approach and its base, centred on the map, are used
+    contact : contact of the map's summits; its approach and sphere (centred on the map) are used
 
     Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
 
@@ -181,14 +181,14 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
 
 
 def _places(surface: Surface, every: int) -> tuple[Array, Array]:
-    """The coordinates x of columns and y of rows, of every so many pixels."""
+    """The coordinates x of columns and y of rows, every `every`-th of them."""
     (rows, columns), (dx, dy) = surface.heights.shape, surface.pixel
     x, y = (np.arange(columns) - (columns - 1) / 2) * dx, (np.arange(rows) - (rows - 1) / 2) * dy
     return x[::every], y[::every]
 
 
 def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, float]:
-    """The pressures for every so many pixels along each side, and their total load."""
+    """The pressures on every `every`-th pixel along each side, and the total load."""
     x, y = _places(surface, every)
     overlap = contact.approach + surface.heights[::every, ::every]
     for radius, axes in contact.scene.curved:

@@ -13,7 +13,7 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and the relative step that ends them.
+#: Largest number of Gauss-Newton steps to the best sphere, and the relative size of the last one.
 STEPS, ENOUGH = 50, 1e-12
 
 
@@ -46,14 +46,7 @@ class Removed:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The best least-squares plane or sphere, and its height at each pixel.
 
-    A sphere, or a plane with k = 0, is
-
-        z = a + b x + c y + k (x^2 + y^2 + z^2) / 2
-
-    with the curvature k / sqrt(1 + b^2 + c^2 - 2 a k), positive for a bowl. So
-    z = 2 q / (1 + sqrt(1 - 2 k q)) with q = a + b x + c y + k (x^2 + y^2) / 2, and the derivatives
-    of z by a, b, c, k are their factors over 1 - k z. The Gauss-Newton method starts at the best
-    paraboloid; for a plane one step is exact. Lengths are over half the map's size.
+    docs/theory/surfaces.md, "Removing the form". Lengths are over half the map's size.
 
     Raises InputError if no sphere fits.
     """
@@ -86,6 +79,5 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:
-    """The least-squares coefficients of the factors, from the normal equations."""
     normal = [[float(np.vdot(one, other)) for other in factors] for one in factors]
     return np.asarray(np.linalg.solve(normal, [float(np.vdot(each, misfit)) for each in factors]))

@@ -35,7 +35,7 @@ OFF_GRID = 0.05
 
 
 class HeightGrid(NamedTuple):
-    """The heights in a file, with nan for holes, and the pixel and units that it states.
+    """The heights in a file, with nan for holes, and the pixel and units that the file states.
 
     pixel : size along x and y, None if not stated;  unit, height_unit : "" if not stated
     """
@@ -49,11 +49,11 @@ class HeightGrid(NamedTuple):
 def read_grid(path: Path) -> HeightGrid:
     """The map in a text file: a matrix of heights, a line for each row; or columns x, y and height.
 
-    Files with three columns are taken as x, y and height. Comments above a matrix may state its
+    Files with three columns are taken as x, y and height. Comments above a matrix may state the
     width and height with a unit, and the unit of the values.
 
-    Raises FileError if the file is not text, and InputError with row and column if its contents are
-    not a map.
+    Raises FileError if the file is not text, and InputError with row and column if it contains no
+    map.
     """
     comments: list[str] = []
     body: list[tuple[int, str]] = []
@@ -82,7 +82,7 @@ def _style(body: Sequence[tuple[int, str]]) -> Style | None:
 
 
 def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    """The numbers in all lines; empty cells, and words such as BAD, are holes."""
+    """The numbers in all lines; empty cells, and texts such as BAD, are holes."""
     rows: list[Array] = []
     for number, line in body:
         cells = ["nan" if it.lower() in HOLES else it for it in stripped(style.split(line))]
@@ -115,7 +115,7 @@ def _refuse_numbers(path: Path, place: str, line: Array) -> None:
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix, with its size and units from comments."""
+    """The matrix, with the size and units that comments state."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
         said[found[1].lower().rstrip("s")] = found[2]

@@ -1,11 +1,6 @@
-"""The hills of a map: the positions and prominences of its maxima.
+"""The hills of a map, with positions and prominences of the maxima.
 
-The *prominence* of a maximum is its height above the highest pass on any way to a taller maximum.
-Wolf pruning (ISO 25178-2, ISO 16610-85) merges the hill with the least height above its highest
-saddle into the hill beyond this saddle, and repeats this until all heights exceed a threshold. The
-hill beyond the saddle is always taller, as the saddle bounds it, too. So a hill is merged exactly
-if its prominence is below the threshold. Prominences do not depend on the threshold, and one sort
-of the passes gives all of them.
+docs/theory/surfaces.md, "Pruning".
 """
 
 from __future__ import annotations
@@ -39,8 +34,8 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position. So all but one maxima of a plateau have the
-    prominence 0; these are left out.
+    Pixels of equal height are ordered by position, and maxima of prominence 0 are left out, so that
+    a plateau has one maximum.
     """
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)
@@ -68,16 +63,14 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    A way between two maxima crosses from hill to hill at pairs of neighbours; inside a hill it need
-    not go below the crossing at which it enters. So the graph of hills with the highest crossing of
-    each pair has the same passes, and so has a spanning tree of it (Kruskal).
+    A spanning tree of the graph of hills with the highest crossing of each pair (Kruskal) has them.
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
     highest_first = np.lexsort((-rank, second, first))
     first, second, rank = first[highest_first], second[highest_first], rank[highest_first]
     new = np.append(True, (np.diff(first) != 0) | (np.diff(second) != 0))[: len(first)]
-    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1: none counts as missing
+    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, as 0 means no edge
     graph = coo_array((weights, (first[new], second[new])), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 

@@ -11,14 +11,14 @@ from convexrough.arrays import Array, Indices
 #: Steps (row, column) from a pixel to neighbours along a side, so each pair is found once.
 SIDES = ((0, 1), (1, 0))
 
-#: Distance of a spike from the median, over the standard deviation that the quartiles suggest.
+#: Least distance of a spike from the median, over the standard deviation that quartiles suggest.
 OUTLYING = 6.0
 
 
 def spikes(heights: Array) -> Indices:
-    """(m, 2) row and column of outlying pixels of which no two neighbours have such a height.
+    """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
 
-    Neighbours differ from it by more than half of its distance from the median.
+    A similar neighbour differs by at most half of the outlier's distance from the median.
     """
     low, middle, high = np.quantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
@@ -32,10 +32,10 @@ def spikes(heights: Array) -> Indices:
 
 
 def clipped(heights: Array) -> int:
-    """The number of pixels with exactly the largest height, if these are surprisingly many.
+    """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    That is if they are at least ten, and more than those below in the next 1 % of the range, or at
-    the next height of all.
+    Many means at least ten, and more than in the next 1 % of the range of heights or at the second
+    largest height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -45,10 +45,9 @@ def clipped(heights: Array) -> int:
 
 
 def filled(heights: Array) -> Array:
-    """The map with each hole (nan) replaced so that it is the mean of its neighbours.
+    """The map with each hole (nan) filled by the mean of its neighbours.
 
-    Such a harmonic function has no maximum inside, so no filled pixel becomes a summit. At the edge
-    of the map only existing neighbours count. At least one pixel must not be a hole.
+    No filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
     number = np.full(heights.shape, -1)

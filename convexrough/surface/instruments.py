@@ -22,7 +22,7 @@ def read_instrument(
     Raises FileError if SurfaceTopography cannot read the file or is not installed.
     """
     try:
-        with catch_warnings(action="ignore", category=ImportWarning):  # MPI is not installed
+        with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
             from SurfaceTopography import open_topography
             from SurfaceTopography.Exceptions import ReadFileError
     except ImportError as error:

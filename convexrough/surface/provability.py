@@ -24,10 +24,10 @@ from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.surface.summits import Summits
 
-#: The default prunings of a curve, as fractions of the largest height.
+#: Default prunings, as fractions of the height Sz of the map.
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: Crowding above which contact discs overlap, and the largest model error that is trusted.
+#: Crowding above which contact discs overlap, and the largest trusted model error.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
 #: A function that presses a sphere on asperities.
@@ -73,13 +73,13 @@ class Provability(Table, Plottable):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(m,) true if all statuses are proved, no discs overlap, and model errors are <= 5 %."""
+        """(m,) True if all statuses are proved, no discs overlap, and model errors are <= 5 %."""
         proved = np.isin(self.scope, ("global", "local")) & (self.undecided == 0)
         return frozen(proved & (self.crowding <= OVERLAP) & (self.model_error <= TOO_FAR))
 
     @property
     def trusted_from(self) -> float:
-        """The pruning from which on all are trusted; nan if the strongest is not."""
+        """The weakest pruning from which on all are trusted; nan if the strongest is not."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
@@ -117,7 +117,7 @@ def provability(
 
 
 def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
-    """Pairs (m, 2) of asperities with a crowding above a value, and their crowdings (m,).
+    """Pairs (m, 2) of asperities with a crowding above a value, and the crowdings (m,).
 
     The crowding is (a_i + a_j) / r_ij, with contact radii a and distance r. The largest are first.
 
@@ -143,9 +143,10 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
 def model_errors(contact: Contact) -> Array:
     """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
 
-    The Hertz pressure of a neighbour displaces the surface by a_j^2 / (10 r_ij^2) times
-    P_j / (pi E* r_ij) more than a point force does. The sum over neighbours is divided by the
-    asperity's prescribed approach D0 + d_i.
+    The Hertz pressure of a neighbour with contact radius a_j and load P_j displaces the surface by
+    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij) more than a point force does, at the distance r_ij.
+    The sum over neighbours is divided by the asperity's prescribed approach D0 + d_i (d_i: the
+    scene's `offsets`).
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

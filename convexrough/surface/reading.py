@@ -27,8 +27,8 @@ HEIGHTS = ("heights", "height", "z")
 #: Rms slopes outside this range suggest different units of heights and pixels.
 SLOPES = (1e-5, 10.0)
 
-#: Numbers that mark holes, and the size from which any number does. Only numbers count that differ
-#: from the median of all other heights by more than FAR times their range.
+#: Numbers that mark holes, if they differ from the median of all other heights by more than FAR
+#: times the range of these; and the size from which on any such number marks a hole.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference up to which two pixel sizes count as equal.
@@ -103,7 +103,6 @@ def _pixel(
 
 
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
-    """The heights without holes, and the number of holes filled."""
     marks = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     if marks.any() and (rest := heights[~marks & ~np.isnan(heights)]).size:
         marks &= np.abs(heights - np.median(rest)) > FAR * np.ptp(rest)
@@ -123,20 +122,18 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
 
 
 def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> HeightGrid:
-    """The map in a file, read according to its suffix."""
     kind = path.suffix.lower()
     with reading(path):
         if kind in TEXT:
             return read_grid(path)
         if kind in (".npy", ".npz", ".mat"):
             return _arrays(path)
-        from convexrough.surface.instruments import read_instrument  # heavy: only when asked
+        from convexrough.surface.instruments import read_instrument  # slow to import
 
         return read_instrument(path, pixel, unit)
 
 
 def _arrays(path: Path) -> HeightGrid:
-    """The map of a file of arrays."""
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
     if "" in found:
         return HeightGrid(_numbers(found[""]))

@@ -1,4 +1,4 @@
-"""The results of the command `summits`: printed text, JSON and tables."""
+"""The output of the command `summits`: printed text, JSON and tables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: Columns of summits.csv beside x, y, height and tip_radius, which a scene file reads.
+#: Columns of summits.csv; a scene file reads x, y, height and tip_radius.
 COLUMNS = ("x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
            "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations")  # fmt: skip
 
@@ -43,13 +43,13 @@ MOST_LISTED = 10
 #: Fraction of a map's half width beyond which contact causes a warning.
 NEAR_EDGE = 0.9
 
-#: Largest relative difference between a statistic and its value by moments without a warning.
+#: Largest difference of a statistic from its value by moments, relative to this, without a warning.
 UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """A surface, all its summits, those left by pruning, and the result of pressing them.
+    """A surface, all summits, those left by pruning, and the result of pressing these.
 
     curve, contact : None if not pressed; contact also if no solution was found
     whole : the whole map by boundary elements, or None
@@ -141,7 +141,7 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def curve_columns(curve: Provability) -> dict[str, NDArray[Any]]:
-    """The columns of the curve, with a row for each pruning."""
+    """The columns of contacts against pruning, with a row for each pruning."""
     return curve.columns(*Provability._along["level",])
 
 
@@ -193,7 +193,6 @@ def describe_surface(scanned: Scanned) -> list[str]:
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
-    """The statistics of the summits, and of a Gaussian surface with the same moments."""
     maxima, left = scanned.maxima.statistics, scanned.summits.statistics
     moments, unit = scanned.surface.moments, scanned.surface.unit
     units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
@@ -226,7 +225,6 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
 
 
 def _describe_crowded(contact: Contact) -> list[str]:
-    """The overlapping pairs of summits, and the summits with large model errors."""
     pairs, values = crowded(contact)
     lines = []
     if len(pairs):
@@ -280,7 +278,7 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
         if width > diameter:
             yield (
-                f"the map is {width:.4g} {surface.unit} wide, and the base {diameter:.4g} "
+                f"the map is {width:.4g} {surface.unit} wide, and the sphere {diameter:.4g} "
                 f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
             )
     if scanned.whole is not None:

@@ -43,7 +43,8 @@ def self_affine(
 ) -> Surface:
     """A square periodic map with a self-affine spectrum.
 
-    hurst     : Hurst exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst))
+    hurst     : Hurst exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst)) with the wave
+        number q
     rms_slope : root mean square of the slope |grad z|
     rolloff   : [length] wavelength; the spectrum of longer waves is constant
     seed      : of the random phases. Amplitudes are not random, so all maps have the same moments

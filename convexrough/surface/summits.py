@@ -56,7 +56,7 @@ class Origin(Record):
 
     @property
     def threshold(self) -> float:
-        """[length] the least prominence."""
+        """[length] The least prominence of a hill."""
         return self.prune * self.max_height
 
     @property
@@ -78,7 +78,7 @@ class Statistics(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Summits(Table, Asperities, Plottable):
-    """Asperities that are the summits of a map, in order of the heights of their maxima.
+    """Asperities that are the summits of a map, in descending order of the heights of their maxima.
 
     positions, tip_radii, heights : of the tops of fitted paraboloids; the tip radius is
         1 / sqrt(k1 k2)

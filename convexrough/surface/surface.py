@@ -21,10 +21,10 @@ from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, find_summits
 from convexrough.tabular.units import known_unit
 
-#: Largest ratio of the sides of a pixel; summits are not resolved by longer ones.
+#: Largest ratio of the sides of a pixel; longer ones do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: Part of the variance above which a trend causes a warning, and pixels along a side that are used.
+#: Part of the variance above which a trend causes a warning, and fitted pixels along a side.
 MOST, FITTED = 0.5, 256
 
 #: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
@@ -195,7 +195,7 @@ class Surface(Record, Plottable):
                        unit=into.name, removed=tuple(removed))  # fmt: skip
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
-        """The summits of the map as asperities, in order of the heights of their maxima.
+        """The summits of the map as asperities, in descending order of the heights of their maxima.
 
         prune : hills with a prominence below this fraction of `max_height` are merged into taller
             ones (Wolf pruning, ISO 25178-2)
@@ -203,7 +203,7 @@ class Surface(Record, Plottable):
             fitted
 
         Hills are left out if this square does not lie in the map, or if their paraboloid has no top
-        in the square; `origin` has their numbers.
+        in the square; `origin` has the numbers of both.
 
         Raises InputError for maps smaller than the square, or if no summit is left.
 

@@ -13,13 +13,13 @@ from convexrough.arrays import Array, Indices
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about maxima. Only entries with `whole` true have a meaning.
+    """Paraboloids fitted about maxima. Only entries with `whole` True have a meaning.
 
     offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first
     deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
-    whole      : (n,) true if curved downwards in every direction, with the top among the pixels
+    whole      : (n,) True if curved downwards in every direction, with the top among the pixels
     """
 
     offsets: Array
@@ -34,12 +34,10 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
 
     pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
     pixel  : [length] sizes along x and y
-
-    z = z0 + g.r + r.H.r / 2 has its top at -H^-1 g; its curvatures are the eigenvalues of -H.
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so all are about 1
     terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
     around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
     z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
@@ -54,7 +52,7 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
     product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
     larger = np.where(whole, middle + half, 1.0)
-    curvatures = np.stack((larger, product / larger), axis=1)  # no difference of near equals
+    curvatures = np.stack((larger, product / larger), axis=1)  # avoids cancellation
     summits = z0 + (gu * top[0] + gv * top[1]) / 2
     x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
@@ -67,15 +65,10 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
 def elliptic_load(ratio: Array) -> Array:
     """(n,) load of an elliptic tip over that of the sphere of radius 1 / sqrt(k1 k2).
 
-    Both are Hertz contacts on a flat with the same indentation. ratio : (n,) k1 / k2, at least 1
+    Both are Hertz contacts on a flat with the same indentation: docs/theory/surfaces.md, "Tips",
+    and Johnson (1985), eqs 4.26 to 4.28.
 
-    With the ratio b / a of the half axes of the contact and the complete elliptic integrals K, E
-    of the parameter 1 - (b / a)^2,
-
-        k1 / k2 = (E (a/b)^2 - K) / (K - E).
-
-    The indentation is F2 times that of the sphere under the same load (Johnson 1985, eqs 4.26 to
-    4.28), and loads grow as indentation^(3/2).
+    ratio : (n,) k1 / k2, at least 1
     """
     flattened = np.array(np.maximum(ratio, 1.0), dtype=np.float64)
     round_enough = flattened < 1 + 1e-7  # the error is below the square of 1e-7

@@ -1,1 +1,1 @@
-"""Sweeps over many scenes: their enumeration, measures, workers and tables."""
+"""Sweeps over many scenes: scenes, measured numbers, workers and tables."""

@@ -1,4 +1,4 @@
-"""Batches: consecutive scenes that a worker computes together, and their rows."""
+"""Batches: consecutive scenes that a worker computes together, and their rows of the table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 
-#: With the same versions of these packages rows are the same, bit for bit.
+#: Versions of the packages that decide the last bits of rows.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
 Columns = dict[str, NDArray[Any]]
@@ -38,21 +38,21 @@ class Batch:
 
 
 class BatchRows(NamedTuple):
-    """The rows of a batch, and the versions of the programs that computed them."""
+    """The rows of a batch, and the versions of the packages that computed them."""
 
     columns: Columns
     versions: Mapping[str, str]
 
 
 def different(versions: Mapping[str, str]) -> str:
-    """The versions that differ from those of this process, in words; "" if none."""
+    """The versions that differ from those of this process, as text; "" if none."""
     said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
             if versions.get(name) != here)  # fmt: skip
     return ", ".join(said)
 
 
 def compute(batch: Batch) -> BatchRows:
-    """The rows of a batch. Each depends only on its scene; that of a failed scene has the error."""
+    """The rows of a batch, each from its scene alone; the row of a failed scene has the error."""
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Asked](), dict[int, Row]()
         for number in batch.numbers:
@@ -67,10 +67,7 @@ def compute(batch: Batch) -> BatchRows:
 
 
 def _row(asked: Asked, known: Measured | None, columns: tuple[Column, ...]) -> Row:
-    """The row of one scene.
-
-    known : its numbers if it was measured together with others, else None
-    """
+    """The row of one scene; `known` has its numbers if they were measured with others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.pressed(), asked.stages, wanted)

@@ -14,13 +14,13 @@ from convexrough.plots.notebook import Figure
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
-#: Quantiles at the ends of the two bands, and of the line between them.
+#: Quantiles that bound the two bands, and that of the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Up to so many combinations of the other swept keys have their own bands; more are merged.
+#: Largest number of combinations of other swept keys with bands of their own; more are merged.
 MOST_BANDS = 4
 
-#: Number of bins for the many values of a random key.
+#: Number of bins for random keys, which have many values.
 BINS = 20
 
 #: Colour, line and marker of each band; all differ also in grey.
@@ -33,8 +33,8 @@ def draw_quantiles(
     """Axes with the median and bands from 5 to 95 % and 25 to 75 %, of all rows that did not fail.
 
     columns : the columns `measured` and `over`, `status`, and the `others`
-    others  : other swept keys that are not random; each combination of their values has its own
-        bands if these are few
+    others  : other swept keys that are not random; each combination of their values has bands of
+        its own if there are at most four
     """
     if axes is None:
         axes = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained").subplots()
@@ -52,7 +52,6 @@ def draw_quantiles(
 
 
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
-    """The name and the rows of each band."""
     if others:
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)

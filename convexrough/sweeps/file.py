@@ -1,4 +1,4 @@
-"""Sweep files: a scene file with a table [sweep] of keys that vary, checked value by value."""
+"""Sweep files: scene files with a table [sweep] of keys that vary."""
 
 from __future__ import annotations
 
@@ -35,7 +35,6 @@ def _are_seeds(seeds: int | list[int]) -> bool:
 
 
 def _is_law(table: dict[Law, list[float]]) -> bool:
-    """Whether the table has one law with two valid numbers."""
     if len(table) != 1 or not all(len(pair) == 2 for pair in table.values()):
         return False
     [(law, (first, second))] = table.items()
@@ -118,9 +117,9 @@ def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = Non
 def plan_of(
     contents: Mapping[str, Any], path: Path, measure: Sequence[str] | None = None, text: str = ""
 ) -> Plan:
-    """The plan of the tables of a sweep file.
+    """The plan of a sweep, from the tables of a sweep file.
 
-    path : of the file, for messages and for relative paths in it
+    path : the sweep file, for messages; paths in the tables are relative to its folder
 
     Raises SceneFileError with every mistake.
     """
@@ -134,7 +133,7 @@ def plan_of(
     keys, mistakes = validate_table("sweep", table, Keys)
     mistakes += _nothing_random(_dict(table), tables)
     if keys is None or mistakes:
-        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # values still missing
+        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # checked later
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
         rest = [each for each in others if "missing table" not in each]
         raise SceneFileError(str(path), [*mistakes, *rest])
@@ -158,7 +157,7 @@ def _swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterable[str]:
-    """The mistake of seeds without anything random: all scenes would be the same."""
+    """The mistake of seeds if nothing is random, so that all scenes would be the same."""
     given = {*_dict(tables.get("asperities"))}
     given |= {key.removeprefix("asperities.") for _, key in _swept(table)}
     rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
@@ -170,7 +169,7 @@ def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iter
 
 
 def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
-    """The first scene, and the mistakes in all values, each checked once."""
+    """The tables of the first scene, and the mistakes in all swept values."""
     first = grid.point(0)
     study, mistakes = validate(grid.with_values(*first))
     for where, axes in (("together", grid.together), ("over", grid.over)):
@@ -183,7 +182,6 @@ def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
 
 
 def _summit_files(grid: Grid) -> set[str]:
-    """The paths of all files of asperities."""
     key = "asperities.path"
     swept = [values for each, values in (*grid.together, *grid.over) if each == key]
     paths = swept[0] if swept else [grid.tables.get("asperities", {}).get("path")]

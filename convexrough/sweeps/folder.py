@@ -1,7 +1,7 @@
-"""The folder of a sweep: a manifest that never changes, and parts, each written once as a whole.
+"""The folder of a sweep: a manifest that never changes, and parts, each written once.
 
 A part is a Parquet file of consecutive rows, named by its first scene. All parts have the same
-number of rows, so each has the same content whichever process computes it, and when.
+number of rows, so their contents do not depend on the process that computes them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ MANIFEST, PARTS = "manifest.json", "parts"
 
 @dataclass(frozen=True)
 class Folder:
-    """A folder of results."""
+    """The folder of a sweep on disk."""
 
     path: Path
     manifest: Mapping[str, Any]
 
     def scenes(self, first: int) -> range:
-        """The scenes of the part that begins with this one."""
+        """The scenes of the part that begins with scene `first`."""
         return range(first, min(first + self.manifest["batch"], self.manifest["scenes"]))
 
     def parts(self) -> list[range]:
@@ -50,7 +50,7 @@ class Folder:
         write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
-        """Some columns of a part, by default all. Raises FileError if it is damaged."""
+        """Some columns of a part, by default all. Raises FileError if the part is damaged."""
         pyarrow, parquet = arrow()
         path = self.file(part)
         try:
@@ -71,7 +71,7 @@ class Folder:
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """The parts to compute, and a line on those found. Damaged parts are removed.
+        """The parts to compute, and a message about parts found. Damaged parts are removed.
 
         Raises FileError if parts exist and `resume` is false.
         """
@@ -119,10 +119,10 @@ def open_folder(path: Path) -> Folder:
 
 
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
-    """The folder of this sweep, created if it does not exist.
+    """The folder of a sweep, created if it does not exist.
 
     Raises FileError if it contains another sweep or other files, or cannot be written, and
-    ExtraError, before that, if pyarrow is not installed.
+    ExtraError if pyarrow is not installed.
     """
     arrow()
     if overwrite and (path / MANIFEST).exists():

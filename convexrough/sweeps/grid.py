@@ -1,8 +1,7 @@
 """The scenes of a sweep: combinations of listed values, random values and seeds.
 
-The number of a scene gives its values as the digits of a mixed-radix number: the lists taken
-together change slowest, then the keys of the grid, the last of them fastest, and the seeds fastest
-of all. Memory does not grow with the number of scenes.
+Scenes are numbered so that lists taken together change slowest, then the keys of the grid, the last
+key fastest, and seeds fastest of all. Memory does not grow with the number of scenes.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ Law = Literal["uniform", "normal", "lognormal"]
 
 
 class Draw(NamedTuple):
-    """The law of a random value, which is the same for all scenes with the same seed.
+    """The law of a random value.
 
     first, second : of "uniform" the ends; of "normal" the mean and the standard deviation; of
         "lognormal" the mean and the coefficient of variation. The last two laws are clipped at six
-        deviations, as random heights are
+        deviations
     """
 
     key: str
@@ -37,7 +36,7 @@ class Draw(NamedTuple):
     second: float
 
     def value(self, seed: int) -> float:
-        """The value for a seed. It does not depend on other random keys."""
+        """The value for a seed, independent of other random keys."""
         random = np.random.default_rng([seed, zlib.crc32(self.key.encode())])
         if self.law == "uniform":
             return float(random.uniform(self.first, self.second))
@@ -49,7 +48,7 @@ class Draw(NamedTuple):
 
 
 class Point(NamedTuple):
-    """The values of one scene by key, and its seed, or None."""
+    """The values of one scene by key, and the seed or None."""
 
     values: dict[str, Any]
     seed: int | None
@@ -62,8 +61,8 @@ class Grid:
     tables : tables of the scene file, without swept keys
     together : keys with lists of the same length, whose k-th values belong together
     over   : keys whose values are combined in every way
-    draws  : keys with random values
-    seeds  : of random heights, tip radii and draws; None if nothing is random
+    draws  : keys with random values, and their laws
+    seeds  : seeds of random heights, tip radii and values; None if nothing is random
     """
 
     tables: Mapping[str, Mapping[str, Any]]
@@ -78,13 +77,13 @@ class Grid:
         return (*(key for key, _ in (*self.together, *self.over)), *(it.key for it in self.draws))
 
     def is_number(self, key: str) -> bool:
-        """Whether every value of a key is one number."""
+        """True if every value of a key is one number."""
         axes = dict((*self.together, *self.over))
         return all(isinstance(value, (int, float)) for value in axes.get(key, ()))
 
     @property
     def each(self) -> int:
-        """The number of scenes that differ only in their seed."""
+        """The number of scenes that differ only in the seed."""
         return 1 if self.seeds is None else len(self.seeds)
 
     @property

@@ -1,8 +1,8 @@
-"""The numbers that a sweep can measure: those in the summary of a run, by name or its end.
+"""The numbers that a sweep can measure: names in the summary of a run, or their last parts.
 
-`cycle.loss` is the loss of each cycle, and so is `loss` if no earlier stage has such a number. The
-name of a column is that of the measure and of the row of the summary: `loss_0.37` is the loss of
-the cycle between +-0.37 f P, `history.loss_2` that at the third force of a history.
+`cycle.loss` is the loss of each cycle, and so is `loss` if no earlier stage has such a number. A
+column is named after the number and the row: `loss_0.37` is the loss of the cycle between
++-0.37 f P, with the friction limit f P, and `history.loss_2` that at the third force of a history.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Stages = Mapping[str, Stage]
 #: Numbers by name and row.
 Numbers = dict[tuple[str, str], float]
 
-#: Quantiles, over the loaded asperities, of the force at which they start to slide, over f P.
+#: Quantiles of the shear forces at which the loaded asperities start to slide, over f P.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
 #: Errors of one scene that do not affect the others.
@@ -48,7 +48,7 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The numbers of a scene, and why they are not certified and the model may not hold, or ""."""
+    """Numbers of a scene; why they are not certified, or ""; where the model may fail, or ""."""
 
     numbers: Numbers
     doubts: str
@@ -56,11 +56,13 @@ class Measured(NamedTuple):
 
 
 def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measured:
-    """The numbers of the wanted stages. The stage "normal" is always computed."""
+    """The numbers of the wanted stages, and of the stage "normal"."""
     found: Numbers = {}
     doubts: list[str] = []
+    cautions = [*cautions_of(contact)]
     for name, stage in stages.items():
         if name in wanted or name == "normal":
+            cautions += stage.cautions(contact)
             result = stage.compute(contact)
             found |= dict(_numbers(result.summary(), name, "", stage.labels))
             doubts += result.doubts()
@@ -69,7 +71,7 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
         onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
         at = np.quantile(onsets, QUANTILES) if len(which) else np.full(len(QUANTILES), np.nan)
         found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
-    return Measured(found, "; ".join(doubts), "; ".join(cautions_of(contact)))
+    return Measured(found, "; ".join(doubts), "; ".join(cautions))
 
 
 def _numbers(
@@ -88,16 +90,15 @@ def _numbers(
 
 
 def row_label(ends: Sequence[float]) -> str:
-    """The label of a row: a force; or the ends of a cycle, only the maximum if symmetric."""
+    """The label of a row: a force, or both ends of a cycle; the maximum if it is symmetric."""
     *first, last = ends
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
-    """The columns of each measure, which is the first number of this name.
+    """The columns for each name in `measures`, which means the first number of this name.
 
-    Stages after the last one that is needed are not computed. Raises InputError for a measure
-    without a number.
+    Raises InputError if there is no such number. Stages after the last needed one are not computed.
     """
     rows: dict[str, list[str]] = {}
 

@@ -15,10 +15,10 @@ from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Limits of a batch: scenes, and about so many asperities; and the number of batches aimed at.
+#: Largest numbers of scenes and (about) of asperities in a batch; number of batches to aim at.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
-#: Number of scenes that are tried to find the measurable numbers, if the first ones fail.
+#: Largest number of scenes that are computed to find out which numbers can be measured.
 TRIED = 5
 
 
@@ -52,10 +52,7 @@ class Plan:
         return Batch(self.source.part(part), self.columns, part)
 
     def manifest(self) -> dict[str, Any]:
-        """The contents of manifest.json, which do not depend on the time.
-
-        Its entry "each" is the number of scenes that differ only in their seed.
-        """
+        """The contents of manifest.json; "each" counts scenes that differ only in the seed."""
         grid = self.source.grid if isinstance(self.source, Tables) else None
         labels = list(self.source.labels(range(0)))
         numbers = {key: key for key in labels} | {it.name: it.number for it in self.columns}
@@ -82,12 +79,11 @@ def planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for scenes; the first one gives the measurable numbers and the size of batches.
+    """The plan for scenes; the first one shows which numbers it has and how large batches may be.
 
     given : all input on which the numbers depend, except measures and version
 
-    Raises InputError for an unknown measure, and the error of the first scenes if all of these
-    fail.
+    Raises InputError for an unknown measure, and the error of the first five scenes if all fail.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):

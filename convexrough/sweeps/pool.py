@@ -27,8 +27,7 @@ from convexrough.errors import ExtraError, InputError, WorkerError
 from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
 from convexrough.threads import cores
 
-#: Number of batches submitted at once to an executor, and per local process: a process that dies
-#: loses its batches.
+#: Number of batches submitted at once to an executor, and per local process.
 AT_ONCE, EACH = 1000, 2
 
 #: Number of lost batches after which the sweep ends.
@@ -38,8 +37,8 @@ MOST_LOST = 64
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, in order of completion.
 
-    A batch whose worker died is computed again, alone, after the others. Raises WorkerError if its
-    worker dies again, or if no worker is left.
+    If a worker dies, its batches are computed again, one by one, after the others. Raises
+    WorkerError if a batch loses its worker twice, or if no worker is left.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -53,7 +52,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
 def _together(
     batches: Iterator[Batch], executor: Executor
 ) -> Generator[Columns, None, list[Batch]]:
-    """The rows of batches, in any order; returns the batches whose workers died."""
+    """Yield the rows of batches, in any order; return the batches whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[BatchRows], Batch] = {}
     lost: list[Batch] = []
@@ -85,16 +84,12 @@ def _together(
 
 
 def _lost() -> tuple[type[BaseException], ...]:
-    """The exceptions of a future whose worker died."""
     distributed = sys.modules.get("distributed")
     return (BrokenExecutor, *((distributed.KilledWorker,) if distributed else ()))
 
 
 class Processes(Executor):
-    """Processes on this machine; those that die are replaced.
-
-    Each is a new interpreter, so that it inherits no locks or threads.
-    """
+    """Processes on this machine, each a new interpreter; those that die are replaced."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()
@@ -122,10 +117,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """Make this process end with its parent process, and ignore interrupts.
-
-    pipe : one end of a pipe; only the parent has the other end
-    """
+    """End this process when its parent, with the other end of the pipe, ends."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -138,11 +130,7 @@ def _end_with(pipe: Any) -> None:
 
 @contextmanager
 def _sheltered() -> Iterator[None]:
-    """Inside this context new processes do not run the user's script, and ignore interrupts.
-
-    So scripts need no guard. A terminal interrupts child processes, too; they inherit the signals
-    blocked here.
-    """
+    """Inside this context new processes do not run the user's script, and ignore interrupts."""
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     masks = hasattr(signal, "pthread_sigmask")  # not everywhere
@@ -159,7 +147,7 @@ def _sheltered() -> Iterator[None]:
 def dask(address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler, which may join and leave.
 
-    address : of the scheduler, "tcp://host:port"; or its file, "scheduler.json"; or "local" for a
+    address : "tcp://host:port" of the scheduler; or its file, "scheduler.json"; or "local" for a
         new cluster on this machine
 
     Raises ExtraError if Dask is not installed; InputError if no scheduler answers.

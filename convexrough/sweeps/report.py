@@ -1,4 +1,4 @@
-"""Results of the command `sweep`: printed lines, JSON, tables and figures."""
+"""The output of the command `sweep`: printed lines, JSON, tables and figures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, done: Done | None = None) -> Summary:
-    """The contents of `--json`: the state of the table, and the work of this call."""
+    """The contents of `--json`: the state of the table, and what this call computed."""
     said: Summary = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
@@ -71,7 +71,7 @@ def failures(table: SweepTable) -> list[str]:
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """A warning that counts the scenes with a message which did not fail; [] if there are none."""
+    """A warning with the number of computed scenes that have a message; [] without any."""
     count, first = 0, ""
     for block in table.blocks(["scene", "status", "message"]):
         rows = np.flatnonzero((block["status"] == "certified") & (block["message"] != ""))
@@ -94,7 +94,7 @@ def write_summary(
 
 
 def progress_kept(folder: Path, plan: Plan) -> str:
-    """A line on the rows of an interrupted sweep in a folder, and on how to continue."""
+    """A message about the rows of an interrupted sweep in a folder, and how to continue it."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"
     rows = len(open_sweep(folder))

@@ -1,4 +1,4 @@
-"""The scenes of a sweep, from the tables of a file or from objects, with their stages."""
+"""The scenes of a sweep with their stages, from the tables of a file or from objects."""
 
 from __future__ import annotations
 
@@ -70,10 +70,7 @@ NO_SEED = -1
 
 @dataclass(frozen=True)
 class Tables:
-    """Scenes of a grid over the keys of a scene file.
-
-    path : of the file, for messages and for relative paths in it
-    """
+    """Scenes of a grid over the keys of a scene file; `path` is for messages and relative paths."""
 
     grid: Grid
     path: Path
@@ -92,12 +89,12 @@ class Tables:
             values = [each.values[key] for each in points]
             if self.grid.is_number(key):
                 swept[key] = np.array(values, dtype=np.float64)
-            else:  # lists as in the file
+            else:  # text of lists
                 swept[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
         return swept | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
-        """The source for a worker that computes the scenes with these numbers."""
+        """The source of the scenes with these numbers, for a worker."""
         return self
 
     def opened(self) -> Ask:

@@ -1,4 +1,4 @@
-"""`sweep`: measures many scenes, with local processes or any executor, into one table."""
+"""`sweep`: computes many scenes, with local processes or any executor, and returns a table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
 from convexrough.tabular.units import UnitNames
 
-#: A sweep file, its contents, or scenes.
+#: A sweep file, the tables of one, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
 #: Largest number of scenes that one call computes; larger sweeps are computed in parts.
@@ -51,20 +51,22 @@ def sweep(
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
 ) -> SweepTable:
-    """The table of measured numbers of many scenes.
+    """A table of measured numbers of many scenes.
 
     what     : a sweep file; or its tables, as a mapping; or scenes
-    approach, load : for scenes, [length] and [force]; one of them, a number for all or one for each
-    cycle, shear : for scenes, amplitudes of cycles and shear forces as fractions of f P
-    measure  : numbers of a run's summary, by name or its end; replaces the list of a file
+    approach, load : only if `what` is scenes: either approaches [length] or loads [force], one
+        number for all scenes or one for each
+    cycle, shear : only if `what` is scenes: amplitudes of cycles and shear forces, as fractions of
+        the friction limit (coefficient of friction times load)
+    measure  : names in summary.json, or their last parts; overrides the list in a sweep file
     out      : folder for the results; default: they are only returned
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: number of processors
     resume   : continue an interrupted sweep in the folder;  overwrite : compute it again
-    part     : (k, n), the k-th of n parts of the sweep, from 1
+    part     : (k, n): compute only the k-th of n shares of the scenes, counted from 1
 
-    The table is the same, bit for bit, for any executor, order and number of interruptions. The row
-    of a failed scene has the reason.
+    The table is the same, bit for bit, for any executor, any order of computation and any number of
+    interruptions. The row of a failed scene has the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
     workers died twice with the same scenes, or if no worker is left.
@@ -99,7 +101,7 @@ def sweep(
 
 @dataclass(frozen=True)
 class Done:
-    """A table, a line on the rows found before, the number of computed scenes, and the time [s]."""
+    """A table, a message about earlier rows, the number of computed scenes, and the time [s]."""
 
     table: SweepTable
     found: str
@@ -116,7 +118,7 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> Done:
-    """The result of a plan; arguments as for `sweep`."""
+    """The computed table of a plan; arguments as for `sweep`."""
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:
@@ -140,7 +142,7 @@ def run(
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
-    """The scenes of the k-th of n shares of the parts, or of all parts."""
+    """The parts that job k of n computes, as scenes; without `part`, all."""
     k, n = part or (1, 1)
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
@@ -153,7 +155,7 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
 
 
 def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
-    """The same rows; the progress is logged."""
+    """Yield `found` unchanged, and log the progress."""
     began, done, failed = time.monotonic(), 0, 0
     for columns in found:
         yield columns
@@ -166,7 +168,6 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    """The stages with these fractions of f P."""
     from convexrough.run.stages import CycleStage, NormalStage, ShearStage
     from convexrough.run.study import validate_table
 

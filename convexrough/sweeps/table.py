@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 #: The default quantiles.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: [bytes] memory per cell of a table, including a data frame of it.
+#: [bytes] memory per number of a table and of a data frame with the same contents.
 CELL = 24
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
-    """The table of a sweep in a folder, finished or not. Rows are read only when needed.
+    """The table of a sweep in a folder, complete or not. Rows are read only when needed.
 
     Raises FileError if the folder contains no sweep.
 
@@ -70,12 +70,12 @@ class SweepTable(Record):
 
     @property
     def swept(self) -> list[str]:
-        """The keys that vary, those with random values last."""
+        """The swept keys, with random keys last."""
         return self.columns[1 : self.columns.index("seed")]
 
     @property
     def points(self) -> list[str]:
-        """The swept keys without random values; combinations of their values are grid points."""
+        """The swept keys that are not random; combinations of their values are grid points."""
         return [key for key in self.swept if key not in self.manifest["drawn"]]
 
     @property
@@ -129,10 +129,10 @@ class SweepTable(Record):
         return counts
 
     def to_dataframe(self, columns: Sequence[str] | None = None) -> pandas.DataFrame:
-        """A data frame of pandas with some columns, by default all.
+        """A pandas data frame with some columns, by default all.
 
-        Raises ExtraError if pandas is not installed; InputError if the table does not fit in
-        memory, for which `to_dask` is made.
+        Raises ExtraError if pandas is not installed; InputError if the table does not fit in memory
+        (then use `to_dask`).
         """
         variables: frames.Variables = {
             name: (("row",), values) for name, values in self.read(columns).items()
@@ -141,10 +141,9 @@ class SweepTable(Record):
         return frames.dataframe(variables, attributes)
 
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
-        """A data frame of Dask with some columns, by default all; parts are read when needed.
+        """A Dask data frame with some columns, by default all; parts are read when needed.
 
-        Raises ExtraError if Dask is not installed; InputError if the table has no parts in a
-        folder.
+        Raises ExtraError if Dask is not installed; InputError if the table is not in a folder.
         """
         try:
             import dask.dataframe
@@ -163,8 +162,8 @@ class SweepTable(Record):
     ) -> Axes:
         """Axes with bands of quantiles of a measured number against a swept key.
 
-        measured, over : names of columns; default: the first of each kind. Combinations of other
-            swept keys have their own bands if these are few
+        measured, over : names of columns; default: the first measured number and the first swept
+            key. Each combination of other swept keys has its own bands if there are at most four
 
         Raises InputError if nothing is swept, and for unknown names.
         """
@@ -189,8 +188,8 @@ class SweepTable(Record):
 
         measured : names of columns, by default all;  at : quantiles, from 0 to 1
 
-        The columns are those of `points`, `quantity`, `scenes` (number computed), `failed` (number
-        of these without results), and one for each quantile, nan if all scenes failed.
+        The columns are those of `points`, `quantity`, `scenes` (number computed), `failed` (how
+        many of these failed), and one for each quantile, nan if all scenes failed.
         """
         names = self.measured if measured is None else list(measured)
         about = self.read([*self.points, "scene", "status"])
@@ -211,7 +210,6 @@ class SweepTable(Record):
         return {head: np.array([row[i] for row in rows]) for i, head in enumerate(heads, 1)}
 
     def _said(self, name: str) -> str:
-        """The label of a column, with its unit."""
         table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
         label = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")

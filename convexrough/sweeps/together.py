@@ -1,6 +1,6 @@
 """Scenes of a batch that are pressed and cycled together, as rows of one stack.
 
-This is possible if only the numbers of `NORMAL` and `CYCLE` are measured.
+This is possible if only numbers of `NORMAL` and `CYCLE` are measured.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def _count(status: str) -> Callable[[Found], Array]:
     return lambda found: (found["status"] == status).sum(axis=1)
 
 
-#: Numbers of summaries from the arrays of `Contacts` and `Cycles`, and from four more: "amplitudes"
-#: (force), "moved" (proved displacement amplitudes), "smooth" and "scales" (losses of spheres).
+#: Numbers of summaries, computed from arrays of `Contacts` and `Cycles` and from "amplitudes" (of
+#: force), "moved" (proved displacement amplitudes), "smooth" and "scales" (losses of spheres).
 NORMAL: dict[str, Callable[[Found], Array]] = {
     **{name: _count(name) for name in ("contact", "open", "undecided")},
     "approach": lambda found: found["approaches"],
@@ -56,7 +56,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 
 def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> dict[int, Measured]:
-    """The result of `measured` for the scenes that are proved in rows, by their numbers."""
+    """The numbers of the scenes that are proved in rows, by the numbers of the scenes."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}
@@ -78,13 +78,12 @@ def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> 
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known
-        except FAILURES:  # some scene caused it; each is then measured alone
+        except FAILURES:  # one scene failed: each is measured alone
             continue
     return found
 
 
 def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
-    """The stage of cycles of a scene if any of its numbers is measured, else None."""
     stage = asked.stages.get("cycle")
     wanted = any(column.stage == "cycle" for column in columns)
     return stage if wanted and isinstance(stage, CycleStage) else None
@@ -93,7 +92,6 @@ def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
 def _known(
     rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
 ) -> dict[int, Measured]:
-    """What is measured of the certified rows, by their positions."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
     normal = {name: number(contacts) for name, number in NORMAL.items()}
@@ -130,7 +128,6 @@ def _known(
 
 
 def _cautions(scene: Scene, loads: Array) -> str:
-    """The `cautions` of `Measured`, from loads (n,)."""
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
     if clear_of_cautions(scene, loads, radii):
         return ""

@@ -1,1 +1,1 @@
-"""Tables and names of units as people have them: text, arrays and workbooks."""
+"""Files of numbers and names of units in common forms: text, arrays and workbooks."""

@@ -20,8 +20,8 @@ Columns = dict[str, list[Any]]
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: Errors besides OSError that this package's readers raise for files in another format than their
-#: extension says, with unclosed quotes, or truncated. `foreign` converts errors of other packages.
+#: Errors besides OSError that mean that a file is corrupted, or not in the format of its extension.
+#: `foreign` converts errors of other packages to one of them.
 SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
@@ -46,9 +46,8 @@ def reading(path: Path) -> Iterator[None]:
 def foreign() -> Iterator[None]:
     """Raise a ValueError for any error that another package raises on a corrupted file.
 
-    Their documentation does not list these errors: numpy, scipy, pyarrow and openpyxl have been
-    seen to raise SyntaxError, KeyError, TypeError, AttributeError, MemoryError, struct.error,
-    TokenError and BadZipFile on files cut short or with one byte changed. Only call readers inside.
+    numpy, scipy, pyarrow and openpyxl raise errors of many kinds that they do not document. The
+    body should only call readers.
     """
     try:
         yield
@@ -59,7 +58,7 @@ def foreign() -> Iterator[None]:
 
 
 def needed(path: Path, package: str) -> Any:
-    """A package that reads the file. Raises FileError if it is not installed."""
+    """A package that the file needs. Raises FileError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -68,7 +67,7 @@ def needed(path: Path, package: str) -> Any:
 
 
 def named_arrays(path: Path) -> dict[str, Any]:
-    """The arrays of a file by name; "" is the name of an unnamed one."""
+    """The arrays of a file by name; the name of an unnamed array is ""."""
     if path.suffix.lower() == ".mat":
         return _matlab(path)
     if path.suffix.lower() == ".parquet":

@@ -1,4 +1,4 @@
-"""Tables of text, for a terminal and for Markdown."""
+"""Printed tables, for a terminal and for Markdown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-#: A table: a heading, and rows with the same number of cells.
+#: A table: a row of headings, and rows with the same number of cells.
 PrintedTable = Sequence[Sequence[Any]]
 
 
@@ -16,7 +16,7 @@ def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
 
 
 def aligned(table: PrintedTable, *, left: int = 0, digits: int = 6) -> list[str]:
-    """The lines of a table, with aligned columns: the first `left` to the left, others right."""
+    """The lines of a table; the first `left` columns are aligned to the left, others right."""
     return ["  ".join(row).rstrip() for row in _padded(table, left, digits)]
 
 

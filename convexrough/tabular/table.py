@@ -37,13 +37,13 @@ INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
-#: Mistakes of one file that are shown; the rest are counted.
+#: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
-#: Characters of a line that are shown.
+#: Largest number of characters of a line that are shown.
 MOST_SHOWN = 60
 
-#: Similarity of names above which an unread column may be a misspelt one that is missing.
+#: Similarity above which the name of an unread column may be a misspelling of a missing one.
 LOOKS_LIKE = 0.75
 
 #: Relative difference up to which two factors count as equal.
@@ -52,9 +52,9 @@ SAME = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """How columns are read.
+    """How columns of a file are read.
 
-    columns : their names in the file;  scales : factors of their numbers
+    columns : names in the file, by known name;  scales : factors of the numbers
     units   : units of the scene;  convert : convert columns in other units, else refuse them
     scalable : messages may propose the options --scale and --column
     alike   : columns of one quantity must have one unit, even if the scene names none
@@ -84,7 +84,7 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
 
 
 class ReadTable(NamedTuple):
-    """Columns of a file by their known names, and how the file was read.
+    """Columns of a file by known names, and how the file was read.
 
     columns : numbers, or text for the columns read as text
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
@@ -105,12 +105,12 @@ class ReadTable(NamedTuple):
     indices: dict[str, NDArray[np.intp]]
 
     def mistake(self, row: int, what: str) -> str:
-        """A mistake in a row, with its line."""
+        """The message of a mistake in a row, with the line."""
         return _shown(f"{self.rows[row]}{what}", self.lines[row])
 
 
 class _Source(NamedTuple):
-    """Cells of a file by column. Without a header, column numbers from 1 are the names."""
+    """Cells of a file by column. Without a header, columns are named by numbers from 1."""
 
     header: list[str] | None
     columns: list[Sequence[Any]]
@@ -134,7 +134,7 @@ def read_table(
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
 ) -> ReadTable:
-    """Named columns of a file. The numbers of other columns are not checked.
+    """Columns of a file by known names. The numbers of other columns are not checked.
 
     required, optional, text : names of columns; those in `text` are optional and read as text
     instead : columns that replace a required one if the file has the first of them
@@ -206,7 +206,6 @@ def read_table(
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
-    """Factors that convert columns to the scene's units, and mistakes in units and factors."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
     first: dict[str, tuple[str, Unit]] = {}
     for name in names:
@@ -258,7 +257,6 @@ def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
 
 
 def _source(path: Path, known: Sequence[str]) -> _Source:
-    """All cells of a file of text or arrays."""
     if path.suffix.lower() in ARRAYS:
         arrays = read_arrays(path, known)
         count = len(next(iter(arrays.values()), []))
@@ -307,7 +305,6 @@ def _places(
     how: Reading,
     unnamed: Sequence[Sequence[str]],
 ) -> tuple[dict[str, int], list[str]]:
-    """The index of each wanted column that the file has, and mistakes in the names."""
     columns = how.columns
     names = source.header
     if names is None:

@@ -18,7 +18,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 
 class _Slip(NamedTuple):
-    """A kind of wrong line, its correction, and the reason."""
+    """A kind of wrong line, the correction, and the reason."""
 
     pattern: re.Pattern[str]
     meant: Callable[[re.Match[str]], str]
@@ -30,7 +30,7 @@ def _slip(pattern: str, meant: Callable[[re.Match[str]], str], why: str) -> _Sli
 
 
 def _number(text: str) -> str:
-    """The number in TOML, with digits on both sides of the point."""
+    """The number as TOML, with digits on both sides of the point."""
     text = re.sub(r"(?<!\d)\.(?=\d)", "0.", text)
     return re.sub(r"(?<=\d)\.(?!\d)", ".0", text)
 
@@ -77,10 +77,7 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A line for each mistake: place, text and correction, if it is known.
-
-    Each mistake is corrected to find the next one.
-    """
+    """A line for each mistake: place, text and correction, if it is known."""
     lines = text.split("\n")
     found: list[str] = []
     while len(found) < MOST_SLIPS:

@@ -1,4 +1,4 @@
-"""Units by name: their dimension and their exact size in SI units."""
+"""Units by name, with dimensions and exact sizes in SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from convexrough.errors import InputError
 
 
 class Unit(NamedTuple):
-    """A unit: its size in SI units, its powers of length and force, and the name to show."""
+    """A unit: the size in SI units, the powers of length and force, and the name to show."""
 
     size: Fraction
     length: int
@@ -20,7 +20,7 @@ class Unit(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The quantity it measures, or "" if no column has it."""
+        """The quantity that the unit measures, or "" if no column has it."""
         return KINDS.get((self.length, self.force), "")
 
     def __mul__(self, other: Unit) -> Unit:  # type: ignore[override]
@@ -79,7 +79,7 @@ def parsed(name: str) -> Unit | None:
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit of a kind by any of its names; None for an empty name. Raises InputError."""
+    """The unit of a quantity by any of its names; None for an empty name. Raises InputError."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -102,14 +102,14 @@ def one_unit(what: str, given: str | None, found: str) -> Unit | None:
 
 
 class UnitNames(NamedTuple):
-    """Names of a scene's units of length and force; "" if it names none."""
+    """Names of a scene's units of length and force; "" for units that are not named."""
 
     length: str = ""
     force: str = ""
 
     @classmethod
     def of(cls, names: object) -> UnitNames:
-        """The given names after a check. Raises InputError."""
+        """The given names, checked. Raises InputError."""
         if not isinstance(names, tuple) or len(names) != 2:
             raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
         for kind, name in zip(cls._fields, names, strict=True):
@@ -122,7 +122,7 @@ class UnitNames(NamedTuple):
         return ", ".join(filter(None, self))
 
     def unit(self, kind: str) -> Unit | None:
-        """The scene's unit of a kind; None where it names none."""
+        """The scene's unit of a quantity; None if it is not named."""
         length, force = (parsed(name) if name else None for name in self)
         if kind == "area" and length:
             return (length**2)._replace(name=f"{self.length}²")
@@ -132,12 +132,12 @@ class UnitNames(NamedTuple):
 
     @property
     def work(self) -> str:
-        """The name of the unit of work, "" unless both are named."""
+        """The name of the unit of work; "" unless both units are named."""
         return f"{self.force} {self.length}" if self.length and self.force else ""
 
     @property
     def pressure(self) -> str:
-        """The name of the unit of pressure, "" unless both are named."""
+        """The name of the unit of pressure; "" unless both units are named."""
         return f"{self.force}/{self.length}²" if self.length and self.force else ""
 
 

@@ -1,1 +1,1 @@
-"""Shear with the full tangential kernel: forces and slips are vectors."""
+"""Shear with the full tangential compliance: forces and slips are vectors."""

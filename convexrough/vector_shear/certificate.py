@@ -1,29 +1,9 @@
-r"""Proved bounds on the errors of a vector friction state from any source, in the proof's order.
+"""Proved bounds on the errors of a vector friction state from any source.
 
-Forces q and displacements are in own units. Stars mark the solution for the true loads P, which are
-balls. With the sliding threshold k_i, the rigid displacement X and the kernel B, each asperity i
-that is proved to touch obeys
-
-    eta_i = X - (B q)_i,    q_i = q(eta_i),    sum q = T,
-
-where q(eta) is parallel to eta, with the length P [1 - (1 - |eta|/k)^(3/2)], or P beyond k. It is
-the gradient of a convex function of eta. All other asperities together carry at most `stray`.
-
-1. Trial. Any eta and the forces q(eta) obey the local law with the true loads exactly. Not zero are
-   the imbalance v_i = eta_i + (B q(eta))_i - X and m = |sum q(eta) - T|.
-2. Total. Let lambda(r) be a lower bound on the slope of s -> sum q(eta + s) for |s| <= r
-   (`_shift`). If r lambda(r) >= m, then some s with |s| <= r makes sum q(eta + s) = T: on the
-   circle |s| = r the convex function less T.s rises outwards, so its minimum lies inside.
-3. Residual. For q' = q(eta + s) and the displacement X + s the residual is
-   e_i = |v_i + (B (q' - q))_i| plus the effect of `stray`. Where an asperity slides, |q'_i| = P_i.
-4. Theorem (`convex.theorem`):  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
-5. Displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
-   So step 2, with sums that include w, bounds |X* - X|.
-6. Statuses. Asperity i is proved to slide if |eta*_i| > k_i within the bounds, and not to slide if
-   |eta*_i| < k_i or |q*_i| < P_i.
-
-The energy E is convex, so E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) for any forces q.
-docs/theory/vector-friction.md derives lambda of step 2, and a second proof near gross sliding.
+docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derives
+the steps 1 to 6 that comments name. Forces q, the displacement eta that each asperity takes up, the
+total T and the rigid displacement X are in scaled units. P are the loads, k the sliding thresholds,
+B the kernel; a star marks the solution for the true loads, which are known as balls.
 """
 
 from __future__ import annotations
@@ -48,11 +28,11 @@ ROUNDED = 8 * ROUNDOFF
 
 
 class VectorBounds(NamedTuple):
-    """Proved bounds on the errors of a state, in own units; infinite without a proof.
+    """Proved bounds on the errors of a state, in scaled units; infinite without a proof.
 
     increments, slips : (n,) on |q - q*| and |slip - slip*|;  displacement_error : on |X - X*|
-    sliding, partial : (n,) true where proved to slide, and proved not to slide
-    excess : on the energy of the forces above the minimum
+    sliding, partial : (n,) True where proved to slide, and where proved not to slide
+    excess : on the excess of the energy over the minimum
     """
 
     proved: bool
@@ -72,10 +52,7 @@ class VectorBounds(NamedTuple):
 
 @quietly
 def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Bounds on the errors of a state, which may come from any source.
-
-    total : (2,) T
-    """
+    """Bounds on the errors of a state from any source; total : (2,) T."""
     if problem.scope == "none" or not problem.sure.any():
         return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
@@ -87,7 +64,6 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
 
 def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """The bounds by steps 1 to 6."""
     sure, softness = problem.sure, problem.softness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
@@ -145,10 +121,7 @@ def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> Ve
 
 
 def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
-    """(2, n) q(eta), without cancellation: with the positive part z of 1 - |eta|/k,
-
-    P/k [1 + z / (1 + z^(1/2))] eta  up to the threshold, and P eta/|eta| beyond.
-    """
+    """(2, n) q(eta): P/k [1 + z / (1 + z^(1/2))] eta if z = 1 - |eta|/k >= 0, else P eta/|eta|."""
     exact = Ball.exact(np.ascontiguousarray(eta.T))
     squares = exact * exact
     share = (squares[0] + squares[1]).sqrt() / thresholds
@@ -157,10 +130,7 @@ def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
 
 
 def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) the eigenvalues of dq/deta along and across eta; they fall as |eta| grows.
-
-    scale : P/k;  share : |eta|/k
-    """
+    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k."""
     left = np.maximum(1.0 - share, 0.0)
     root = np.sqrt(left)
     return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
@@ -174,13 +144,7 @@ def _steepest(problem: VectorProblem, size: Array) -> Array:
 
 
 def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found.
-
-    Along a unit vector z the slope of q_i is at least radial + d sin^2 of the angle between z and
-    eta_i, with d = across - radial at the longest eta_i. Let `least` be the smallest sum of d sin^2
-    over all z, and theta_i bounds on the errors of the sines. By Minkowski's inequality
-    lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
-    """
+    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found."""
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
@@ -212,10 +176,10 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
 
 def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
-    """A bound on E(q) - E(q*) for forces within friction, up to rounding; infinite if X is.
+    """Bound on E(q) - E(q*) for forces within friction, up to rounding; infinite if X is.
 
-    e_i is the distance of X - (B q)_i from the deflection of q_i; where |q_i| = P_i, from the ray
-    of all eta with these forces.
+    e_i is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the
+    ray of all eta with this force.
     """
     q, X = state.increments, state.displacement
     if not np.isfinite(X).all() or problem.margin == 0.0:
@@ -226,7 +190,7 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
     along_q = (eta * along(np.ones(len(q)), q, length)).sum(axis=1)
     nearest = np.where(size < problem.loads, own, np.maximum(along_q, own))
     off = np.hypot(*(eta - along(nearest, q, length)).T)
-    # Near |q| = P one roundoff of |q| changes the deflection by many.
+    # Near |q| = P one roundoff of |q| changes the deflection by many roundoffs.
     steep = problem.deflections(np.minimum(size * (1 + ROUNDED), problem.loads)) - own
     sums = own + problem.influence.matrix @ size + float(np.hypot(*X))
     off = off + steep + (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
@@ -236,7 +200,6 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
 
 def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
-    """The better of two proofs, for each bound."""
     return VectorBounds(
         found.proved or other.proved,
         np.fmin(found.increments, other.increments),
@@ -250,9 +213,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
 def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
     """The bounds near gross sliding: docs/theory/vector-friction.md, "Close to gross sliding".
 
-    t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`. So
-    |q_i - P_i t| <= (2 P_i unused)^(1/2), and the lower bounds on X.t from single asperities hold
-    for all. Sliding forces that turn away from t would need more friction than is left.
+    t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`.
     """
     sure, reach, unproved = problem.sure, problem.reach, VectorBounds.unproved(len(problem))
     P, thresholds = np.where(sure, problem.loads, 0.0), problem.threshold_balls

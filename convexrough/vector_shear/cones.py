@@ -1,22 +1,10 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-M = B + shift is the kernel with a diagonal that makes it positive semidefinite, S the share of the
-shift in the local stiffness. A variable m_i >= |q_i| bounds the size of each force, and
-m_i / P_i = 1 - t_i^3. The local energy of m less shift m^2 / 2 is P_i threshold_i times
-
-    (3/5) t^5 - (S/3) t^6 - (1 - 2S/3) t^3 + 2/5 - S/3,
-
-which does not fall as m grows if S <= 1. So the sum of these energies and of the convex
-(1/2) q'Mq may be minimised over m_i >= |q_i| and sum q = T. The cones of `convexrough.convex.cones`
-represent the powers of t exactly, with four cones per asperity if all S_i <= 21/25, with five if
-S_i <= 1. The multiplier of the total is the rigid displacement; that of |q_i| <= m_i is the sum of
-the slip and of the slope of the local energy.
-
-Under a small force every t is near 1, and variables for powers of t would lose all digits. So the
-cones use u = 1 - t. Each cone says that a 2 x 2 moment matrix, in the basis 1, t or 1, t^2, is
-semidefinite; the basis 1, u or 1, 1 - t^2 gives an equivalent cone. The solver's variables are
-those of order u^k over epsilon_i^k, and q over epsilon_i P_i, where epsilon_i is the elastic
-estimate of |q_i| / P_i, at most 1. So the numbers are about 1 under any force.
+docs/theory/vector-friction.md, "Cones", derives it, with t from |q| / P = 1 - t^3, u = 1 - t, the
+share S of the shift in the local stiffness, and epsilon, the elastic estimate of |q| / P. The
+solver's variables are those of order u^k over epsilon^k, and q over epsilon P. The multiplier of
+the total is the rigid displacement; that of |q_i| <= P_i (1 - t^3) is the sum of the slip and of
+the slope of the local energy.
 """
 
 from __future__ import annotations
@@ -87,26 +75,26 @@ FIVE = _Lift(
 #: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
 _SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
-#: Below this fraction of gross sliding the state is proportional to T within the solver's accuracy:
-#: the program is solved at this fraction, and the result scaled. A heuristic.
+#: Below this fraction of gross sliding the state is proportional to T to the solver's accuracy, so
+#: the program is solved at this fraction and the result scaled. A heuristic.
 ELASTIC = 1e-9
 
-#: Accepted residual, including slips, over the accepted relative gap. A heuristic: at the default
-#: gap of 1e-8 energies determine forces to its square root, 1e-4, the accepted residual.
+#: Largest accepted residual over the largest accepted `duality_gap`. A heuristic: an energy with an
+#: error of 1e-8, the default, determines forces to the square root, 1e-4.
 SLIPS = 1e4
 
-#: Largest part of the way to the boundary of the cones in a step of Clarabel. Short steps are an
-#: order more accurate; a few problems need long ones. Heuristics, tried one after the other.
+#: Limits on Clarabel's steps, as parts of the way to the boundary of the cones, in order of trial.
+#: Short steps give a tenth of the error; a few problems need long ones. Heuristics.
 STEPS = (0.9, 0.99)
 
 
 @dataclass(frozen=True)
 class FrictionConic:
-    """Settings of the cone program for `shear_vector`, through Clarabel.
+    """A solver of `shear_vector` by a cone program, through Clarabel.
 
-    tolerance : tolerance of Clarabel for duality gap and feasibility. Its status is not used
-    accepted  : largest relative `duality_gap` of the result; its `residual` may be 1e4 times this.
-        Otherwise `solve` raises SolverError
+    tolerance : tolerance of Clarabel for duality gap and feasibility
+    accepted  : largest relative `duality_gap` of the result; `residual` may be 1e4 times as large.
+        Otherwise `solve` raises SolverError, whatever Clarabel reports
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
     >>> state.residual < 1e-5
@@ -118,7 +106,7 @@ class FrictionConic:
     name: str = field(default="conic", init=False)
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
-        """The state of a total increment (2,), |T| < sum P (own units)."""
+        """The state under a total (2,), |T| < sum P, in scaled units."""
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
         data, solver = program.apply(), f"friction ({self.name})"
@@ -147,8 +135,7 @@ class FrictionConic:
 class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     """The cone program, scaled so that its numbers are about 1.
 
-    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then those of the cones,
-    asperity by asperity.
+    The variables are q / (epsilon P) (x_1, y_1, x_2, ...), then those of the cones by asperity.
 
     total  : (2,) T;  lift : the cones;  small : (n,) epsilon;  energy : the unit of energy
     """
@@ -173,7 +160,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
     @property
     def force(self) -> float:
-        """The unit of the total."""
+        """The unit of the total in the program."""
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
@@ -182,7 +169,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic and linear part: (1/2) q'Mq, and the local energies."""
+        """The quadratic and linear parts: (1/2) q'(B + shift)q, and the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
@@ -198,7 +185,6 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
     def _constraints(self, rows: Array) -> csc_matrix:
-        """Rows of sum q = T over |T|, and then of the cones of every asperity."""
         from scipy import sparse
 
         n, _, variables = rows.shape
@@ -215,10 +201,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) the rows of the cones of every asperity,  m / P >= |(x, y)|  first.
-
-        Each row is divided by the power of epsilon of its order.
-        """
+        """(n, rows, k) rows of the cones over epsilon^order, with m / P >= |(x, y)| first."""
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
         powers = np.maximum(lift.orders - leading, 0.0)
@@ -229,10 +212,10 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return np.concatenate((friction, rows), axis=1)
 
     def invert(self, raw: RawAnswer) -> VectorState:
-        """Forces, rigid displacement and slips from the solver's result and its multipliers.
+        """Forces, rigid displacement and slips, from the solver's variables and multipliers.
 
-        An interior point has |q_i| < P_i and a slip > 0 at every asperity. The asperity slides if
-        the slip exceeds the difference of its deflection from the threshold.
+        An interior-point method returns |q_i| < P_i and a slip > 0 everywhere. An asperity slides
+        if the slip exceeds the difference of its deflection from the threshold.
         """
         problem = self.problem
         n, P, thresholds = len(problem), problem.loads, problem.thresholds

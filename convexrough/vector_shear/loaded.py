@@ -2,7 +2,8 @@
 
 An asperity with the load P and the shear force u has the deflection
 eta = threshold deflection(u / P), and slides beyond threshold = k P^(2/3). Shear forces are in
-units of f times the unit of loads, displacements of c_t f times the unit of lengths.
+units of f times the unit of loads, displacements of c_t f times the unit of lengths, with the
+coefficient of friction f and Mindlin's ratio c_t.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ ELASTIC = Fraction(1, 10**15)
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """n loaded asperities of a contact. Arrays are (n,), in own units.
+    """n loaded asperities of a contact. Arrays are (n,), in scaled units.
 
     scope    : scope of the contact's certificate; "none" without a proof
     touching : their indices in the scene
-    loads, errors : P, and bounds on its errors;  thresholds : k P^(2/3)
+    loads, errors : P, and bounds on the errors;  thresholds : k P^(2/3)
     influence : operator A;  shells : added to its diagonal they make it positive semidefinite
-    sure     : true where proved to touch
+    sure     : True where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
     softness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
     stray    : bound on the total load of all asperities that are neither sure nor proved open
@@ -124,7 +125,7 @@ class Loaded:
         return (self.loads + self.errors) * (1 + SAFETY)
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) u and eta of `shear`, with the scalar kernel, under T [force]."""
+        """(n,) u and eta of `shear`, with the scalar kernel, under the shear force T [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares / self.stiffest
@@ -133,7 +134,7 @@ class Loaded:
         return u.value[self.places], eta.value[self.places]
 
     def increments(self, deflections: Array) -> Array:
-        """(n,) the shear forces u of these deflections, P beyond the threshold."""
+        """(n,) the shear forces u at these deflections; P beyond the threshold."""
         u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.thresholds))
         return u
 
@@ -157,12 +158,12 @@ class Loaded:
 
     @property
     def places(self) -> Indices:
-        """(n,) positions of the loaded asperities among the candidates."""
+        """(n,) indices of the loaded asperities among the candidates."""
         return np.searchsorted(self.levels.candidates, self.touching)
 
     @cached_property
     def elastic(self) -> Ball:
-        """(n,) elastic shares of T if all stick: the derivatives of the loads by the total."""
+        """(n,) shares of the total if all stick: derivatives of the loads by their total."""
         return self.levels.top.tangent.loads[self.places]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:

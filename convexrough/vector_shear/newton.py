@@ -1,16 +1,13 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-The unknown is eta_i, the sum of deflection and slip of asperity i. The shear force
-q_i = P_i force(|eta_i| / threshold_i) is parallel to eta_i, and `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", in scaled units: the unknown eta_i is the sum of
+deflection and slip of asperity i, and `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-Asperities with |eta_i| > threshold_i slide, so no set of them is guessed. With
-dq_i/deta_i = W_i W_i' (of rank 1 where sliding: the force can still turn) a step solves
+With dq_i/deta_i = W_i W_i' a step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
-
-The matrix is symmetric, and positive definite if the energy is convex.
 """
 
 from __future__ import annotations
@@ -30,10 +27,11 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 @dataclass(frozen=True)
 class FrictionNewton:
-    """Settings of Newton's method for `shear_vector`, which starts from the state of `shear`.
+    """A solver of `shear_vector` by Newton's method, which starts from the state of `shear`.
 
     It stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not halve
-    this residual. Raises SolverError if this takes more than `max_iterations` steps.
+    this residual. Raises SolverError if this takes more than `max_iterations` steps. The symbols
+    are those of docs/theory/vector-friction.md.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
     >>> state.residual < 1e-12
@@ -45,7 +43,7 @@ class FrictionNewton:
     name: str = field(default="newton", init=False)
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
-        """The state of a total increment (2,), |T| < sum P (own units)."""
+        """The state under a total (2,), |T| < sum P, in scaled units."""
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
         height = Fraction(size) * Fraction(problem.units.force)
@@ -92,7 +90,7 @@ class _Friction:
     unit: ClassVar[str] = "the displacement"
 
     def evaluate(self, unknown: Array) -> _Iterate | None:
-        """The state at eta, shifted so that forces add up to the total; None if this fails."""
+        """The state at eta, shifted so that forces add up to T; None if no shift is found."""
         problem = self.problem
         shifted = _onto_total(problem, unknown, self.total)
         if shifted is None:
@@ -111,7 +109,7 @@ class _Friction:
         return _Iterate(shifted, q, coupling, roots, displacement, defect, residual, energy)
 
     def direction(self, state: _Iterate, left: float) -> Array:
-        """The Newton step, from a direct solve that needs no tolerance."""
+        """The Newton step, from a direct solution that needs no tolerance."""
         return _direction(self.problem, state)
 
     def gradient(self, state: _Iterate) -> Array:
@@ -124,11 +122,7 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _Iterate) -> float:
-        """A lower bound on the rounding error of F, from that of X.
-
-        Usually steps end earlier, when one does not halve the residual. On a symmetric layout the
-        part of F across X can shrink at every step until it underflows; this bound ends the steps.
-        """
+        """A lower bound on the rounding of F, which ends steps on symmetric layouts."""
         return ROUNDOFF * state.scale
 
     def advice(self, state: _Iterate) -> str:
@@ -136,7 +130,7 @@ class _Friction:
 
 
 def _direction(problem: VectorProblem, state: _Iterate) -> Array:
-    """d(eta); the shift of the kernel is added if the matrix is not positive definite."""
+    """The step d(eta); if the matrix is not positive definite, the shift is added to the kernel."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     n = len(problem)
@@ -184,11 +178,7 @@ def _roots(problem: VectorProblem, eta: Array) -> Array:
 
 
 def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
-    """eta + s, with the vector s that makes the forces add up to the total; None if not found.
-
-    s minimises a convex function with the gradient sum q(eta + s) - T, by Newton's method with
-    steps halved while they overshoot.
-    """
+    """eta + s, with the vector s for which forces add up to T; None if it is not found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
     size = float(np.hypot(*total))
@@ -219,7 +209,7 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
 
 
 def advice(problem: VectorProblem, total: float) -> str:
-    """Advice for the user if no state is found at this total."""
+    """What the user can try if no state is found at this total."""
     place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
     number = float((problem.shells * problem.stiffest).max())
     if number < 1:

@@ -1,26 +1,15 @@
-"""The friction problem with the full tangential kernel, as one convex program.
+"""The friction problem with the full tangential kernel: docs/theory/vector-friction.md.
 
-The shear force on asperity i is f q_i with a vector |q_i| <= P_i in the plane. A tangential point
-force at j moves the surfaces of both bodies at i by Cerruti's tensor
+Forces are in units of the coefficient of friction f, displacements of c_t f and energies of
+c_t f^2, with Mindlin's ratio c_t. With the compliance operator A and bias = nu / (2 - nu) the
+kernel is, by (1) of that page,
 
-    C_ij = 1 / (pi G r) [(1 - nu) I + nu d d']
+    B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
-with the distance r, the unit vector d from j to i, shear modulus G and Poisson's ratio nu. With
-Mindlin's ratio c_t, the normal influence matrix A and bias = nu / (2 - nu), C_ij = c_t B_ij and
-
-    B_ij = A_ij [(1 - bias) I + 2 bias d d'].
-
-With energies in units of c_t f^2 and displacements of c_t f, the forces minimise
-
-    sum_i P_i threshold_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q/f.
-
-The multiplier of the total is the rigid displacement X. The multiplier of |q_i| <= P_i times the
-direction of q_i is the slip, and
+for the unit vector d from j to i and Poisson's ratio nu. Under the total T = Q / f the forces q_i,
+|q_i| <= P_i, and the slips satisfy, with the rigid displacement X,
 
     X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i deflection(|q| / P_i) q / |q|.
-
-The mean of d d' over all directions is I / 2. It would give B = A, the problem of `shear`
-(Ciavarella and Jaeger): docs/theory/vector-friction.md, "The kernel" and "The program".
 """
 
 from __future__ import annotations
@@ -44,7 +33,7 @@ MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 class VectorState(NamedTuple):
-    """A friction state of the n loaded asperities, in own units.
+    """A friction state of the n loaded asperities, in scaled units.
 
     total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2)
     """
@@ -59,8 +48,8 @@ class VectorState(NamedTuple):
 class Shift(NamedTuple):
     """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
 
-    shares : (n,) S_i = values_i / h_i, h_i the least local stiffness; the energy is convex if all
-        S_i <= 1: docs/theory/vector-friction.md, "Convexity"
+    shares : (n,) S_i = values_i / h_i with the least local stiffness h_i; the energy is convex if
+        all S_i <= 1: docs/theory/vector-friction.md, "Convexity"
     """
 
     values: Array
@@ -80,7 +69,6 @@ class VectorProblem(Loaded):
 
     @classmethod
     def _assemble(cls, contact: Contact) -> Self:
-        """The problem of a contact. Raises InputError if B does not fit in memory."""
         checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
         loaded = Loaded.of(contact)
         n = len(loaded)
@@ -92,7 +80,7 @@ class VectorProblem(Loaded):
         squares[np.diag_indices(n)] = 1.0
         kernel = np.empty((n, 2, n, 2))
         A = loaded.influence.matrix
-        turned = bias * A * (dx - dy) * (dx + dy) / squares  # 2 d d' - I = [[cos, sin], [., -cos]]
+        turned = bias * A * (dx - dy) * (dx + dy) / squares  # bias A times the cosine in 2 d d' - I
         kernel[:, 0, :, 0], kernel[:, 1, :, 1] = A + turned, A - turned
         kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = bias * A * 2.0 * dx * dy / squares
         known = {each.name: getattr(loaded, each.name) for each in fields(Loaded)}
@@ -100,11 +88,7 @@ class VectorProblem(Loaded):
 
     @property
     def stiffness(self) -> Array:
-        """(n,) h_i = (2/3) threshold_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
-
-        Its eigenvalues, along q and across, are threshold/P times deflection'(t) and
-        deflection(t)/t: docs/theory/vector-friction.md, "Convexity".
-        """
+        """(n,) h_i = (2/3) threshold_i / P_i; the local Hessian is at least h_i I."""
         h: Array = (2.0 / 3.0) * self.thresholds / self.loads
         return h
 
@@ -131,10 +115,7 @@ class VectorProblem(Loaded):
         return along(self.deflections(size), increments, size)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, and exactly P_i where |q_i| is at least P_i up to rounding.
-
-        Near P_i the local law is steep: one roundoff of |q_i| changes the deflection by 2e-11.
-        """
+        """(n,) |q_i|, and exactly P_i up to rounding, as deflections are steep near P_i."""
         size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full
@@ -153,9 +134,9 @@ class VectorProblem(Loaded):
     def residual(self, state: VectorState) -> float:
         """The largest relative violation of the conditions of least energy.
 
-        Over |X|: the error of the equation for X above; the part of a slip across its force; and
-        slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|: the error
-        of the total. See docs/theory/vector-friction.md, "The program".
+        Over |X|: the error of the equation for X (top of the module); the part of a slip across its
+        force; and slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|:
+        the error of the total.
         """
         if not np.isfinite(state.displacement).all():
             return np.inf
@@ -176,11 +157,7 @@ class VectorProblem(Loaded):
 
     @cached_property
     def shift(self) -> Shift:
-        """A shift for the cones: docs/theory/vector-friction.md, "Convexity".
-
-        By (3) of that page it is 2 / (2 - nu) times, with s_i as in `convexity_numbers`,
-
-            1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
+        """The shift for the cones, from (3) of docs/theory/vector-friction.md.
 
         If a share exceeds 21/25, all shares are equal and follow from the smallest eigenvalue.
         """

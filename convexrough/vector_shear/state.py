@@ -2,8 +2,7 @@
 
 `shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces move the
 surface by Cerruti's tensor, so forces and slips are vectors, which turn a little from the direction
-of the shear force. The state minimises a convex energy (`convexrough.vector_shear.problem`);
-Newton's method or a second-order cone program finds it. Derived in docs/theory/vector-friction.md.
+of the shear force (docs/theory/vector-friction.md).
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState
 
 
 class FrictionSolver(Protocol):
-    """Frozen settings of a solver, which raises SolverError rather than return a poor result."""
+    """The interface of solvers: frozen settings. SolverError replaces inaccurate results."""
 
     @property
     def name(self) -> str: ...
@@ -94,14 +93,14 @@ class VectorShearState(Table, Plottable):
 def shear_vector(
     contact: Contact, *, force: ArrayLike, solver: FrictionSolver | None = None
 ) -> VectorShearState:
-    """The friction state with the full tangential kernel, after first loading at constant load.
+    """The friction state with the full tangential kernel, after loading from rest at constant load.
 
     force  : [force] the pair (Qx, Qy), or a number along x
     solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
 
     Raises InputError if the scene has no friction or |Q| exceeds f P; SolverError if the solver
     does not converge or is not installed, or if the program is not convex because the asperities
-    are too dense.
+    are too crowded.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> print(f"{state.disagreement:.3f}")
@@ -150,7 +149,7 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
-    """The solver's result, checked to be finite. An error has its forces in the scene's units."""
+    """The solver's result, checked to be finite. SolverErrors keep its forces."""
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
@@ -166,7 +165,6 @@ def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> Vec
 
 
 def _vector(force: ArrayLike) -> Array:
-    """(2,) the force from a number along x, or from a pair."""
     if np.ndim(force) == 0:
         return np.array([checks.array("force", force, length=1)[0], 0.0])
     pair = checks.array("force", force)
@@ -177,10 +175,9 @@ def _vector(force: ArrayLike) -> Array:
 
 
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
-    """The state at |T| = sum P: all forces and slips are along T.
+    """The state at |T| = sum P, where all forces and slips are along T.
 
-    This needs displacements B q with the same component across T at all asperities. Otherwise the
-    forces only tend to this state as X grows without bound.
+    If displacements B q across T differ, the forces only tend to it as X grows without bound.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
@@ -198,14 +195,14 @@ def _gross(problem: VectorProblem, total: Array) -> VectorState:
 
 
 def _times(vectors: Array, size: Array | float) -> Array:
-    """vectors * size, and 0 where the vector is 0, even times infinity."""
+    """vectors * size, and 0 where a vector is 0, even times infinity."""
     product = np.zeros(np.broadcast_shapes(vectors.shape, np.shape(size)))
     np.multiply(vectors, size, out=product, where=vectors != 0)
     return product
 
 
 def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) -> float:
-    """The relative difference from the forces of `shear` along the total; 0 at rest."""
+    """Relative difference of the forces from those of `shear`, along the total; 0 at rest."""
     if height == 0:
         return 0.0
     other, _ = problem.from_rest(height)
@@ -217,8 +214,6 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
 def _certificate(
     contact: Contact, problem: VectorProblem, state: VectorState, bounds: VectorBounds
 ) -> ShearCertificate:
-    """The certificate in the scene's units, from the bounds on a state."""
-
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
         return problem.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
@@ -251,7 +246,6 @@ def _certificate(
 
 
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
-    """The state of a contact without load."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
     certificate = shear(contact, force=0.0).certificate

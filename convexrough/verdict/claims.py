@@ -1,4 +1,4 @@
-"""Claimed forces from a file: one per asperity of a scene, in its order."""
+"""Claimed forces from a file, one per asperity of a scene, in the scene's order."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import rounded_up
 
-#: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given:
-#: five digits are enough, and every asperity still has one nearest row.
+#: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given.
 POSITION_TOLERANCE = 1e-2
 
 #: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
 
-#: Upper limit of the median distance of loaded nodes from their asperities, over the spacing. For
-#: random points this is about 0.4.
+#: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
+#: At random points the median is about 0.4.
 BY_CHANCE = 0.25
 
 #: Negative loads up to this fraction of the largest load may be noise.
@@ -45,8 +44,8 @@ class Manner(Reading):
 
     sign      : -1 where compression is negative;  floor : [force] loads up to this are noise
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
-    missing_open : true if asperities without a row are open
-    nodes     : true if rows are nodes or pixels, summed at the nearest asperity
+    missing_open : True if asperities without a row are open
+    nodes     : True if rows are nodes or pixels, summed at the nearest asperity
     """
 
     sign: int = 1
@@ -87,7 +86,7 @@ def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
 
 
 def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Shear forces [force] from a file: its column force, and statuses if it has them."""
+    """Shear forces [force] from the column `force` of a file, and statuses if it has them."""
     return _read(path, scene, "force", how, np.inf)
 
 
@@ -156,10 +155,7 @@ def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDA
 
 
 def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
-    """The areas of nodes, or the one area of the points of a regular grid.
-
-    The points of a hexagonal grid are every second one of a rectangular grid.
-    """
+    """The areas of nodes, or the one area of a regular grid."""
     if "area" in columns:
         return columns["area"]
     try:
@@ -172,7 +168,6 @@ def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
 
 
 def _explained(table: ReadTable) -> Iterator[str]:
-    """Lines that say how many rows there are, and how each column is read."""
     yield f"rows: {len(table.rows):,}{f', {table.style}' if table.style else ''}"
     for name, called in table.called.items():
         unit = f" in {table.units[name]}" if name in table.units else ""
@@ -201,7 +196,6 @@ class _Placing:
         self.points = np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self) -> Indices:
-        """The asperity of each row, where rows are asperities."""
         count, rows = len(self.scene), len(self.table.rows)
         found = np.arange(rows) if self.points is None else self._matched(self.points)
         by = "positions"
@@ -231,7 +225,7 @@ class _Placing:
         loaded, pressed = self.points[values != 0], np.abs(values[values != 0])
 
         def fits(points: Array) -> bool:
-            """True if near to more than one asperity, and nearer than random points."""
+            """True if points are near to several asperities, and nearer than random points."""
             near, their = _nearest(self.scene.contact_points, points)
             parts = near / apart[their]
             return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
@@ -260,8 +254,8 @@ class _Placing:
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.manner.missing_open)
-        # Rising numbers may be of nodes and are ignored; in another order, or if nearly all fit,
-        # they are indices.
+        # Increasing numbers may be those of nodes and are ignored. In another order, or if nearly
+        # all fit, they are indices.
         if times.max() == 1:
             sure |= bool(name) and bool((np.diff(index) < 0).any())
         else:
@@ -317,7 +311,7 @@ class _Placing:
         return owners
 
     def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:
-        """The exchange, sign or unit of x and y whose correction makes all points fit; else ""."""
+        """A sentence on the exchange, sign or unit of x and y that makes all fit; else ""."""
         x, y = (bare(self.table.called[name]) for name in ("x", "y"))
         exchange = f"--column x={y} --column y={x}"
         if fits(points[:, ::-1]):
@@ -333,7 +327,7 @@ class _Placing:
         return ""
 
     def _shifted(self, points: Array, allowed: float, fits: Callable[[Array], bool]) -> str:
-        """The shift whose correction makes all points fit; else ""."""
+        """A sentence on the shift that makes all points fit; else ""."""
         positions = self.scene.asperities.positions
         tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
         if len(points) == len(positions):

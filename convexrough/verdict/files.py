@@ -1,4 +1,4 @@
-"""`verify_files`: read claims from files, and compare them with the proof."""
+"""`verify_files`: verdicts on the claims of files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,6 @@ def verify_files(
 
 
 def _claimed_to_slide(path: Path, forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
-    """(n,) true where the file claims sliding; None if it has no statuses."""
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))

@@ -84,7 +84,7 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
 
 
 def describe_verdict(found: Verified) -> list[str]:
-    """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
+    """Aligned lines on each claim: what is wrong, undecided, or inaccurate, and the total."""
     lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
         others = ": --json and --out have all"
@@ -99,7 +99,6 @@ def describe_scene(scene: Scene) -> list[str]:
 
 
 def _proved(claim: Claim) -> str:
-    """One line that says what is proved of a claim."""
     if len(claim.wrongly_claimed):
         return f"{claim.proved} wrong"
     if len(claim.undecided):
@@ -116,7 +115,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
-    """Aligned lines of one claim; `others` says where to find the rows that a table leaves out."""
+    """Aligned lines on one claim; `others` says where to find the rows that a table leaves out."""
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, scene, which[:MOST_LISTED])
@@ -141,7 +140,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
 
 
 def reason(claim: Claim) -> str:
-    """One line: the reasons why a claim does not hold; "" if it holds."""
+    """The reasons why a claim does not hold, on one line; "" if it holds."""
     counts = {"wrong statuses": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
     counts[f"{claim.one}s not within the tolerance"] = len(claim.off)
     parts = [f"{what} ({count:,})" for what, count in counts.items() if count]
@@ -151,7 +150,7 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Verified | ConvexroughError) -> bytes:
-    """A JUnit test suite with a case for each check; or with the error in place of the cases."""
+    """A JUnit test suite with a case for each check, or with only the error."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     if isinstance(found, Verified):
         kind, cases = "failure", list(_cases(found))
@@ -171,7 +170,6 @@ def junit(found: Verified | ConvexroughError) -> bytes:
 
 
 def _cases(found: Verified) -> Iterator[tuple[str, str]]:
-    """Pairs of a question and its failure message, "" if there is no failure."""
     for claim in found.claims:
         wrong = {what: which for what, which in claim.wrong.items() if len(which)}
         asked = {
@@ -192,7 +190,6 @@ def _named(scene: Scene, which: Indices) -> str:
 
 
 def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
-    """The lines of a table of asperities; empty if there are none."""
     if len(which) == 0:
         return []
     length, force = scene.units

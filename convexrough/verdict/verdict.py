@@ -1,10 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-Loads make three claims: the asperities with a load above the floor touch, the others do not, and
-the loads are correct. `certify` bounds the errors of the loads; this module compares the claimed
-set with the proved statuses. Where the loads are too inaccurate to prove every status, Newton's
-method continues from them to a solution, and the certificate of that solution shows which
-asperities are wrong. `friction.verdict` does the same for shear forces.
+Where the loads are too inaccurate to prove every status, Newton's method continues from them to a
+solution, and the certificate of that solution shows which asperities are wrong. `friction.verdict`
+does the same for shear forces.
 """
 
 from __future__ import annotations
@@ -30,13 +28,14 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: Fraction of the largest load up to which hints call a load noise.
+#: Loads up to this fraction of the largest are called noise in hints.
 NOISE = 1e-6
 
-#: `_moved`: distances relative to the array that count as 0; fraction of the error that may remain.
+#: For `_moved`: distance over the size of the array that counts as 0, and largest remaining part of
+#: the error.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: Prefix of the unit in which loads too large by this power of ten were given.
+#: Prefixes of the units of loads that are too large by these powers of ten.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 
@@ -82,22 +81,22 @@ class Verdict(Claim, Table, Plottable):
 
     @cached_property
     def claimed(self) -> NDArray[np.bool_]:
-        """(n,) true where the asperity is claimed to touch."""
+        """(n,) True where the asperity is claimed to touch."""
         return frozen(self.loads > self.floor)
 
     @cached_property
     def wrongly_open(self) -> Indices:
-        """(m,) claimed open, and proved to touch."""
+        """(m,) indices of asperities that are claimed to be open, and proved to touch."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "contact")))
 
     @cached_property
     def wrongly_loaded(self) -> Indices:
-        """(m,) claimed to touch, and proved to be open."""
+        """(m,) indices of asperities that are claimed to touch, and proved to be open."""
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] bounds from the certificate of the loads, plus the loads counted as 0."""
+        """(n,) [force] bounds from the certificate of the loads, plus the loads that count as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         return frozen(self.certificate.load_errors + ignored)
 
@@ -179,7 +178,7 @@ def verify(
         hardly more than the contact set
     floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
         asperity is open
-    influence : compliance operator; None for the cheapest that is exact
+    influence : compliance operator; None for the cheapest
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
 
@@ -201,7 +200,7 @@ def verify_on(
     within: float = WITHIN,
     floor: float = 0.0,
 ) -> Verdict:
-    """The verdict of `verify`, for a problem that is already assembled."""
+    """The verdict of `verify`, for an assembled problem."""
     floor = checks.non_negative("floor", floor)
     within = tolerance("within", within)
     given = checks.array("loads", loads, length=len(problem.scene))
@@ -222,4 +221,4 @@ def verify_on(
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:
             continue
-    return verdict  # with the certificate of the loads alone
+    return verdict  # statuses then follow only from the certificate of the loads

@@ -193,7 +193,7 @@ def test_the_smallest_shear_is_borne() -> None:
     assert missing <= path.asperity_force_errors[-1].sum() + 1e-30 * P
 
 
-@pytest.mark.parametrize("share", [1e-24, 1e-28])
+@pytest.mark.parametrize("share", [1e-24, 1e-28, 1e-40])
 def test_a_path_through_almost_no_load(share: float) -> None:
     scene, approach = SCENES["dense"]
     load = cr.press(scene, approach=approach).load
@@ -201,6 +201,27 @@ def test_a_path_through_almost_no_load(share: float) -> None:
     path = cr.load_path(scene, loads=np.array([1.0, share, 1.0]) * load, forces=shear)
     assert (path.displacement_errors <= 1e-8 * path.displacements.max()).all()
     assert (path.loss_errors <= 1e-8 * 0.25 * load * approach).all()
+
+
+def test_a_load_below_all_digits_is_refused() -> None:
+    with pytest.raises(cr.InputError, match="largest"):
+        cr.load_path(PAPER, loads=[P, 1e-300 * P], forces=[0.0, 0.0])
+    with pytest.raises(cr.InputError, match="largest"):
+        cr.load_path(PAPER, loads=[1e-300 * P], forces=[0.0], start=cr.press(PAPER, load=P))
+
+
+def test_gross_sliding_where_order_fails() -> None:
+    """There and back at the limit f P, at a load that varies and one that does not."""
+    contact = around(4.0)
+    loads = np.array([4.0, 4.0, 3.0, 4.0])
+    path = cr.load_path(contact.scene, loads=loads, forces=0.5 * loads * [1, -1, -1, 0])
+    assert path.order == "fails"
+    limits = 0.5 * path.asperity_loads
+    assert path.asperity_forces[:3] == pytest.approx(limits[:3] * [[1], [-1], [-1]], rel=1e-12)
+    true = Bristles(contact).to(2.0 * np.linspace(0, 1 - 1e-7, 201)[1:])
+    history = cr.history(contact, forces=[2.0, -2.0, 2.0])
+    assert history.displacements[0] == pytest.approx(true.displacement, rel=1e-4)
+    assert history.displacements[2] == pytest.approx(history.displacements[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("fraction", [1e-6, 1e-5, 1e-4])

@@ -1,4 +1,4 @@
-"""The status audit: six fresh scenes by default, ten thousand with --full."""
+"""The status audit: four fresh scenes by default, ten thousand with --full."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,7 +13,7 @@ import convexrough as cr
 
 def test_every_status_and_bound(pytestconfig: pytest.Config) -> None:
     first, full = 1_000_000 * pytestconfig.option.seed, pytestconfig.option.full
-    tally = audit(range(10_000) if full else range(first, first + 6))
+    tally = audit(range(10_000) if full else range(first, first + 4))
     if not full:
         return
     judged = tally.scenes - tally.refused - tally.unsolved
@@ -26,7 +26,7 @@ def test_every_status_and_bound(pytestconfig: pytest.Config) -> None:
     ]
     statuses, undecided = np.sum(usual, axis=0)
     assert undecided <= 0.01 * statuses
-    assert report(tally).count("|") > 100
+    assert report(tally).count("undecided") > 100
 
 
 @pytest.mark.parametrize("kind", ["loss_error", "loss"])

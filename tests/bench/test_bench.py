@@ -10,19 +10,15 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from figure_checks import texts
-from matplotlib.text import Text
 
 import convexrough as cr
 from convexrough.bench import measure, page, suite
-from convexrough.bench.figures import bench_figures
 from convexrough.bench.measure import Attempt, reference
 from convexrough.bench.profile import Profile, profile_of
-from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
+from convexrough.bench.rows import Bench, Row, better_than_default, frontier
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton
 
-ROOT = Path(__file__).parent.parent.parent
 SMALL = (("lattice", 61),)
 
 
@@ -34,6 +30,7 @@ def tiny() -> Bench:
         patch.setattr(suite, "PRESSES", (*SMALL, ("scattered", 61)))
         patch.setattr(suite, "FOLLOWING", dict.fromkeys(suite.FOLLOWING, SMALL))
         patch.setattr(suite, "SWEEPS", ((61, 200, 1),))
+        patch.setattr(suite, "ROUNDS", 1)
         patch.setattr(measure, "LEAST_RUNS", 1)
         return suite.run(quick=True)
 
@@ -109,17 +106,6 @@ def test_who_is_better_than_the_default() -> None:
                          "better, default.")  # fmt: skip
 
 
-def test_exponent() -> None:
-    sizes = np.array([1e4, 3e4, 1e5, 1e6])
-    assert exponent(sizes, 7e-6 * sizes**1.13) == pytest.approx(1.13)
-    assert np.isnan(exponent([1e4], [1.0]))
-    rows = tuple(
-        Row("press", "lattice", int(n), seconds=1e-6 * n**1.1) for n in (5e3, 1e4, 1e5, 1e6)
-    )
-    (line,) = replace(tiny(), rows=rows).verdicts()
-    assert line.startswith("The time of a press grows as n^1.10 from 10,000 to 1,000,000 ")
-
-
 def test_every_task_is_timed_on_the_scene_that_it_names() -> None:
     rows = {(each.task, each.family): each for each in tiny().rows if each.task != "solve"}
     for task in ("press", "from nothing", *suite.FOLLOWING):
@@ -134,17 +120,6 @@ def test_every_task_is_timed_on_the_scene_that_it_names() -> None:
     assert rows["sweep", "rough"].message == "10 scenes, 1 processes, 10 certified"
     default = next(each for each in tiny().rows if each.task == "solve" and each.default)
     assert 0 < default.error < 1e-14
-
-
-def test_a_task_that_fails_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object, **__: object) -> None:
-        raise cr.SolverError("no", solver="test")
-
-    monkeypatch.setattr(measure, "load_path", refuse)
-    found = measure.measure_task("load path", "lattice", 61, 0.0)
-    assert (found.outcome, "no" in found.message) == ("failed", True)
-    said = "\n".join(page.describe(replace(tiny(), rows=(found,))))
-    assert "load path, 61 asperities (lattice): failed, " in said
 
 
 # What it writes.
@@ -197,8 +172,6 @@ def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> 
     assert "| lattice " in text
     assert "(figures/work-precision.png)" in text
     assert (tmp_path / "docs" / "figures" / "work-precision.png").exists()
-    assert command("bench", "--quick", "--page", "docs/page.md", "--force").status == 0
-    assert path.read_text() == text
 
 
 @pytest.mark.parametrize(
@@ -213,30 +186,6 @@ def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path,
     assert "page.md: expected one line <!-- bench: begin -->" in ran.err
     assert (tmp_path / "page.md").read_text() == text
     assert not (tmp_path / "bench-results").exists()
-
-
-def test_the_page_of_the_documentation() -> None:
-    path = ROOT / "docs" / "performance.md"
-    before, _ = page.split_page(path)
-    assert "convexrough bench --page docs/performance.md" in before
-    block = path.read_text("utf-8").split(page.BEGIN)[1].split(page.END)[0]
-    heading = next(line for line in block.splitlines() if line.startswith("| scene"))
-    assert [cell.strip() for cell in heading.split("|")[-3:-1]] == ["MB", "proved error"]
-
-
-def test_figures() -> None:
-    for figure in bench_figures(tiny()).values():
-        figure.draw_without_rendering()
-        shown = [axes.xaxis.label for axes in figure.axes]
-        shown += [text for legend in figure.legends for text in legend.get_texts()]
-        for text in filter(Text.get_text, shown):
-            box = text.get_window_extent()
-            assert figure.bbox.padded(1).contains(box.x0, box.y0), text
-            assert figure.bbox.padded(1).contains(box.x1, box.y1), text
-    work = bench_figures(tiny())["work-precision"]
-    labels = {text.get_text() for text in texts(work)}
-    assert {"newton (default)", "conic", "bristles", "frontier", "seconds"} <= labels
-    assert bench_figures(replace(tiny(), rows=()))
 
 
 def test_a_performance_profile() -> None:

@@ -63,17 +63,6 @@ def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
         assert_allclose(appendix.energies(state), cycle.asperity_losses, rtol=1e-12)
 
 
-def test_at_the_limit_the_last_to_slide_stands_for_the_adhered() -> None:
-    contact = pressed(0.0)
-    limit = 0.5 * contact.load
-    near, at = (cr.shear(contact, force=t * limit) for t in (1 - 1e-12, 1.0))
-    assert np.count_nonzero(near.stick_radii) == 1
-    assert not at.stick_radii.any()
-    assert np.isnan(appendix.scatter(at))
-    assert_allclose(appendix.slips(at), appendix.slips(near), rtol=1e-6)
-    assert_allclose(appendix.slips(cr.shear(contact, force=-limit)), -appendix.slips(at))
-
-
 def test_open_asperities_and_no_shear() -> None:
     state = sheared(0.3, 0.5)
     is_open = state.contact.loads == 0

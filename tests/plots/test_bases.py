@@ -51,6 +51,7 @@ def test_an_ellipse_beside_the_contact() -> None:
     assert "smooth sphere" not in "".join(map(texts, figures.values()))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("base", [np.inf, (1.0, np.inf)])
 def test_no_smooth_reference(base: Any) -> None:
     contact = pressed(base)

@@ -49,37 +49,6 @@ def test_a_dense_stick_slip_map_is_a_mosaic() -> None:
     assert dark.sum() / shown.sum() == pytest.approx(sliding, abs=0.05)  # cells of one size
 
 
-def test_a_dense_profile_is_density_and_median() -> None:
-    contact = dense()
-    figures = plots.press_figures(contact)
-    for figure in figures.values():
-        fits(figure)
-    _, profile, _ = figures["pressure"].axes
-    texts = {line.get_label() for line in profile.lines}
-    assert texts == {"their median", "smooth sphere"}
-    (axes,) = figures["loads"].axes
-    (median,) = [line for line in axes.lines if line.get_label() == "their median"]
-    r, share = (np.asarray(v, dtype=float) for v in median.get_data())
-    a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
-    here = contact.loads > 0
-    near = here & (np.abs(contact.scene.asperities.distances / a_H - 0.5) < 0.02)
-    expected = 100 * np.median(contact.loads[near]) / contact.load
-    shown = np.interp(0.5e3 * a_H, r, share)  # in µm, where the scene is in mm
-    assert shown == pytest.approx(expected, rel=0.05)
-
-
-def test_some_of_many_cycles_are_drawn_and_named() -> None:
-    contact = few()
-    parts = [0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
-    cycles = cr.cycles(contact, np.array(parts) * 0.5 * contact.load)
-    figure = plots.cycle_figures(cycles)["hysteresis"]
-    fits(figure)
-    whole, upright, _ = figure.axes
-    assert [text.get_text() for text in upright.texts] == ["±0.2", "±0.4", "±0.7", "±0.9"]
-    assert whole.get_title(loc="left") == "whole contact: 4 of 13"
-    assert len(whole.lines) == 8
-
-
 def test_figures_show_themselves_in_a_notebook() -> None:
     figures = plots.press_figures(few())
     page: Any = figures._repr_html_()

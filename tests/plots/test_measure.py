@@ -69,19 +69,6 @@ def test_scattered_asperities_are_all_in_the_right_panel() -> None:
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("$r$  [µm]", "$p$  [GPa]")
 
 
-def test_no_half_of_the_map_of_ones_own_surface_is_empty() -> None:
-    """Flat, and far from the origin: the window is that of the contacts."""
-    random = np.random.default_rng(5)
-    points = random.uniform(500.0, 550.0, (80, 2))
-    asperities = cr.Asperities(points, random.uniform(0.5, 2.0, 80), random.normal(0, 0.3, 80))
-    scene = cr.Scene(np.inf, asperities, cr.Material.from_youngs(210.0, 0.3))
-    contact = cr.press(scene, load=20.0)
-    chart = plots.press_figures(contact)["pressure"].axes[0]
-    size, r_c = np.ptp(chart.get_xlim()), plots.measure.Scale(contact).typical
-    discs = contact.scene.contact_points[contact.loads > 0] / r_c
-    assert np.ptp(discs, axis=0).max() > 0.7 * size
-
-
 def test_fretting_is_drawn_with_units() -> None:
     contact = scattered()
     cycle = cr.cycle(contact, maximum=0.2 * contact.load)
@@ -113,3 +100,9 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
 def test_other_formats_are_refused(tmp_path: Path, form: str, dpi: Any) -> None:
     with pytest.raises(cr.InputError, match=r"form|dpi"):
         plots.save(Figure(), tmp_path / "a", form, dpi)
+
+
+def test_the_map_of_a_gradient_fits() -> None:
+    contact = scattered()
+    gradient = cr.cycle(contact, maximum=0.1 * contact.load).gradient()
+    fits(plots.gradient_figures(gradient, of="D_0")["gradient"])

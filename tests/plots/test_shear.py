@@ -95,19 +95,6 @@ def test_figures_of_the_paper_fit_to_print(name: str) -> None:
 # --- stick-slip map -------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("name", ["paper", "rough"])
-def test_a_disc_for_every_status(name: str) -> None:
-    shown = states(name, [0.1, 0.37, 0.5, 0.7])
-    figure = plots.shear_figures(shown)["stick_slip"]
-    for axes, state in zip(figure.axes, shown, strict=True):
-        sliding = int((state.status == "sliding").sum())
-        assert discs(axes, "sliding") == sliding
-        assert discs(axes, "stick") == discs(axes, "partial") == (state.status == "partial").sum()
-        share = state.force / limit(name)
-        assert axes.get_title() == f"$Q/(fP)$ = {share:g}:\n{sliding} of 37 slide"
-
-
 def test_discs_have_the_radii_of_the_state() -> None:
     (state,) = states("rough", [0.5])
     (axes,) = plots.shear_figures([state])["stick_slip"].axes
@@ -184,19 +171,6 @@ def test_the_path_passes_through_every_step() -> None:
 
 
 # --- the paper's figures --------------------------------------------------------------------------
-
-
-def test_rings_have_the_letters_of_the_paper() -> None:
-    chart, bars = of_paper("paper")["fig4_rings"].axes
-    letters = [text.get_text() for text in chart.texts]
-    assert {letter: letters.count(letter) for letter in letters} == dict(
-        F=1, E=6, D=6, C=6, B=12, A=6
-    )
-    assert chart.get_title(loc="left") == "slide at $Q/(fP)$ = 0.5: A"
-    assert discs(chart, "sliding") == 6
-    written = [text.get_text() for text in bars.texts]
-    onsets = cr.onset_of_sliding(contact("paper")) / limit("paper")
-    assert written[:-1] == [f"{onsets[i]:.4f}" for i in (0, 1, 7, 13, 19, 31)]
 
 
 def test_the_traction_drawn_is_the_field() -> None:

@@ -111,14 +111,6 @@ def test_run_writes_the_page(command: Any, tmp_path: Path) -> None:
     assert "slider.html" in json.loads((tmp_path / "a-results/files.json").read_text())["files"]
 
 
-def test_without_friction_there_is_no_page_and_no_work(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
-    ran = command("run", "a.toml", "--html")
-    assert ran.status == 2
-    assert "a.toml: friction" in ran.err
-    assert not (tmp_path / "a-results").exists()
-
-
 # In a browser.
 
 
@@ -175,34 +167,6 @@ def follow(shown: Opened, index: int) -> None:
     options = shown.page.locator("#follow option").all_inner_texts()
     (label,) = [option for option in options if option.startswith(f"{index}:")]
     shown.page.locator("#follow").select_option(label=label)
-
-
-@in_browser
-def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_path: Path) -> None:
-    tiny = cr.Asperities.hexagonal(spacing=25e-6, tip_radius=2e-4, within=1.02e-4)
-    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), 0.5, "summit", ("m", "N"))
-    text = page_of(cr.press(scene, approach=5e-7))
-    (tmp_path / "slider.html").write_text(text, encoding="utf-8")
-    shown = Opened(browser, tmp_path / "slider.html")
-    chooser = shown.page.locator("#follow")
-    labels = chooser.locator("option").all_inner_texts()
-    assert "1: (2.5\xa0×\xa010⁻⁵, 0) m" in labels
-    room = chooser.evaluate("""list => {
-        const pen = document.createElement("canvas").getContext("2d");
-        pen.font = getComputedStyle(list).font;
-        const widths = [...list.options].map(each => pen.measureText(each.text).width);
-        return [Math.max(...widths) + 30, list.clientWidth];
-    }""")
-    assert room[0] < room[1]
-    shown.close()
-
-
-@in_browser
-@pytest.mark.parametrize("width", [1300, 1000, 400])
-def test_lines_of_the_certificate_are_not_clipped(opened: Opened, width: int) -> None:
-    opened.page.set_viewport_size({"width": width, "height": 900})
-    overflow = "text => text.scrollWidth - text.clientWidth"
-    assert opened.page.locator("#certificate").evaluate(overflow) <= 0
 
 
 def near(values: Any) -> Any:
@@ -262,15 +226,3 @@ def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> No
     assert opened.text("said") == "0 of 37 slide, 37 stick in part"
     said = opened.page.locator("#force").get_attribute("aria-valuetext")
     assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick in part"
-
-
-@in_browser
-def test_an_asperity_is_followed_by_mouse_and_keyboard(opened: Opened, contact: cr.Contact) -> None:
-    opened.page.locator("#map circle.stick").first.click()
-    assert opened.page.locator("h2 .who").inner_text() == "0"
-    assert_shown(opened, contact, 0.5, 0)
-    opened.page.locator("#follow").focus()
-    opened.page.keyboard.press("End")
-    assert opened.page.locator("h2 .who").inner_text() == "36"
-    follow(opened, 7)
-    assert_shown(opened, contact, 0.5, 7)

@@ -65,39 +65,3 @@ def test_the_curve_is_drawn_where_it_is() -> None:
     assert_allclose(lower.lines[0].get_ydata(), 100 * curve.model_error)
     title = upper.get_title(loc="left")
     assert title.startswith(f"advised pruning: at least {100 * curve.trusted_from:.3g} %")
-
-
-def test_numbers_over_one_decade_have_plain_labels() -> None:
-    few = cr.surface.self_affine(0.8, 0.1, 32.0, seed=2, pixels=128, unit="µm").summits(0.0)
-    figure = provability_figure(cr.surface.provability(few, lambda it: press(it, 100.0)), 0.05)
-    fits(figure)
-    figure.draw_without_rendering()
-    low, high = figure.axes[0].get_ylim()
-    labels = [text.get_text() for text in figure.axes[0].get_yticklabels(which="both")]
-    shown = [float(each) for each in labels if each and low <= float(each) <= high]
-    assert len(shown) >= 3
-
-
-def test_one_summit() -> None:
-    y, x = np.mgrid[:9, :9] - 4.0
-    one = cr.surface.Surface(-(x**2) - y**2, 1.0)
-    summits = one.summits()
-    assert len(summits) == 1
-    curve = cr.surface.provability(summits, lambda left: press(left, 1e-3), levels=[0.1])
-    for figure in surface_figures(one, summits, summits, curve, press(summits, 1e-3)).values():
-        fits(figure)
-
-
-@pytest.mark.sample(1)
-def test_axes_are_in_si_with_prefixes() -> None:
-    """A map in metres has the same axes as one in micrometres."""
-    drawn = []
-    for unit in ("µm", "m"):
-        surface = MAP.to_unit(unit)
-        figures = surface_figures(surface, surface.summits(0.0), surface.summits(0.05))
-        for figure in figures.values():
-            fits(figure)
-        drawn.append([said(figure) - {""} for figure in figures.values()])
-    assert drawn[0] == drawn[1]
-    assert {"$x$  [µm]", "$y$  [µm]", "$z$  [µm]"} <= drawn[1][0]
-    assert {"height  [µm]", "tip radius  [µm]"} <= drawn[1][1]

@@ -50,58 +50,23 @@ def contact() -> cr.Contact:
 # Scene files
 
 
-def test_every_table_is_read(tmp_path: Path) -> None:
-    more = """
-[friction]
-coefficient = 0.5
-[shear]
-fractions = [0, 0.5, 1]
-[cycle]
-maximum_fraction = [0.1, 0.5]
-[history]
-fractions = [1, -1, 0.25]
-[solver]
-name = "newton"
-[units]
-length = "mm"
-force = "N"
-"""
-    rough = HEXAGONAL.replace("summit", "closest") + "within = 0.01\nheight_std = 1e-6\nseed = 7"
-    file = read(tmp_path, rough, "load = 1", more)
-    expected = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.01, height_std=1e-6, seed=7
-    )
-    assert np.array_equal(file.scene.asperities.heights, expected.heights)
-    assert (file.scene.geometry, file.scene.friction) == ("closest", 0.5)
-    assert (file.approach, file.load) == (None, 1.0)
-    assert list(file.stages) == ["normal", "shear", "cycle", "history"]
-    assert file.stages["shear"].fractions == [0.0, 0.5, 1.0]
-    assert (file.stages["cycle"].maximum_fraction, file.stages["cycle"].lowest) == (
-        [0.1, 0.5],
-        [-0.1, -0.5],
-    )
-    assert file.stages["history"].fractions == [1.0, -1.0, 0.25]
-    assert file.solver == cr.solvers.Newton()
-    assert file.scene.units == ("mm", "N")
-
-
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("asperities", "expected"),
     [
         ("spacing = -0.1", "spacing: found -0.1, expected a positive number"),
-        ("spacing = 0", "spacing: found 0, expected a positive number"),
         ("spacing = nan", "spacing: found nan, expected a positive number"),
         ("spacing = true", "spacing: found true, expected a positive number"),
-        ('spacing = "1"', "spacing: found '1', expected a positive number"),
         ("spacing = 1e-61", "spacing: found 1e-61, expected a size from 1e-60 to 1e+60"),
         ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
         ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
-        ("spacing = 1\ntip_radius = inf", "tip_radius: found inf, expected a positive number"),
         ("spacing = 1\ntip_radius = [1, -2]", "tip_radius[1]: found -2, expected a positive"),
         ("spacing = 1\nheight_std = 1", "seed: missing, needed with height_std"),
-        ("spacing = 1\ntip_radius_cv = 1", "seed: missing, needed with tip_radius_cv"),
+        (
+            "spacing = 1\ntip_radius_cv = 10\nseed = 1",
+            "tip_radius_cv: found 10, expected a standard deviation over the mean",
+        ),
         ("spacing = 1\nseed = 1.5", "seed: found 1.5, expected a whole number"),
-        ("spacing = 1\nseed = -1", "seed: found -1, expected a whole number"),
         ("spacing = 1\nwithin = -1", "within: found -1, expected a number that is not negative"),
         ("spacing = 1\ngeometry = 3", 'geometry: found 3, expected "summit" or "closest"'),
         ('spacing = 1\npath = "a.csv"', "path: not used with this pattern"),
@@ -116,6 +81,11 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
     assert line.startswith(f"[asperities] {expected}")
 
 
+PRESSED = "approach = 1e-5"
+FRICTION = "[friction]\ncoefficient = 1\n"
+
+
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("normal", "more", "expected"),
     [
@@ -123,52 +93,23 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
         ("approach = 1\nload = 1", "", "[normal] approach, load: found both, expected exactly"),
         ("load = 0", "", "[normal] load: found 0, expected a positive number"),
         ("approach = nan", "", "[normal] approach: found nan, expected a finite number"),
-        ("approach = 1e-5", "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
-        ("approach = 1e-5", "[sweep]", "[sweep]: many scenes, which `convexrough sweep` computes"),
-        (
-            "approach = 1e-5",
-            "[shear]\nfractions = [0.1]",
-            "[friction]: missing table, needed with [shear]",
-        ),
-        (
-            "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[shear]\nfractions = [0.1, -0.1]",
-            "[shear] fractions[1]: found -0.1, expected a number from 0 to 1",
-        ),
-        (
-            "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[shear]\nfractions = []",
-            "[shear] fractions: found [], expected a list of numbers from 0 to 1",
-        ),
-        (
-            "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[history]\nfractions = [1.1]",
-            "[history] fractions[0]: found 1.1, expected a number from -1 to 1",
-        ),
-        (
-            "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[cycle]\n"
-            "maximum_fraction = [0.1, 0.2]\nminimum_fraction = [0]",
-            "[cycle] minimum_fraction: found 1 values, expected 2, as in maximum_fraction",
-        ),
-        (
-            "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[cycle]\n"
-            "maximum_fraction = [0.1]\nminimum_fraction = [0.1]",
-            "[cycle] maximum_fraction[0]: found 0.1, expected a number above its minimum, 0.1",
-        ),
-        (
-            "approach = 1e-5",
-            "[solver]\nname = 'newtn'",
-            "[solver] name: found 'newtn', expected one of",
-        ),
-        (
-            "approach = 1e-5",
-            "[units]\nlength = 1",
-            "[units] length: found 1, expected text in quotes",
-        ),
+        (PRESSED, "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
+        (PRESSED, "[sweep]", "[sweep]: many scenes, which `convexrough sweep` computes"),
+        (PRESSED, "[shear]\nfractions = [0.1]", "[friction]: missing table, needed with [shear]"),
+        (PRESSED, FRICTION + "[shear]\nfractions = [0.1, -0.1]",
+         "[shear] fractions[1]: found -0.1, expected a number from 0 to 1"),
+        (PRESSED, FRICTION + "[shear]\nfractions = []",
+         "[shear] fractions: found [], expected a list of numbers from 0 to 1"),
+        (PRESSED, FRICTION + "[history]\nfractions = [1.1]",
+         "[history] fractions[0]: found 1.1, expected a number from -1 to 1"),
+        (PRESSED, FRICTION + "[cycle]\nmaximum_fraction = [0.1, 0.2]\nminimum_fraction = [0]",
+         "[cycle] minimum_fraction: found 1 values, expected 2, as in maximum_fraction"),
+        (PRESSED, FRICTION + "[cycle]\nmaximum_fraction = [0.1]\nminimum_fraction = [0.1]",
+         "[cycle] maximum_fraction[0]: found 0.1, expected a number above its minimum, 0.1"),
+        (PRESSED, "[solver]\nname = 'newtn'", "[solver] name: found 'newtn', expected one of"),
+        (PRESSED, "[units]\nlength = 1", "[units] length: found 1, expected text in quotes"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) -> None:
     (line,) = mistakes(tmp_path, normal=normal, more=more)
     assert line.startswith(expected)
@@ -182,14 +123,6 @@ def test_a_phase_in_degrees(tmp_path: Path) -> None:
         f"[steady] ellipse.phase: found 90, {expected}",
         f"[steady] phases[1]: found 180.0, {expected}",
     ]
-
-
-def test_the_former_name_of_the_largest_forces(tmp_path: Path) -> None:
-    """A maximum is a force in Python and was a fraction in files: it is refused, not guessed."""
-    more = "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]"
-    missing, unknown = mistakes(tmp_path, normal="approach = 1e-5", more=more)
-    assert missing.startswith("[cycle] maximum_fraction: missing")
-    assert unknown.startswith('[cycle] maximum: unknown key, did you mean "maximum_fraction"?')
 
 
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
@@ -208,11 +141,6 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         "[normal] approach, load",
         "[asperities]",
     ]
-
-
-def test_an_endless_lattice_is_counted_not_built(tmp_path: Path) -> None:
-    (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.0025", "1e-9"))
-    assert line.startswith("[asperities] within / spacing = 1e+07: found 3.63e+14 asperities")
 
 
 @pytest.mark.parametrize(
@@ -237,7 +165,7 @@ def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
 # What `within` is when the file does not say
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("pattern", ["hexagonal", "square"])
 @pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])
@@ -325,22 +253,6 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
         write(KeyboardInterrupt(), "2", force=True)
     assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
     assert (folder / "one.csv").read_text() == "1"
-
-
-def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
-    folder = tmp_path / "a"
-    folder.mkdir()
-    with results_folder(folder, force=False):  # empty: nothing to lose
-        pass
-    (folder / "mine.txt").write_text("precious")
-    for place, force, said in (
-        (folder, False, "not empty"),
-        (folder / "mine.txt", True, "cannot hold results"),
-        (folder / "mine.txt" / "c", False, "cannot hold results"),
-    ):
-        with pytest.raises(cr.FileError, match=said), results_folder(place, force=force):
-            raise AssertionError("computed")
-    assert (folder / "mine.txt").read_text() == "precious"
 
 
 def test_json_has_no_infinities() -> None:

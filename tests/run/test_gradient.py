@@ -26,51 +26,40 @@ def read(name: str) -> dict[str, Any]:
     return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
 
 
-def test_a_run(command: Any) -> None:
-    write('[gradient]\nof = "loss"\nfraction = 0.5\n')
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 0, outcome.err
-    assert "gradient of the loss at Q/(fP) = 0.5, at constant load" in outcome.out
-    summary = json.loads(Path("out/summary.json").read_text())["gradient"]
-    file = cr.read_scene("scene.toml")
-    contact = cr.press(file.scene, load=file.load)
-    gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
-    table = read("gradient")
-    np.testing.assert_array_equal(table["by_height"], gradient.heights)
-    np.testing.assert_array_equal(table["by_height_error"], gradient.height_errors)
-    np.testing.assert_array_equal(table["by_tip_radius"], gradient.tip_radii)
-    np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])
-    assert summary["by"]["contact_modulus"] == gradient.contact_modulus
-    assert summary["largest_by_height"] == gradient.heights[summary["largest_at"]]
-    assert abs(summary["largest_by_height"]) == np.abs(gradient.heights).max()
-
-
 def printed(out: str) -> dict[str, str]:
     """The lines of the gradient, by their first words."""
     lines = out.split("gradient of the ")[1].split("\n\n")[0].splitlines()[1:]
     return {line[:22].strip(): line[22:] for line in lines}
 
 
-def test_what_is_printed(command: Any) -> None:
+def test_what_is_written_and_printed(command: Any) -> None:
     """Names apart from numbers, what is held, how far heights are known, and what was asked by."""
     write('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    assert outcome.status == 0, outcome.err
+    assert "gradient of the loss at Q/(fP) = 0.5, at constant load and force" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
-    assert "at constant load and force" in outcome.out
+    contact = cr.read_scene("scene.toml").press()
+    gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
+    table = read("gradient")
+    np.testing.assert_array_equal(table["by_height"], gradient.heights)
+    np.testing.assert_array_equal(table["by_height_error"], gradient.height_errors)
+    np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])
+    assert summary["by"]["contact_modulus"] == gradient.contact_modulus
+    assert summary["largest_by_height"] == gradient.heights[summary["largest_at"]]
+    assert abs(summary["largest_by_height"]) == np.abs(gradient.heights).max()
     lines = printed(outcome.out)
     for name, slope in summary["by"].items():
         assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
     known = float(lines["by height"].split("error at most ")[1].rstrip(")"))
     assert summary["height_error"] <= known <= 1.2 * summary["height_error"]
-    table = read("gradient")
     far = np.hypot(table["by_x"], table["by_y"])
     at = int(lines["by position"].split("asperity ")[1].rstrip(")"))
     assert far[at] == far.max()
     assert lines["by position"].startswith(f"up to ({table['by_x'][at]:.8g}, ")
     assert "by tip_radius" not in lines
     write('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')
-    outcome = command("run", "scene.toml", "--out", "other", "--no-figures")
-    lines = printed(outcome.out)
+    lines = printed(command("run", "scene.toml", "--out", "other", "--no-figures").out)
     assert "by height" not in lines
     assert lines["by friction"] == "0"
     assert lines["by tip_radius"].startswith("up to ")
@@ -110,10 +99,3 @@ def test_where_there_is_none(command: Any) -> None:
     assert summary["cycle"][0]["loss"] > 0
     assert Path("out/cycle.csv").exists()
     assert not Path("out/gradient.csv").exists()
-
-
-def test_nothing_touches(command: Any) -> None:
-    write('[gradient]\nof = "load"\n', SCENE.replace("load = 3.60853389e-7", "approach = -1e-6"))
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 3
-    assert "gradient of the load: none, contact: found no load, expected" in outcome.out

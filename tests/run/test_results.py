@@ -10,7 +10,6 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
-from convexrough.run.stages.normal import limits_of
 
 FRICTION = "[friction]\ncoefficient = 0.5\n"
 
@@ -99,7 +98,7 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
     blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
     outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
     assert (
-        "1.09 of the base's radius from the axis: from 0.2 on, the paraboloid of the model"
+        "1.09 of the sphere's radius from the axis: from 0.2 on, the paraboloid of the model"
         in outcome.err
     )
     assert "of the tip radius: from 0.2 on, the paraboloid of the model" in outcome.err
@@ -120,19 +119,6 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
         assert (said in warned(command, tmp_path, text).err) == warns, radius
     few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", "0.004")
     assert said not in warned(command, tmp_path, few).err
-
-
-@pytest.mark.parametrize("spacing", [0.0025, 2.5e-4])
-def test_the_estimate_is_what_pressing_finds(spacing: float) -> None:
-    asperities = cr.Asperities.hexagonal(spacing=spacing, tip_radius=8 * spacing, within=0.0102)
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit")
-    contact = cr.press(scene, approach=5e-5)
-    closest = cr.Scene(1.0, asperities, scene.material, geometry="closest")
-    other = cr.press(closest, approach=5e-5)
-    heavy = contact.loads >= 0.1 * contact.loads.max()
-    change = np.abs(other.loads[heavy] / contact.loads[heavy] - 1).max()
-    assert limits_of(contact)["closest_change"] == pytest.approx(change, rel=0.02)
-    assert limits_of(other)["closest_change"] is None
 
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:

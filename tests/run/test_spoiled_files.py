@@ -1,16 +1,13 @@
 """What mutated files brought to light: each was a traceback, a hang, or a page of messages."""
 
-import io
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from scene_files import scene_text
 
 import convexrough as cr
 from convexrough.run import scene_file
-from convexrough.run.tables import read_table
 
 
 def refused(folder: Path, text: str) -> str:
@@ -38,35 +35,6 @@ def test_a_thousand_mistakes_are_counted(tmp_path: Path) -> None:
     said = refused(tmp_path, scene_text() + "".join(f"[t{i}]\na = 1\n" for i in range(1000)))
     assert len(said.splitlines()) == 51
     assert said.endswith("and 950 more mistakes")
-
-
-def test_spaces_before_a_unit_that_is_not_there(tmp_path: Path) -> None:
-    path = tmp_path / "loads.csv"
-    path.write_text("x" + " " * 100_000 + "load\n" + "1 2\n")
-    assert read_table(path, required=("load",)).columns["load"].tolist() == [2.0]
-
-
-def saved(values: Any) -> bytes:
-    out = io.BytesIO()
-    np.save(out, values)
-    return out.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        (b"(5,)", b"(5,("),  # a header without an end: tokenize.TokenError
-        (b"'<f8'", b"'<f9'"),
-        (b"(5,)", b"(5,9999999999999999)"[:4]),
-        (b"'fortran_order'", b"'fortran_0rder'"),
-    ],
-)
-def test_a_spoiled_header_of_an_array(tmp_path: Path, before: bytes, after: bytes) -> None:
-    contents = saved(np.zeros(5))
-    assert before in contents
-    (tmp_path / "loads.npy").write_bytes(contents.replace(before, after))
-    with pytest.raises(cr.FileError, match=r"loads\.npy: not an \.npy file"):
-        read_table(tmp_path / "loads.npy", required=("load",))
 
 
 STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"

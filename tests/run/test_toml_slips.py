@@ -3,13 +3,10 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scene_files import scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
-from convexrough.tabular.toml_slips import explained
 
 
 def refused(folder: Path, text: str) -> list[str]:
@@ -59,12 +56,6 @@ def test_all_slips_at_once(tmp_path: Path) -> None:
     assert lines[2].startswith("not a TOML file: ")
     assert lines[2].endswith("(at line 6, column 13): coefficient 0.5")
     assert len(lines) == 3
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.text(alphabet=st.sampled_from('ab=0.,;:"“[]#\n m1eD-\t'), max_size=80))
-def test_any_text_is_explained(text: str) -> None:
-    assert explained("a.toml", text, ValueError("wrong (at line 1, column 1)"))
 
 
 @pytest.mark.sample(1)

@@ -33,15 +33,6 @@ def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
     return replace(rough(geometry), sphere_radius=base, friction=friction)
 
 
-def test_two_equal_radii_are_a_sphere() -> None:
-    assert (
-        cr.Scene((2.0, 2.0), paper().asperities, MATERIAL, geometry="summit").sphere_radius == 2.0
-    )
-    assert (
-        cr.Scene([INF, INF], paper().asperities, MATERIAL, geometry="summit").sphere_radius == INF
-    )  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("base", [0.9, (0.7, 3.0), (INF, 0.4), INF])
 def test_closest_points_by_minimisation(base: Any) -> None:
     """The contact point and drop of "closest" minimise the gap of the two paraboloids."""
@@ -202,9 +193,7 @@ def _exactly(value: Pair, place: Any) -> Fraction:
 def test_no_gradient_by_the_radius_of_what_is_no_sphere() -> None:
     scene = on(INF)
     contact = cr.press(scene, load=3e-7)
-    with pytest.raises(
-        InputError, match="sphere_radius: found a flat base, expected a scene whose"
-    ):
+    with pytest.raises(InputError, match="sphere_radius: found a flat, expected a sphere"):
         contact.change(cr.Direction(sphere_radius=1e-3))
     with pytest.raises(InputError, match="by sphere_radius: found an ellipsoid"):
         cr.Objective(scene=on((1.0, 2.0)), of="load", by=["sphere_radius"], approach=4e-5)

@@ -94,7 +94,7 @@ def test_a_fine_bed_of_asperities_is_smooth() -> None:
     assert 2 * approaches[1] - approaches[0] == pytest.approx(hertz.approach, rel=1e-3)
 
 
-@pytest.mark.parametrize(("base", "name"), [(np.inf, "a flat base"), ((np.inf, 1.0), "a cylinder")])
+@pytest.mark.parametrize(("base", "name"), [(np.inf, "a flat"), ((np.inf, 1.0), "a cylinder")])
 def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
     scene = cr.Scene(base, ALONE, MATERIAL, friction=0.5, geometry="summit")
     assert smooth_reference(scene, 1.0) is None

@@ -66,6 +66,7 @@ def rough(seed: int, shape: tuple[int, int] = (14, 17), smooth: float = 0.7) -> 
     return np.asarray(ndimage.gaussian_filter(noise, smooth))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_maxima_and_prominences(seed: int) -> None:
     heights = rough(seed, smooth=0.3 * (seed % 4))
@@ -76,6 +77,7 @@ def test_maxima_and_prominences(seed: int) -> None:
     np.testing.assert_array_equal(found.prominences, [flooded(heights, peak) for peak in peaks])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_pruning_is_wolf_pruning(seed: int) -> None:
     heights = rough(100 + seed)
@@ -96,6 +98,7 @@ def test_a_plateau_is_one_hill() -> None:
     assert found.pixels[1].tolist() == [6, 1]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_whole_numbers_have_ties(seed: int) -> None:
     """Of quantised heights each connected plateau that is a maximum counts once."""

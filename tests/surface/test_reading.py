@@ -32,15 +32,6 @@ def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> 
     return "".join(separator.join(map(repr, row)) + ending for row in np.asarray(heights).tolist())
 
 
-def test_a_matrix_in_a_workbook(tmp_path: Path) -> None:
-    book = pytest.importorskip("openpyxl").Workbook()
-    for row in HEIGHTS.tolist():
-        book.active.append(row)
-    book.save(tmp_path / "a.xlsx")
-    found = cr.surface.read(tmp_path / "a.xlsx", pixel=1.0, detrend=None)
-    np.testing.assert_allclose(found.heights, HEIGHTS, rtol=1e-15)  # it writes 16 digits
-
-
 def test_arrays(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", HEIGHTS)
     surface = raw(tmp_path / "a.npy", pixel=2.0, unit="um")
@@ -97,6 +88,7 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
         raw(tmp_path / "a.mat")
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A"])
 @pytest.mark.parametrize("listed", [False, True])
 def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
@@ -113,18 +105,10 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
 
-def test_a_file_is_levelled_unless_asked(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", HEIGHTS + 5 * X + 2 * Y)
-    surface = cr.surface.read(tmp_path / "a.npy", pixel=10.0)
-    assert surface.removed[0].kind == "plane"
-    assert_allclose(surface.removed[0].slopes, (0.5, 0.2), atol=0.05)
-    assert raw(tmp_path / "a.npy", pixel=10.0).removed == ()
-    assert surface.summits(0.0, 3).origin.removed == surface.removed
-
-
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize(
     ("content", "options", "message"),
     [
@@ -134,6 +118,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
         (matrix(1e9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
         (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
+        (matrix(), {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
         (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of"),

@@ -1,6 +1,5 @@
 """Summits as asperities, and the generator whose spectrum is known."""
 
-import dataclasses
 import pickle
 
 import numpy as np
@@ -38,14 +37,6 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert not again.prominences.flags.writeable
 
 
-def test_the_scene_takes_them() -> None:
-    scene = cr.Scene(1e4, MAP.summits(), cr.Material(1.0, 0.3), geometry="summit")
-    contact = cr.press(scene, load=10.0)
-    assert contact.certificate.holds
-    moved = dataclasses.replace(contact.scene, sphere_radius=2e4)
-    assert moved.asperities is scene.asperities
-
-
 @pytest.mark.parametrize("prune", [0.02, 0.05, 0.3, 1.0])
 def test_pruning_later_is_pruning_at_once(prune: float) -> None:
     later, once = MAP.summits(0.0).pruned(prune), MAP.summits(prune)
@@ -63,22 +54,6 @@ def test_a_map_turned_or_scaled_has_the_same_summits() -> None:
     large = cr.surface.Surface(1e-6 * MAP.heights, 1e-6).summits()
     assert_allclose(large.tip_radii, 1e-6 * first.tip_radii, rtol=1e-9)
     assert_allclose(large.elliptic_loads, first.elliptic_loads, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"prune": -0.1}, "prune: found -0.1, expected a number from 0.0 to 1.0"),
-        ({"prune": np.nan}, "prune"),
-        ({"fit": 4}, "fit: found 4, expected an odd number of pixels, at least 3"),
-        ({"fit": 3.0}, "fit: found 3.0"),
-        ({"fit": True}, "fit: found True"),
-        ({"fit": 257}, "map: found 256 by 256 pixels, expected at least 257 by 257, as fit is 257"),
-    ],
-)
-def test_wrong_questions(options: dict[str, object], message: str) -> None:
-    with pytest.raises(cr.InputError, match=message):
-        MAP.summits(**options)  # type: ignore[arg-type]
 
 
 def test_the_map_has_the_moments_of_its_spectrum() -> None:

@@ -28,6 +28,8 @@ def test_a_plane_is_removed_and_said() -> None:
     for term in (np.ones_like(x), x, y):  # a least-squares fit leaves nothing of its terms
         assert abs(np.vdot(left, term)) < 1e-9
     assert_allclose(plane.rms_height, NOISE.std(), rtol=1e-2)
+    with pytest.raises(cr.InputError, match="detrend: found 'cone', expected \"plane\" or"):
+        plane.detrend("cone")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("radius", [25.0, -25.0, 400.0])
@@ -64,11 +66,9 @@ def test_another_unit_is_the_same_surface() -> None:
     ("heights", "message"),
     [
         (np.full((5, 5), 2.0), "found 2 everywhere, expected a rough surface"),
-        (np.zeros((5, 5)), "found 0 everywhere, expected a rough surface"),
         (np.where(np.eye(5) > 0, np.nan, NOISE[:5, :5]), r"5 holes \(nan\) in 25 pixels"),
         (np.where(np.eye(5) > 0, np.inf, NOISE[:5, :5]), "inf in row 0, column 0"),
         (NOISE[0], r"shape \(60,\), expected rows and columns"),
-        (NOISE[:2], r"shape \(2, 60\), expected rows and columns, at least 3"),
         ([["a", "b"], ["c", "d"]], "expected numbers"),
         (NOISE * 1j, "expected numbers"),
     ],
@@ -76,31 +76,6 @@ def test_another_unit_is_the_same_surface() -> None:
 def test_no_map(heights: object, message: str) -> None:
     with pytest.raises(cr.InputError, match=message):
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("pixel", "message"),
-    [
-        (0.0, "positive"),
-        ((1.0, -1.0), "positive"),
-        ((1.0, 20.0), "found 1 by 20, expected sides at most 1 to 10"),
-        ((1.0, 1.0, 1.0), "found 3 numbers"),
-        ("1", "positive number"),
-    ],
-)
-def test_no_pixel(pixel: object, message: str) -> None:
-    with pytest.raises(cr.InputError, match=message):
-        cr.surface.Surface(NOISE, pixel)  # type: ignore[arg-type]
-
-
-def test_nothing_but_trend() -> None:
-    x, y = grid()
-    with pytest.raises(cr.InputError, match="found nothing but a plane, expected a rough surface"):
-        cr.surface.Surface(1 + 0.1 * x + y, (0.5, 0.7)).detrend()
-    with pytest.raises(
-        cr.InputError, match='detrend: found \'cone\', expected "plane" or "sphere"'
-    ):
-        cr.surface.Surface(NOISE, 1.0).detrend("cone")  # type: ignore[arg-type]
 
 
 def test_a_trend_that_explains_most_is_named() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import shutil
 import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -22,6 +23,20 @@ def here() -> Iterator[Executor]:
     """Computes in this process."""
     with ThreadPoolExecutor(1) as executor:
         yield executor
+
+
+@pytest.fixture(scope="module")
+def whole(here: Executor, tmp_path_factory: pytest.TempPathFactory) -> cr.SweepTable:
+    """The table of SMALL, in a folder that no test changes."""
+    return cr.sweep(SMALL, executor=here, out=tmp_path_factory.mktemp("whole") / "a")
+
+
+@pytest.fixture
+def folder(whole: cr.SweepTable, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    assert whole.folder is not None
+    shutil.copytree(whole.folder.path, tmp_path / "a")
+    return tmp_path / "a"
 
 
 ALL = tables(
@@ -154,26 +169,26 @@ def test_what_is_not_proved_is_said(here: Executor) -> None:
     ]  # fmt: skip
 
 
-def test_data_frames(here: Executor, tmp_path: Path) -> None:
-    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    frame = cr.open_sweep(tmp_path / "a").to_dataframe()
-    assert list(frame.columns) == table.columns
+def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
+    frame = cr.open_sweep(folder).to_dataframe()
+    assert list(frame.columns) == whole.columns
     assert frame.index.name == "row"
-    assert frame["loss_0.37"].tolist() == numbers(table, "loss_0.37")[0]
-    lazy = table.to_dask(["normal.load", "loss_0.37"])
+    assert frame["loss_0.37"].tolist() == numbers(whole, "loss_0.37")[0]
+    lazy = whole.to_dask(["normal.load", "loss_0.37"])
     assert lazy.npartitions > 1
     means = lazy.groupby("normal.load")["loss_0.37"].mean().compute(scheduler="synchronous")
     expected = frame.groupby("normal.load")["loss_0.37"].mean()
     assert means.to_dict() == pytest.approx(expected.to_dict(), rel=1e-15, abs=0)
     with pytest.raises(cr.InputError, match="column: found 'los', expected a column of the table"):
-        table.read(["los"])
+        whole.read(["los"])
+    parquet = pytest.importorskip("pyarrow.dataset").dataset(folder / "parts")
+    rows = parquet.to_table(columns=["scene", "load"])
+    assert sorted(rows["scene"].to_pylist()) == list(range(16))
 
 
-def test_quantiles_are_those_of_each_point(here: Executor, tmp_path: Path) -> None:
-    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    found = table.quantiles(["loss_0.37"], [0.1, 0.5])
-    frame = table.to_dataframe()
-    groups = frame.groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
+def test_quantiles_are_those_of_each_point(whole: cr.SweepTable) -> None:
+    found = whole.quantiles(["loss_0.37"], [0.1, 0.5])
+    groups = whole.to_dataframe().groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
     for i, (point, values) in enumerate(groups):
         assert (found["asperities.height_std"][i], found["normal.load"][i]) == point
         assert (found["scenes"][i], found["failed"][i]) == (4, 0)
@@ -182,8 +197,7 @@ def test_quantiles_are_those_of_each_point(here: Executor, tmp_path: Path) -> No
     assert i == 3
 
 
-def test_a_part_of_a_sweep(here: Executor, tmp_path: Path) -> None:
-    whole = cr.sweep(SMALL, executor=here)
+def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path) -> None:
     for k in (2, 3, 1):
         table = cr.sweep(SMALL, executor=here, out=tmp_path / "a", part=(k, 3))
         assert table.complete == (k == 1)
@@ -192,64 +206,52 @@ def test_a_part_of_a_sweep(here: Executor, tmp_path: Path) -> None:
     assert numbers(second, "scene") == [list(range(5, 10))]
 
 
-def test_other_versions_are_refused(here: Executor, tmp_path: Path) -> None:
-    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    manifest = tmp_path / "a/manifest.json"
-    said = json.loads(manifest.read_text())
+def test_other_versions_are_refused(here: Executor, folder: Path) -> None:
+    said = json.loads((folder / "manifest.json").read_text())
     said["versions"]["scipy"] = "1.0"
-    manifest.write_text(json.dumps(said))
+    (folder / "manifest.json").write_text(json.dumps(said))
     with pytest.raises(cr.FileError, match=r"was begun with scipy 1\.0 instead of "):
-        cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
+        cr.sweep(SMALL, executor=here, out=folder, resume=True)
 
 
-def test_a_folder_of_another_sweep_is_refused(here: Executor, tmp_path: Path) -> None:
-    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    before = sorted(path.name for path in (tmp_path / "a/parts").iterdir())
+def test_a_folder_of_another_sweep_is_refused(here: Executor, folder: Path, tmp_path: Path) -> None:
+    before = sorted(path.name for path in (folder / "parts").iterdir())
     with pytest.raises(cr.FileError) as caught:
-        cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=tmp_path / "a", resume=True)
+        cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=folder, resume=True)
     said = str(caught.value)
     assert "holds another sweep, 16 scenes of sweep by version" in said
     assert "this is 20 scenes of sweep" in said
     with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; --resume"):
-        cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+        cr.sweep(SMALL, executor=here, out=folder)
     (tmp_path / "b").mkdir()
     (tmp_path / "b/thesis.tex").write_text("")
     with pytest.raises(cr.FileError, match=r"holds thesis\.tex, but no sweep"):
         cr.sweep(SMALL, executor=here, out=tmp_path / "b")
-    assert sorted(path.name for path in (tmp_path / "a/parts").iterdir()) == before
+    assert sorted(path.name for path in (folder / "parts").iterdir()) == before
     other = tables(sweep={"seeds": 1})
-    replaced = cr.sweep(other, executor=here, out=tmp_path / "a", overwrite=True)
+    replaced = cr.sweep(other, executor=here, out=folder, overwrite=True)
     assert same(replaced, cr.sweep(other, executor=here))
 
 
 def test_resuming_computes_what_is_missing_or_damaged_only(
-    here: Executor, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    here: Executor, whole: cr.SweepTable, folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    assert table.folder is not None
-    gone, broken, *kept = map(table.folder.file, table.folder.parts())
+    gone, broken, *kept = sorted((folder / "parts").iterdir())
     gone.unlink()
     broken.write_bytes(broken.read_bytes()[:-1] + b"x")
-    (tmp_path / "a/parts" / f".{gone.name}.123.unfinished").write_bytes(b"half")
-    (tmp_path / "a/parts/notes.txt").write_text("mine")
+    (folder / "parts" / f".{gone.name}.123.unfinished").write_bytes(b"half")
+    (folder / "parts/notes.txt").write_text("mine")
     times = {part: part.stat().st_mtime_ns for part in kept}
     with caplog.at_level(logging.INFO, "convexrough"):
-        again = cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
+        again = cr.sweep(SMALL, executor=here, out=folder, resume=True)
     said = [news for news in caplog.messages if "scenes" in news]
     removed = "1 damaged parts removed, 1 unfinished files removed"
     assert said[0] == f"found 14 scenes of an earlier run, {removed}"
     assert said[-1].startswith("2 of 2 scenes, ")
     assert {path: path.stat().st_mtime_ns for path in times} == times
-    assert not list((tmp_path / "a/parts").glob(".*"))
-    assert (tmp_path / "a/parts/notes.txt").read_text() == "mine"
-    assert same(again, cr.sweep(SMALL, executor=here))
-
-
-def test_the_parts_are_plain_parquet(here: Executor, tmp_path: Path) -> None:
-    dataset = pytest.importorskip("pyarrow.dataset")
-    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    rows = dataset.dataset(tmp_path / "a/parts").to_table(columns=["scene", "load"])
-    assert sorted(rows["scene"].to_pylist()) == list(range(16))
+    assert not list((folder / "parts").glob(".*"))
+    assert (folder / "parts/notes.txt").read_text() == "mine"
+    assert same(again, whole)
 
 
 def test_without_pyarrow_no_folder_is_left(
@@ -261,6 +263,7 @@ def test_without_pyarrow_no_folder_is_left(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("no_processes")
 def test_the_command(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
     status, out, err = command("sweep", "a.toml", "--workers", "1")
@@ -275,6 +278,7 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
     assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
 
 
+@pytest.mark.usefixtures("no_processes")
 def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: Path) -> None:
     failing = sweeping(over={"asperities.within": [0.0102, 0.0052]})
     failing["asperities"] = {**failing["asperities"], "tip_radius": [0.02] * 61}

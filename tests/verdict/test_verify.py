@@ -171,6 +171,7 @@ def test_wrong_use(command: Any, contact: cr.Contact) -> None:
         (("--shear", loads), "--shear and --shear-force go together"),
         (("--shear-force", "1"), "--shear and --shear-force go together"),
         (("--within", "0"), "--within: found 0.0, expected a positive number"),
+        (("--within", "5"), "; 5 % is 0.05"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),

@@ -23,7 +23,7 @@ __all__ = [
     "SteadyStage",
 ]
 
-#: Tables of a scene file that compute something, by their names, in the order of results.
+#: Stages by the names of their tables in a scene file, in the order of results.
 STAGES: dict[str, type[Stage]] = {
     each.name: each
     for each in (

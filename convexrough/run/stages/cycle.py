@@ -22,8 +22,7 @@ from convexrough.scene.rings import one_of_each_ring
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
 MOST_LOOPS = 12
 
-#: Most and fewest points of a loop by default, and the limit on touching asperities times points:
-#: each point takes a friction state of all touching asperities.
+#: Most and fewest points of a loop by default, and the limit on touching asperities times points.
 MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
 
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
@@ -57,7 +56,7 @@ class CycleStage(Stage):
 
     @property
     def lowest(self) -> list[float]:
-        """The minimum of each cycle, as a fraction of f P."""
+        """The minimum of each cycle, as a fraction of the friction limit."""
         if self.minimum_fraction is not None:
             return self.minimum_fraction
         return [-value for value in self.maximum_fraction]
@@ -118,11 +117,11 @@ class CycleResult(Result):
 
     @cached_property
     def loops(self) -> list[Loop]:
-        """The loops of each cycle, in total and for some asperities."""
+        """The loops of each cycle, of the whole contact and of some asperities."""
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
-        chosen: ArrayLike | None = None  # of all
+        chosen: ArrayLike | None = None  # None means all
         if stage.loop_asperities is None:
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
@@ -140,7 +139,7 @@ class CycleResult(Result):
         _ = self.loops, self.worn
 
     def tables(self) -> dict[str, Columns]:
-        """The tables of cycles, of fretting by asperity, and of loops, total and by asperity."""
+        """The tables of cycles, of fretting by asperity, and of loops, in total and by asperity."""
         touching = int(np.count_nonzero(self.contact.loads))
         worn = {  # fractions replace forces, as in the other tables
             name: np.repeat([row[name] for row in self.known], touching)
@@ -167,7 +166,7 @@ class CycleResult(Result):
 
     @property
     def smooth(self) -> bool:
-        """True if there is a smooth reference, with the energy scale W0."""
+        """True if the energy scale W0 of a smooth sphere is known."""
         return not math.isnan(self.known[0]["smooth_normalised"])
 
     def headings(self) -> Mapping[str, str]:
@@ -175,7 +174,7 @@ class CycleResult(Result):
         return self.printed if self.smooth else over
 
     def lines(self) -> list[str]:
-        said = "no W/W0: a flat base or a cylinder has no smooth reference"
+        said = "no W/W0: a flat or a cylinder has no smooth reference"
         return [*super().lines(), *([] if self.smooth else [said])]
 
     def figures(self) -> Mapping[str, Any]:

@@ -34,7 +34,7 @@ class GradientStage(Stage):
 
     of       : "loss" of the cycle between +-fraction f P, "displacement" under fraction f P,
         "approach" or "load"
-    by       : parameters with columns in the table
+    by       : parameters with a column in the table
     holding  : "load" or "approach", held constant; default: what is prescribed
     """
 
@@ -82,7 +82,6 @@ class GradientStage(Stage):
         return cycle(contact, maximum=force).gradient(holding=self.holding)
 
     def _in_the_file(self, error: InputError) -> InputError:
-        """The error, with the name of a force replaced by the key of the scene file."""
         if error.what not in ("force", "maximum"):
             return error
         found = f"{self.fraction:g}, a force of {error.found}"
@@ -91,13 +90,13 @@ class GradientStage(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GradientResult(Single):
-    """The result of [gradient]: the gradient, or in `none_because` why there is none."""
+    """The result of [gradient]: the gradient, or the reason `none_because` why there is none."""
 
     stage: GradientStage
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """Derivatives by the scene's parameters and the largest by asperities' parameters."""
+        """Derivatives by parameters of the scene, and the largest by parameters of asperities."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]
@@ -148,7 +147,7 @@ class GradientResult(Single):
         held, under = f"at constant {said['holding']}", ""
         if "fraction" in said:
             under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held} and force"
-        rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # no -0
+        rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # 0 in place of -0
         rows += [(f"  by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
         for name, most in said["largest"].items():
             error = bound(said["height_error"])

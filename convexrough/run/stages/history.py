@@ -15,7 +15,7 @@ from convexrough.run.values import Fractions
 
 
 class HistoryStage(Stage):
-    """Any sequence of shear forces from 0, as fractions of f P."""
+    """A sequence of shear forces that starts at 0, as fractions of the friction limit f P."""
 
     name = "history"
     numbers = ("force", "displacement", "loss", "loss_error")
@@ -29,7 +29,7 @@ class HistoryStage(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HistoryResult(Steps):
-    """The states after each force."""
+    """The result of [history]: the state after each force."""
 
     stage: HistoryStage
     printed: ClassVar[Mapping[str, str]] = {

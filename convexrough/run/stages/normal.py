@@ -105,7 +105,7 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
 
 
 def doubts_of(normal: Summary) -> Iterator[str]:
-    """The reasons why loads are not certified."""
+    """The reasons why loads are not certified, from the summary of a contact."""
     if normal["certificate"]["scope"] == "none":
         yield "not certified: nothing is proved about these loads"
     elif normal["undecided"]:
@@ -113,11 +113,11 @@ def doubts_of(normal: Summary) -> Iterator[str]:
 
 
 def limits_of(contact: Contact) -> Summary:
-    """Measures of the validity of the model: those of `plausibility.limits_of`, and
+    """Measures of the validity of the model: those of `plausibility.limits_of`, and two more.
 
-    geometry        : where asperities meet the base
-    closest_change  : largest relative change of a large load if the geometry were "closest"; None
-        if it is, or if the change could not be computed
+    geometry        : where asperities meet the sphere
+    closest_change  : largest relative change of the loads above a tenth of the largest if the
+        geometry were "closest"; None if it is, or if the change could not be computed
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
@@ -172,7 +172,6 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
 
 
 def _neglected(normal: Summary) -> str:
-    """The effect of two different materials that the model neglects, with its size."""
     if not (beta := normal["mismatch"]):
         return ""
     return (
@@ -182,14 +181,12 @@ def _neglected(normal: Summary) -> str:
 
 
 def _described_pressure(normal: Summary, units: UnitNames) -> str:
-    """The largest mean pressure, and whether yield is checked."""
     unit = units.unit("pressure")
     known = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
     return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
 
 
 def _described_geometry(normal: Summary) -> str:
-    """The geometry, with the difference to the other one where it is large."""
     change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
     if change <= DIFFERENT:
         return name

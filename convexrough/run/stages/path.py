@@ -47,7 +47,7 @@ INCREASE = "indentations increase with the load: "
 
 
 class Ellipse(FileTable):
-    """An elliptic path in chords: load P + A cos t, shear force Q + B sin(t + phase).
+    """An elliptic path in chords: normal load P + A cos t, shear force Q + B sin(t + phase).
 
     load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : their number
     """
@@ -61,7 +61,7 @@ class Ellipse(FileTable):
 
 
 class _Points(Stage):
-    """The points of a path, in multiples of `reference`, or an ellipse."""
+    """The points of a path or an ellipse, in multiples of `reference`."""
 
     loads: list[NonNegative] | None = None
     forces: list[Finite] | None = None
@@ -79,6 +79,18 @@ class _Points(Stage):
             found = f"{len(loads)} and {len(forces)} values"
             yield "loads, forces", f"found {found}, expected equally many, at least one"
 
+    @property
+    def highest_load(self) -> float:
+        it = self.ellipse
+        own = [it.load + abs(it.load_amplitude)] if it is not None else self.loads or [0.0]
+        return self.reference * max(own)
+
+    @property
+    def highest_force(self) -> float:
+        it = self.ellipse
+        own = [abs(it.force) + abs(it.force_amplitude)] if it is not None else self.forces or [0.0]
+        return self.reference * max(map(abs, own))
+
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
         if self.ellipse is not None:
@@ -90,7 +102,7 @@ class _Points(Stage):
 
 
 class PathStage(_Points):
-    """A path of load and shear force that starts without load."""
+    """A path of normal load and shear force that starts without load."""
 
     name = "path"
     numbers = (
@@ -106,7 +118,7 @@ class PathStage(_Points):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathResult(Steps):
-    """The states at the points of a path."""
+    """The result of [path]: the states at the points."""
 
     title = "load path"
     printed: ClassVar[Mapping[str, str]] = {
@@ -145,9 +157,9 @@ class PathResult(Steps):
 
 
 class SteadyStage(_Points):
-    """A closed path that is repeated.
+    """A closed path of normal load and shear force that is repeated.
 
-    phases, factors : also compute the losses of the ellipse at these phases [rad], with its
+    phases, factors : also compute the losses of the ellipse at these phases [rad], with the
         amplitudes multiplied by these factors
     """
 
@@ -252,6 +264,6 @@ def _by_phase(losses: PhaseLosses) -> Columns:
 
 
 def unproved_order(result: Result, order: str | None) -> Iterator[str]:
-    """A reason if the order of indentations, which the proof of a result needs, is not proved."""
+    """A reason for doubt if the order of indentations, which the result needs, is not proved."""
     if order is not None and not order.startswith("proved"):
         yield f"not proved: the order of indentations that the proof of [{result.name}] needs"

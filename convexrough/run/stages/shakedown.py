@@ -1,4 +1,4 @@
-"""[shakedown]: the largest factor on the amplitudes of a path up to which sliding ends."""
+"""[shakedown]: the largest factor of the amplitudes of a path for which sliding ends."""
 
 from __future__ import annotations
 
@@ -45,6 +45,11 @@ class ShakedownStage(Stage):
         for i, force in enumerate(self.force_amplitudes):
             if isinstance(force, list) != pairs:
                 yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
+
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load where the factor on the amplitudes is 1."""
+        return self.reference * (self.loads + max([0.0, *(self.load_amplitudes or [])]))
 
     def compute(self, contact: Contact) -> ShakedownResult:
         swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)

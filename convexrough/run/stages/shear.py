@@ -15,7 +15,7 @@ from convexrough.run.values import Shares
 
 
 class ShearStage(Stage):
-    """Shear forces of monotonic shear, as fractions of f P, from 0 to 1."""
+    """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
 
     name = "shear"
     numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),)
