@@ -17,6 +17,9 @@ SMALLEST, LARGEST = 1e-60, 1e60
 #: What an error message expects instead of a number outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
+#: What an error message expects as a coefficient of variation.
+VARIATION = "a standard deviation over the mean, from 0 to 1: not in per cent"
+
 #: What an error message expects as a phase; pi may be rounded up.
 PHASE = "a phase in radians, from -pi to pi; 90 degrees are 1.5708"
 
@@ -31,6 +34,14 @@ def positive(what: str, value: float | None) -> float:
 
 def non_negative(what: str, value: float | None) -> float:
     return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
+
+
+def variation(what: str, value: float | None) -> float:
+    return _checked(what, value, VARIATION, is_variation)
+
+
+def is_variation(number: float) -> bool:
+    return 0 <= number <= 1
 
 
 def phase(what: str, value: float | None) -> float:

@@ -366,7 +366,7 @@ def closest_changes(contact: Contact) -> Array:
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
     where H = (2/3) indentation / P is the local part of the Hessian. With two radii
-    of the base, the terms of x and y are added.
+    of the sphere, the terms of x and y are added.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))

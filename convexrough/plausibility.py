@@ -67,7 +67,7 @@ def limits(
         "crowding": crowding,
         "covered": covered,
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
-        "array_extent": _array_extent(scene, float(loads.sum())),
+        "array_extent": array_extent(scene, float(loads.sum())),
         "all_touch": bool(touching.all()),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(pressures.max()),
@@ -118,11 +118,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
     cut_off = normal["contact"] >= ARRAY and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
-        yield (
-            f"contact reaches the rim of the array, which ends at {normal['array_extent']:.3g} of "
-            "the contact radius of a smooth sphere: the loads depend on where it ends; check the "
-            "unit of the sphere's radius, or use a larger array"
-        )
+        yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["all_touch"]:
         yield (
             "every asperity touches, also at the rim of the array: others beyond it would carry "
@@ -136,7 +132,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     if normal["crowding"] > 1:
         yield (
             f"contact discs overlap (crowding {normal['crowding']:.3g}, above 1): the asperity "
-            "model does not hold"
+            "model does not hold; check the units of the modulus, the load and the radii"
         )
     if normal["covered"]:
         yield (
@@ -171,7 +167,16 @@ def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
     )  # fmt: skip
 
 
-def _array_extent(scene: Scene, load: float) -> float | None:
+def at_the_rim(extent: float) -> str:
+    """A warning for an `array_extent` below `CUT_OFF`."""
+    return (
+        f"contact reaches the rim of the array, which ends at {extent:.3g} of the contact radius "
+        "of the smooth sphere: the loads depend on where it ends; check the unit of the sphere's "
+        "radius, or use a larger array"
+    )
+
+
+def array_extent(scene: Scene, load: float) -> float | None:
     """The smaller of max |x| / a and max |y| / b; of these a row of asperities has only one."""
     smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:

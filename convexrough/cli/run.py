@@ -11,7 +11,7 @@ import click
 from convexrough.atomic import replacing, write_text
 from convexrough.cli.options import PATH, figure_options, html_option, output_options, proof_option
 from convexrough.cli.proof import proved
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say, written
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say, say_aside, written
 from convexrough.errors import FileError, blamed_on
 
 if TYPE_CHECKING:
@@ -59,6 +59,8 @@ def run(
     with results_folder(folder, force=force, **origin(file)) as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
+        for caution in file.cautions(contact):  # before work that may be long, or fail
+            say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
             for result in results:

@@ -138,7 +138,7 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
     """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    Other bases are replaced by a sphere of mean curvature; flat bases have displacement 0.
+    Other shapes are replaced by a sphere of mean curvature; under a flat it is 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)

@@ -377,7 +377,7 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Mean curvature of the base, k^3 of a tip of curvature 1, and 1 / (pi E*), in scaled units."""
+    """Mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*), in scaled units."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

@@ -3,7 +3,7 @@
 Where the scene names its units, axes are in SI units with suitable prefixes. Where it does not,
 lengths are in a_H and pressures in p0 (contact radius and peak pressure of the smooth sphere under
 the same load), shear forces in f P, and displacements and energies in X0 and W0 of `Scale`. Where
-the base has no finite smooth contact, lengths are in the radius r_c of the circle that holds all
+there is no finite smooth contact, lengths are in the radius r_c of the circle that holds all
 contacts, and pressures in the mean pressure on this circle.
 """
 

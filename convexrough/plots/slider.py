@@ -45,7 +45,7 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The slides of a contact. Raises InputError without friction or a spherical base."""
+        """The slides of a contact. Raises InputError without friction or a sphere."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))

@@ -96,6 +96,10 @@ class SceneFile(Record):
         """The contact that the file prescribes. Raises what `press` raises."""
         return solve(self.problem(), self.solver)
 
+    def cautions(self, contact: Contact) -> Iterator[str]:
+        """Warnings about stages that do not fit the contact, before they are computed."""
+        return (each for stage in self.stages.values() for each in stage.cautions(contact))
+
     def compute(self, contact: Contact) -> list[Result]:
         """The results of all stages; the first is the pressed contact."""
         return [stage.compute(contact) for stage in self.stages.values()]
@@ -272,7 +276,10 @@ def _material(study: Study) -> Material:
 def _lattice(
     layout: LatticeTable, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
-    """The scene with asperities up to the distance `within`, or with all that could touch."""
+    """The scene with asperities up to the distance `within`, or with all that could touch.
+
+    These could touch as [normal] prescribes, or under the largest load of a stage.
+    """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
@@ -294,10 +301,16 @@ def _lattice(
 
     if layout.within is not None:
         return scene(layout.within), None
-    if (approach := study.normal.approach) is not None:
-        return scene(farthest(approach)), None
-    assert study.normal.load is not None  # exactly one of the two
-    return all_that_could_touch(scene, farthest, study.normal.load)
+    approach, load = study.normal.approach, study.normal.load or 0.0
+    found: list[tuple[Scene, float | None]] = []
+    if approach is not None:
+        found.append((scene(farthest(approach)), None))
+    else:
+        found.append(all_that_could_touch(scene, farthest, load))
+    most = max((stage.highest_load for stage in study.stages.values()), default=0.0)
+    if most > load:
+        found.append((all_that_could_touch(scene, farthest, most)[0], None))
+    return max(found, key=lambda each: len(each[0]))
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.plausibility import ARRAY, CUT_OFF, array_extent, at_the_rim
 from convexrough.plottable import Plottable
 from convexrough.record import Table, rows_of, singular
 from convexrough.run.values import FileTable
@@ -46,6 +47,10 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
+#: Loads of a stage further from that of [normal] than by this factor get a warning, and shear
+#: forces below this fraction of the friction limit.
+FAR, SLIGHT = 100.0, 2e-3
+
 #: At most this many rows of a table of steps are printed, the last ones.
 MOST_PRINTED = 20
 
@@ -63,6 +68,35 @@ class Stage(FileTable):
     frictional: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load that the table names; 0 if the load is that of [normal]."""
+        return 0.0
+
+    @property
+    def highest_force(self) -> float:
+        """[force] the largest shear force that the table names as a force, not as a fraction."""
+        return 0.0
+
+    def cautions(self, contact: Contact) -> Iterator[str]:
+        """Warnings about loads and forces that do not fit the pressed contact."""
+        load, name, known = self.highest_load, f"[{self.name}]", contact.load
+        if not load:
+            return
+        if known and not 1 / FAR <= load / known <= FAR:
+            yield (
+                f"{name} has loads up to {load:.4g}, and [normal] a load of {known:.4g}: check the "
+                f"units of both, and reference in {name}"
+            )
+        if 0 < self.highest_force < SLIGHT * checks.friction(contact.scene.friction) * load:
+            yield (
+                f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
+                "the friction limit at the largest load: check the units of the forces"
+            )
+        extent = array_extent(contact.scene, load)
+        if len(contact.scene) >= ARRAY and extent is not None and extent < CUT_OFF:
+            yield f"under the loads of {name} {at_the_rim(extent)}"
 
     def compute(self, contact: Contact) -> Result:
         """The result of this stage for a pressed contact. Raises InputError and SolverError."""

@@ -27,6 +27,7 @@ from convexrough.run.values import (
     Switch,
     Text,
     TipRadius,
+    Variation,
     Whole,
     expected,
     phrased,
@@ -93,7 +94,7 @@ class LatticeTable(FileTable):
     tip_radius: TipRadius
     within: NonNegative | None = None
     height_std: NonNegative = 0.0
-    tip_radius_cv: NonNegative = 0.0
+    tip_radius_cv: Variation = 0.0
     seed: Whole | None = None
     geometry: Geometry = "closest"
 

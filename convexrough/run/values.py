@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from convexrough.checks import PHASE, SIZED, is_phase, is_sized, nearest
+from convexrough.checks import PHASE, SIZED, VARIATION, is_phase, is_sized, is_variation, nearest
 
 #: Keys that a user may have written, and the keys to suggest.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
@@ -61,6 +61,7 @@ NonNegative = Annotated[
     float, expected("a number that is not negative", lambda value: value >= 0), _SIZED
 ]
 Ratio = Annotated[float, expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
+Variation = Annotated[float, expected(VARIATION, is_variation)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Phase = Annotated[float, expected(PHASE, is_phase)]

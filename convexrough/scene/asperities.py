@@ -79,7 +79,7 @@ class Asperities(Record):
         ['1.3e-07', '3.5e-07', '1.9e-07']
         """
         height_std = checks.non_negative("height_std", height_std)
-        tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
+        tip_radius_cv = checks.variation("tip_radius_cv", tip_radius_cv)
         if height_std == 0 and tip_radius_cv == 0:
             return self
         n, seed, heights, radii = len(self), checked_seed(seed), self.heights, self.tip_radii

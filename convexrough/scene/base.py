@@ -1,7 +1,7 @@
-"""The shape of the pressed body, the base: a sphere, an ellipsoid, a cylinder or a flat.
+"""The shape of the pressed body: a sphere, an ellipsoid, a cylinder or a flat.
 
 It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, a flat
-base R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
+R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def along(radius: Radius) -> tuple[float, float]:
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """The finite radii R, each with the axes (0 is x, 1 is y) along which the base has it."""
+    """The finite radii R, each with the axes (0 is x, 1 is y) along which the shape has it."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]

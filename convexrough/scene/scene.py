@@ -99,7 +99,7 @@ class Scene(Record):
         """(n, 2) [length] the point at which each asperity first touches.
 
         It is the summit r_i, or in the geometry "closest" r_i R / (R + rho_i) along each axis, with
-        the radius R of the base and the tip radius rho_i.
+        the radius R of the sphere and the tip radius rho_i.
         """
         if self.geometry == "summit" or not self.curved:
             return self.asperities.positions
@@ -148,7 +148,7 @@ class Scene(Record):
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] distance of the undeformed base from its tangent plane on the axis.
+        """(n,) [length] distance of the undeformed sphere from its tangent plane on the axis.
 
         It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
         r_i from the axis. With two radii it is the sum of such terms in x and y.
@@ -192,7 +192,7 @@ def reach(
 ) -> float:
     """[length] distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho))).
 
-    D0 is the approach, z the height, R the radius of the base (the larger of two), rho the tip
+    D0 is the approach, z the height, R the radius of the sphere (the larger of two), rho the tip
     radius.
     """
     radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)

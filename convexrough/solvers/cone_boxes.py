@@ -1,9 +1,9 @@
 """The choice of boxes and the check of answers, for all solvers of the cone program.
 
-docs/theory/exact-cones.md, "Which box" and "What comes back". The program is exact on boxes
-0 <= P_i <= B_i of loads whose convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most
-21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the solution
-reaches a cut face, five cones are tried; if it does so again, the scene is refused.
+docs/theory/exact-cones.md, "Which box" and "Loads and gaps from the answer". The program is exact
+on boxes 0 <= P_i <= B_i of loads with convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i of at
+most 21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the
+solution reaches a cut face, five cones are tried; if it does so again, the scene is refused.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def judged(
 ) -> Solution:
     """The answer as a solution, checked against the contact law. Raises what `ConeSolver` raises.
 
-    The sign of D - A P separates open asperities from lightly loaded ones ("What comes back").
+    The sign of D - A P separates open asperities from lightly loaded ones.
     """
     if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
         raise SolverError(

@@ -1,6 +1,6 @@
 """`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
-The smooth sphere is the base of a scene without asperities, under the same load: Hertz's contact,
+The smooth sphere is the sphere of a scene without asperities, under the same load: Hertz's contact,
 with the theory of Cattaneo, Mindlin and Deresiewicz under shear. Results are for both bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper (Dini and
 Hills 2009), which gives displacements and losses of one body.
@@ -26,7 +26,7 @@ from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
-    """The smooth contact of the base of a scene: a `SmoothSphere` or `SmoothEllipsoid`.
+    """The contact of a scene without asperities: a `SmoothSphere` or `SmoothEllipsoid`.
 
     load : [force] normal load P
 
@@ -43,7 +43,7 @@ def smooth(scene: Scene, *, load: float) -> SmoothSphere:
 
 
 def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
-    """The result of `smooth`, or None for a flat base or a cylinder."""
+    """The result of `smooth`, or None for a flat or a cylinder."""
     if isinstance(scene.sphere_radius, tuple):
         return None if math.inf in scene.sphere_radius else SmoothEllipsoid(scene, load)
     return SmoothSphere(scene, load) if scene.curved else None
@@ -69,7 +69,7 @@ class SmoothSphere(Record):
 
     @property
     def radius(self) -> float:
-        """[length] radius R; for an ellipsoid base see `SmoothEllipsoid.radius`."""
+        """[length] radius R; for an ellipsoid see `SmoothEllipsoid.radius`."""
         return self.scene.mean_radius
 
     @cached_property

@@ -59,8 +59,10 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
     """The numbers of the wanted stages, and of the stage "normal"."""
     found: Numbers = {}
     doubts: list[str] = []
+    cautions = [*cautions_of(contact)]
     for name, stage in stages.items():
         if name in wanted or name == "normal":
+            cautions += stage.cautions(contact)
             result = stage.compute(contact)
             found |= dict(_numbers(result.summary(), name, "", stage.labels))
             doubts += result.doubts()
@@ -69,7 +71,7 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
         onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
         at = np.quantile(onsets, QUANTILES) if len(which) else np.full(len(QUANTILES), np.nan)
         found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
-    return Measured(found, "; ".join(doubts), "; ".join(cautions_of(contact)))
+    return Measured(found, "; ".join(doubts), "; ".join(cautions))
 
 
 def _numbers(

@@ -1,4 +1,4 @@
-r"""Proved bounds on the errors of a vector friction state from any source.
+"""Proved bounds on the errors of a vector friction state from any source.
 
 docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derives
 the steps 1 to 6 that comments name. Forces q, the displacement eta that each asperity takes up, the
@@ -213,9 +213,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
 def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
     """The bounds near gross sliding: docs/theory/vector-friction.md, "Close to gross sliding".
 
-    t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`. So
-    |q_i - P_i t| <= (2 P_i unused)^(1/2), and the lower bounds on X.t from single asperities hold
-    for all. Sliding forces that turn away from t would need more friction than is left.
+    t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`.
     """
     sure, reach, unproved = problem.sure, problem.reach, VectorBounds.unproved(len(problem))
     P, thresholds = np.where(sure, problem.loads, 0.0), problem.threshold_balls

@@ -134,9 +134,9 @@ class VectorProblem(Loaded):
     def residual(self, state: VectorState) -> float:
         """The largest relative violation of the conditions of least energy.
 
-        Over |X|: the error of the equation for X above; the part of a slip across its force; and
-        slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|: the error
-        of the total.
+        Over |X|: the error of the equation for X (top of the module); the part of a slip across its
+        force; and slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|:
+        the error of the total.
         """
         if not np.isfinite(state.displacement).all():
             return np.inf

@@ -62,6 +62,10 @@ def contact() -> cr.Contact:
         ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
         ("spacing = 1\ntip_radius = [1, -2]", "tip_radius[1]: found -2, expected a positive"),
         ("spacing = 1\nheight_std = 1", "seed: missing, needed with height_std"),
+        (
+            "spacing = 1\ntip_radius_cv = 10\nseed = 1",
+            "tip_radius_cv: found 10, expected a standard deviation over the mean",
+        ),
         ("spacing = 1\nseed = 1.5", "seed: found 1.5, expected a whole number"),
         ("spacing = 1\nwithin = -1", "within: found -1, expected a number that is not negative"),
         ("spacing = 1\ngeometry = 3", 'geometry: found 3, expected "summit" or "closest"'),

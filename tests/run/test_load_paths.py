@@ -52,6 +52,50 @@ def test_a_run(command: Any) -> None:
             assert len(list(csv.DictReader(file))) == 61
 
 
+def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
+    """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
+    normal = "load = 3e-8"
+    path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
+
+    def run(within: str) -> tuple[cr.Contact, Any, list[str]]:
+        file = tmp_path / "scene.toml"
+        file.write_text(scene_text(HEXAGONAL + within, normal=normal, more=path))
+        scene = cr.read_scene(file)
+        contact = scene.press()
+        return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
+
+    (pressed, grown, said), (_, whole, _) = run(""), run("within = 0.03")
+    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (121, 13)
+    assert not said
+    assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
+    *_, narrow = run("within = 0.0067")
+    assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            "[path]\nloads = [3e-10, 3e-10]\nforces = [0, 1e-10]",
+            "[path] has loads up to 3e-10, and",
+        ),
+        ("[steady]\nellipse = { load = 3e-4, force_amplitude = 3e-5 }", "[steady] has loads up to"),
+        ("[shakedown]\nloads = 3e-4\nforce_amplitudes = [1e-5, 0.0]", "[shakedown] has loads"),
+        (
+            "[path]\nloads = [3e-7, 3e-7]\nforces = [0, 1e-10]",
+            "[path] has shear forces up to 1e-10",
+        ),
+    ],
+)
+def test_loads_that_do_not_fit_those_of_normal(tmp_path: Path, table: str, message: str) -> None:
+    """They are told before anything is computed from them."""
+    file = tmp_path / "scene.toml"
+    text = scene_text(HEXAGONAL + "within = 0.0102", normal="load = 3e-7", more=FRICTION)
+    file.write_text(text + table)
+    scene = cr.read_scene(file)
+    assert any(each.startswith(message) for each in scene.cautions(scene.press()))
+
+
 VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
 
 

@@ -115,7 +115,7 @@ def doubts_of(normal: Summary) -> Iterator[str]:
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of`, and two more.
 
-    geometry        : where asperities meet the base
+    geometry        : where asperities meet the sphere
     closest_change  : largest relative change of the loads above a tenth of the largest if the
         geometry were "closest"; None if it is, or if the change could not be computed
     """

@@ -79,6 +79,18 @@ class _Points(Stage):
             found = f"{len(loads)} and {len(forces)} values"
             yield "loads, forces", f"found {found}, expected equally many, at least one"
 
+    @property
+    def highest_load(self) -> float:
+        it = self.ellipse
+        own = [it.load + abs(it.load_amplitude)] if it is not None else self.loads or [0.0]
+        return self.reference * max(own)
+
+    @property
+    def highest_force(self) -> float:
+        it = self.ellipse
+        own = [abs(it.force) + abs(it.force_amplitude)] if it is not None else self.forces or [0.0]
+        return self.reference * max(map(abs, own))
+
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
         if self.ellipse is not None:

@@ -46,6 +46,11 @@ class ShakedownStage(Stage):
             if isinstance(force, list) != pairs:
                 yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
 
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load where the factor on the amplitudes is 1."""
+        return self.reference * (self.loads + max([0.0, *(self.load_amplitudes or [])]))
+
     def compute(self, contact: Contact) -> ShakedownResult:
         swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
         with blamed_on(f"[{self.name}]"):
