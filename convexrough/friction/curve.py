@@ -120,7 +120,7 @@ class MemoryCurve(Table, Plottable):
         return curve, pieces
 
     def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after the part of a segment that one rule covers, and the pieces of the loss."""
+        """The state after the part of a segment that one rule covers, and the pieces of loss."""
         added, shear = load - self.load, height - self.height
         if added > 0 and abs(shear) <= added:
             return self._with(shear / added, load, height), []
