@@ -132,22 +132,6 @@ def test_solvers_that_do_not_answer() -> None:
     ]
 
 
-def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = Newton.solve
-
-    def fail(self: Newton, problem: NormalProblem, start: Any = None) -> Solution:
-        if self.tolerance == Newton().tolerance:
-            raise cr.SolverError("newton: stopped")
-        return solve(self, problem, start)
-
-    monkeypatch.setattr(Newton, "solve", fail)
-    comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
-    assert [entry.outcome for entry in comparison.entries] == ["failed", "answered", "answered"]
-    assert all(np.isnan(entry.disagreement) for entry in comparison.entries)
-    assert all(entry.different_statuses is None for entry in comparison.entries)
-    assert comparison.certified
-
-
 def test_wrong_input_is_raised() -> None:
     with pytest.raises(cr.InputError, match="approach, load: found neither"):
         compare(paper())
@@ -282,18 +266,6 @@ def test_command_on_a_contradiction(
     ran = command("compare", "a.toml")
     assert ran.status == 3
     assert "convexrough: warning: contradiction: newton and bristles: loads of " in ran.err
-
-
-def test_command_beyond_the_convex_range(command: Any, tmp_path: Path) -> None:
-    """Newton's method answers, with a local proof; the convex programs refuse by asperity."""
-    dense = scene_text().replace("tip_radius = 0.02", "tip_radius = 5.0")
-    (tmp_path / "a.toml").write_text(dense)
-    ran = command("compare", "a.toml", "--json")
-    assert ran.status == 3
-    first, *rest = json.loads(ran.out)["compare"]
-    assert (first["outcome"], first["scope"]) == ("answered", "local")
-    assert {row["outcome"] for row in rest} == {"refused"}
-    assert all("too dense for a convex program" in row["message"] for row in rest)
 
 
 MINE = """

@@ -95,12 +95,6 @@ def test_former_names_do_not_come_back() -> None:
     assert not found, "\n".join(found)
 
 
-def test_former_names_are_found(tmp_path: Path) -> None:
-    module = tmp_path / "rivals.py"
-    module.write_text("def solve(problem, announce=None):\n    return problem.at_hand  # rise\n")
-    assert names_of_a_module(module) & FORMER_NAMES.keys() == {"rivals", "announce", "at_hand"}
-
-
 def test_no_banned_turn() -> None:
     prose = {page: prose_of_a_page(page) for page in PAGES}
     prose |= {module: prose_of_a_module(module) for module in [*MODULES, *EXAMPLES]}

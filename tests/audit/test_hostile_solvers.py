@@ -149,28 +149,3 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
         assert (lengths(state.slips - truth.slips) <= proof.slip_errors + known.slip_errors).all()
         assert not (state.status[~sliding] == "sliding").any()
         assert not (state.status[sliding] == "partial").any()
-
-
-@dataclass(frozen=True)
-class Meddler:
-    """Newton's answer, changed where it lies: what is known of products of it stays beside it."""
-
-    name: str = "meddler"
-
-    def solve(self, problem: Any, start: Any = None) -> Any:
-        answer = Newton().solve(problem, start)
-        assert answer.trial is not None
-        answer.loads[:] *= 1.01
-        return answer
-
-
-def test_an_answer_cannot_be_changed_behind_its_product() -> None:
-    """A certificate takes A P from whoever has it: for loads that nobody can change any more."""
-    fine = cr.Asperities.hexagonal(spacing=4e-4, tip_radius=3.2e-3, within=0.0102)
-    scene = cr.Scene(1.0, fine, cr.Material(1.0, 0.3), geometry="summit")
-    with pytest.raises(ValueError, match="read-only"):
-        cr.press(scene, approach=PAPER_APPROACH, solver=Meddler())
-    honest = cr.press(scene, approach=PAPER_APPROACH, solver=Liar(lambda loads, rng: 1.01 * loads))
-    again = cr.certify(scene, honest.loads, approach=PAPER_APPROACH)
-    assert honest.certificate.scope == again.scope
-    assert (honest.status == again.status).all()  # refined: the lie is corrected

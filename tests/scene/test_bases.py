@@ -1,7 +1,6 @@
 """Bases that are no sphere: flat, ellipsoid, cylinder. 50 digits, exact fractions, limits."""
 
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import multiprecision
@@ -15,9 +14,7 @@ from scipy.optimize import minimize
 import convexrough as cr
 from convexrough import checker
 from convexrough.errors import InputError
-from convexrough.gradients.scene import Geometry
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.pairs import Pair
 from convexrough.scene.scene import reach
 
 INF = float("inf")
@@ -47,27 +44,6 @@ def test_closest_points_by_minimisation(base: Any) -> None:
     assert_allclose(scene.contact_points[0], best.x, atol=1e-5)
     assert scene.drops[0] == pytest.approx(best.fun, rel=1e-8, abs=1e-14)
     assert 1 / scene.relative_radii[0] == pytest.approx(bend.mean() + 1 / tip, rel=1e-15)
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("base", [1.0, *BASES.values()])
-@each_geometry
-def test_offsets_to_twice_the_digits(base: Any, geometry: Any) -> None:
-    scene = on(base, geometry)
-    problem = NormalProblem.assemble(scene, approach=5e-5)
-    found, length = problem.twofold_offsets(), Fraction(problem.units.length)
-    a = scene.asperities
-    radii = base if isinstance(base, tuple) else (base, base)
-    for place, i in enumerate(problem.candidates.tolist()):
-        further = Fraction(a.tip_radii[i]) if geometry == "closest" else Fraction(0)
-        drop = Fraction(0)
-        for p, R in zip(a.positions[i], radii, strict=True):
-            if R < INF:
-                drop += Fraction(p) ** 2 / (2 * (Fraction(R) + further))
-        size = drop + abs(Fraction(a.heights[i]))
-        off, exact = _exactly(found, place), Fraction(a.heights[i]) - drop
-        assert abs(off * length - exact) <= size / 2**98
-        assert abs(Fraction(scene.offsets[i]) - exact) <= Fraction(scene.offset_errors[i])
 
 
 @pytest.mark.sample(4)
@@ -164,30 +140,6 @@ def test_gradients(base: Any, geometry: Any) -> None:
     assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
     assert gradient.sphere_radius is None
     assert np.isfinite(gradient.height_errors).all()
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("base", [1.0, *BASES.values()])
-@each_geometry
-def test_law_and_contact_points_to_twice_the_digits(base: Any, geometry: Any) -> None:
-    """What proved bounds of gradients are computed from."""
-    scene = on(base, geometry)
-    problem = NormalProblem.assemble(scene, load=3e-7)
-    bends = [
-        Fraction(0) if R == INF else 1 / Fraction(R) for R in np.broadcast_to(base, 2).tolist()
-    ]
-    k, points = problem.exact.coefficients.mid, Geometry.of(problem).contact_points.mid
-    for place, i in enumerate(problem.candidates.tolist()):
-        rho = Fraction(scene.asperities.tip_radii[i])
-        law = _exactly(k, min(place, len(k.high) - 1)) / Fraction(problem.units.local)
-        assert abs(law**3 / (Fraction(9, 16) * (sum(bends) / 2 + 1 / rho)) - 1) < Fraction(1, 2**92)
-        for axis, (p, c) in enumerate(zip(scene.asperities.positions[i], bends, strict=True)):
-            exact = Fraction(p) / (1 + (c * rho if geometry == "closest" else 0))
-            assert abs(_exactly(points, (place, axis)) - exact) <= abs(exact) / 2**96
-
-
-def _exactly(value: Pair, place: Any) -> Fraction:
-    return Fraction(value.high[place]) + Fraction(value.low[place])
 
 
 def test_no_gradient_by_the_radius_of_what_is_no_sphere() -> None:

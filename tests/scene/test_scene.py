@@ -1,6 +1,5 @@
 """Material, asperities, scene: geometry by independent means, and bad values."""
 
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from scenes import MATERIAL, paper
 
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
-from convexrough.scene.layout import Layout
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import reach
 
@@ -25,25 +23,6 @@ def test_hexagonal_lattice() -> None:
     np.fill_diagonal(apart, np.inf)
     assert_allclose(apart.min(axis=0), 0.5)
     assert ((apart < 0.5001).sum(axis=0)[:7] == 6).all()
-
-
-@pytest.mark.parametrize("pattern", [cr.Asperities.hexagonal, cr.Asperities.square])
-@pytest.mark.parametrize("within", [1.0, 3.0, 20.0])
-def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: float) -> None:
-    made = pattern(spacing=0.7, tip_radius=1.0, within=within).layout
-    lattice, sites = made.lattice, made.sites
-    assert (lattice.sites(made.points) == sites).all()
-    for point, site in zip(made.points, sites, strict=True):
-        there = [
-            sum(int(k) * Fraction(b) for k, b in zip(site, row, strict=True))
-            for row in lattice.basis.T
-        ]
-        off = [abs(Fraction(x) - y) for x, y in zip(point, there, strict=True)]
-        assert max(off) <= lattice.site_error / 4
-    assert lattice.spacing == pytest.approx(0.7, rel=1e-15)
-    assert (made.order == np.lexsort(sites.T[::-1])).all()
-    found = Layout(made.points)
-    assert len(made.points) < 7 or (found.order is not None and found.sites is not None)
 
 
 def test_random_heights_and_radii() -> None:

@@ -35,14 +35,6 @@ def test_rows_are_in_the_order_of_lists_then_grid_then_seeds() -> None:
         assert point.seed == seed
 
 
-def test_tables_are_those_of_the_file_with_the_values_set() -> None:
-    grid = plan(SMALL).source.grid  # type: ignore[attr-defined]
-    point = grid.with_values(*grid.point(grid.count - 1))
-    assert point["asperities"] == {**SMALL["asperities"], "height_std": 1e-6, "seed": 3}
-    assert point["normal"] == {"load": 3e-7}
-    assert "sweep" not in point
-
-
 def test_a_sweep_of_any_length_is_counted_at_once() -> None:
     grid = Grid(
         {"asperities": {}}, over=(("normal.load", tuple(range(10))),) * 3, seeds=range(10**18)

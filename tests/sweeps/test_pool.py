@@ -102,20 +102,6 @@ def test_threads_of_linear_algebra_do_not_matter() -> None:
     assert same(*found)
 
 
-def test_the_threads_are_given_back() -> None:
-    from threadpoolctl import threadpool_info
-
-    from convexrough.threads import one_thread
-
-    def threads() -> set[int]:
-        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
-
-    before = threads()
-    with one_thread, one_thread:
-        assert threads() == {1}
-    assert threads() == before
-
-
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     distributed = pytest.importorskip("distributed")

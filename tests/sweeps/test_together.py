@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sweep_files import toml
+from sweep_files import sweeping, toml
 
 import convexrough as cr
 from convexrough import plausibility
@@ -20,12 +20,14 @@ KNOWN = [f"normal.{name}" for name in together.NORMAL if "error" not in name]
 CYCLES = [f"cycle.{name}" for name in together.CYCLE if "error" not in name]
 
 SCENES: dict[str, dict[str, Any]] = {
-    "load": {"sweep.over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [1e-7, 1e-6]}},
+    "load": {
+        "sweep": {"over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [1e-7, 1e-6]}}
+    },
     "approach": {"normal": {"approach": 5e-5}},
     "tips": {"asperities": {"tip_radius_cv": 0.2, "geometry": "summit"}},
     "one end": {"cycle": {"maximum_fraction": [0.3, 0.4], "minimum_fraction": [0.1, -0.2]}},
     "gross sliding": {"cycle": {"maximum_fraction": [1.0, 0.2]}},
-    "friction": {"sweep.draw": {"friction.coefficient": {"uniform": [0.3, 0.6]}}},
+    "friction": {"sweep": {"draw": {"friction.coefficient": {"uniform": [0.3, 0.6]}}}},
     "crowded": {
         "asperities": {"spacing": 0.0006, "within": 0.0007},
         "cycle": {"maximum_fraction": [0.2]},
@@ -34,24 +36,11 @@ SCENES: dict[str, dict[str, Any]] = {
 
 
 def tables(changes: dict[str, Any], measure: list[str]) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "sphere": {"radius": 1.0},
-        "material": {"contact_modulus": 1.0, "poisson_ratio": 0.3},
-        "asperities": {"pattern": "hexagonal", "spacing": 0.0025, "tip_radius": 0.02,
-                       "within": 0.0102, "height_std": 1e-6},
-        "normal": {"load": 3e-7},
-        "friction": {"coefficient": 0.5},
-        "cycle": {"maximum_fraction": [0.2, 0.7]},
-        "sweep": {"seeds": 2, "measure": measure},
-    }  # fmt: skip
+    found = sweeping(seeds=2, measure=measure)
+    found["asperities"] |= {"height_std": 1e-6, "geometry": "closest"}
+    found["cycle"] = {"maximum_fraction": [0.2, 0.7]}
     for name, table in changes.items():
-        table_name, _, inner = name.partition(".")
-        if inner:
-            found[table_name][inner] = table
-        elif name == "normal":
-            found[name] = table
-        else:
-            found[name] = found[name] | table
+        found[name] = table if name == "normal" else found[name] | table
     return found
 
 
@@ -113,21 +102,6 @@ def test_cautions_are_messages_of_certified_scenes(tmp_path: Path) -> None:
     assert all("contact discs overlap" in each for each in found["message"])
     (line,) = cautions(table)
     assert line.startswith("2 certified scenes of 2 have warnings, the first scene 0: ")
-
-
-def test_what_rows_do_not_know_is_measured_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-    one_by_one = batch.measured
-
-    def counted(*given: Any) -> Any:
-        asked.append(1)
-        return one_by_one(*given)
-
-    monkeypatch.setattr(batch, "measured", counted)
-    rows({}, ["load", "loss"])
-    assert len(asked) == 0
-    rows({}, ["load", "duality_gap"])
-    assert len(asked) == 2
 
 
 def test_where_rows_fail_each_scene_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -107,20 +107,6 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
     assert read_loads(tmp_path / "a.npy", scene).values.tolist() == [1, 2, 3, 4, 5.5]
 
 
-@pytest.mark.parametrize(
-    ("content", "columns"),
-    [
-        ("P,y pos,xs\n1.5,0,0\n0,0,1\n2.5e-5,2.5,.5\n", {"load": "P", "x": "xs", "y": "y pos"}),
-        ("F [N];load\n1.5;9\n0;9\n2.5e-5;9\n", {"load": "F"}),
-        ("9,1.5\n9,0\n9,2.5e-5\n", {"load": "2"}),
-        ("2.5e-5 0.5 2.5\n1.5 0 0\n0 1 0\n", {"load": "1", "x": "2", "y": "3"}),
-    ],
-)
-def test_columns_by_other_names(tmp_path: Path, content: str, columns: dict[str, str]) -> None:
-    found = read_loads(written(tmp_path, content), small(), columns=columns)
-    assert found.values.tolist() == LOADS
-
-
 def test_arrays(tmp_path: Path) -> None:
     table = np.column_stack((PLACES, LOADS))
     records = np.rec.fromarrays(table.T, names="x,y,load")
