@@ -97,11 +97,7 @@ class MemoryCurve(Table, Plottable):
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:
-        """The level of each vertex, and the slope below it minus the slope above it.
-
-        The slope is 0 below the first and above the last vertex. The state is the sum of the normal
-        solutions at the levels, multiplied by these bends.
-        """
+        """The level and the bend of each vertex: (s_k, c_k) in (1) of docs/theory/paths.md."""
         slopes = (Fraction(0), *self.slopes, Fraction(0))
         bends = [below - above for below, above in pairwise(slopes)]
         return list(zip(self.levels, bends, strict=True))
@@ -124,7 +120,7 @@ class MemoryCurve(Table, Plottable):
         return curve, pieces
 
     def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after as much of the segment as one rule covers, and the pieces of its loss."""
+        """The state after the part of a segment that one rule covers, and the pieces of loss."""
         added, shear = load - self.load, height - self.height
         if added > 0 and abs(shear) <= added:
             return self._with(shear / added, load, height), []

@@ -123,7 +123,7 @@ class Stepper:
         return replace(found, load=load, height=height, work=now.work + mean * run)
 
     def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
-        """The state in which all slide, with the least displacement at which they do."""
+        """The state in which all asperities slide, at the least displacement that makes them."""
         trial, on = _Trial.of(self, now, level), level.indentations > 0
         coupled = self.A @ (sign * level.loads - now.carried)
         taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]

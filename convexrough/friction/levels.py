@@ -121,7 +121,7 @@ class FrictionLevels:
             self._named |= {load: level for load, level in found if level is not None}
 
     def rows(self, loads: Sequence[Fraction]) -> Rows:
-        """The levels at these loads, as rows."""
+        """The levels at these loads, as the rows of arrays."""
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:

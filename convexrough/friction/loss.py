@@ -47,7 +47,7 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B by its second formula: twice the error of the trapezoid rule on D0 from L to P."""
+    """B by (1) of docs/theory/losses.md: twice the error of the trapezoid rule on D0."""
     run = high.load - low.load
     return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
 

@@ -99,7 +99,7 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
 
 
 def root(levels: FrictionLevels, place: int) -> Fraction:
-    """The load at which the indentation of a candidate is 0; `place` is its index among them."""
+    """The load at which the indentation of the candidate with the index `place` is 0."""
 
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])

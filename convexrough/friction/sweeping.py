@@ -142,7 +142,7 @@ class _Swept:
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
 
     def potentials(self, charges: Indices, places: Indices) -> Array:
-        """Potentials of unit charges at places; on its shell where a charge is at the place."""
+        """Potentials of unit charges at places; the shell's potential at the place of a charge."""
         apart = self.places[charges] - self.places[places]
         squares = apart.real**2 + apart.imag**2
         return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))

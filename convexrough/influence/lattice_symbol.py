@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 #: Ratio of the longer to the shorter basis vector above which the sums have too many terms.
 LONGEST = 50.0
 
-#: Terms with alpha |d| or |k + G| / 2 alpha above this are omitted; there erfc is below 3e-17.
+#: Terms with alpha |d| or |k + G| / 2 alpha above this are omitted; their erfc is below 3e-17.
 REACH = 6.0
 
 #: Bound on the omitted terms and on the rounding of some hundred terms below 10.

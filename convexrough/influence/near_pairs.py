@@ -163,7 +163,7 @@ def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
 
 
 def _neighbourhoods(order: Order, splitting: Splitting) -> Iterator[Piece]:
-    """Points, with the points of the same and of later blocks that can be nearer than the cut."""
+    """Slices of points, each with the later points that can be nearer than the cut."""
     rows, columns = order.shape
     away = 0
     if splitting.meshed:

@@ -8,8 +8,6 @@ from flint import arb, ctx
 from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
 
 import convexrough as cr
-from convexrough.bench.scenes import scene as bench_scene
-from convexrough.friction.levels import FrictionLevels
 
 #: Half a unit in the last place of the largest, and what a bound may be of it.
 ULP, BOUND = 2.0**-53, 1e-14
@@ -87,13 +85,3 @@ def test_a_prescribed_displacement(name: str, share: float) -> None:
     with ctx.workdps(DIGITS):
         assert_known(state.forces, state.certificate.force_errors, true.forces, BOUND)
         assert_known(state.force, state.certificate.force_error, true.f * true.T, BOUND)
-
-
-def test_levels_of_a_held_approach_are_known_as_well_as_the_top() -> None:
-    """Their total load is known to within what P is; it enters all loads in proportion.
-
-    1,162 asperities touch. It was counted at the largest load, which cost a factor of 500.
-    """
-    levels = cr.press(bench_scene("scattered", 6.0), approach=5e-5).cached(FrictionLevels)
-    top, half = levels.top.loads, levels.at(levels.load / 2).loads
-    assert half.radius.max() < 20 * top.radius.max()

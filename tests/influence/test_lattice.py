@@ -1,6 +1,5 @@
 """Lattices found from points, and the coupling on them against exact sums over all pairs."""
 
-import math
 from fractions import Fraction
 from typing import Any
 
@@ -11,9 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from scenes import rough
 
-from convexrough.influence.convolution import SiteBox
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -89,11 +86,6 @@ def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, s
     assert len(np.unique(sites, axis=0)) == len(points)
 
 
-def test_unequal_tip_radii_move_contact_points_off_a_lattice() -> None:
-    assert rough("closest").lattice is None
-    assert rough("closest").asperities.lattice is not None
-
-
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("shift", [0.0, 1e3, 1e6])
@@ -114,7 +106,7 @@ def test_blur_is_a_bound(name: str, shift: float) -> None:
             assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.site_error)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.floats(0.3, 1.0))
 def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> None:
     """Also where most sites are empty, except around the middle, where it is looked for."""
@@ -174,7 +166,7 @@ def loadings(count: int, seed: int = 0) -> dict[str, Array]:
     }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("shift", [0.0, 300.0, 1e6])
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [40, 500, 1000])
@@ -236,38 +228,6 @@ def test_random_sublattices(name: str, seed: int, count: int) -> None:
             assert (coupling.falloff(loads, power) >= inverse**power @ loads).all()
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("count", [30, 300, 2000])
-def test_falloff(name: str, count: int) -> None:
-    """An upper bound, high by at most a few per cent of the largest."""
-    points = patch(turned(BASES[name], 0.3), count)
-    A, inverse = operator(points), inverse_distances(points, points)
-    for strengths in map(np.abs, loadings(count).values()):
-        for power in (2, 3):
-            exact, bound = inverse**power @ strengths, A.falloff(strengths, power)
-            assert (bound >= exact).all()
-            assert bound.max() <= 1.01 * exact.max()
-            assert (bound - exact).max() <= 0.01 * exact.max()
-    assert (A.falloff(np.zeros(count), 3) == 0).all()
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    st.sampled_from(sorted(BASES)),
-    st.integers(0, 2**32 - 1),
-    st.floats(0.01, 1),
-    st.sampled_from([0.0, 0.3, 3.0]),
-)
-def test_crowding(name: str, seed: int, coverage: float, width: float) -> None:
-    """Of all pairs as in a matrix: also of few that touch, and of very different sizes."""
-    rng = np.random.default_rng(seed)
-    points = patch(turned(BASES[name], 0.2), 120)
-    radii = rng.lognormal(0, width, 120) * (rng.random(120) < coverage)
-    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
-    assert A.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
@@ -291,35 +251,6 @@ def test_fitted_shells_do_not_overlap(
 
 
 # Rounding of the transforms.
-
-
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (33, 47), (50, 31)])
-@pytest.mark.parametrize("power", [1, 2, 3])
-def test_convolutions(shape: tuple[int, int], power: int) -> None:
-    """Also on a box of one row, or one site; and what they lose stays below the bounds."""
-    basis = turned(BASES["hexagonal"], 0.4)
-    box = SiteBox(shape, basis)
-    assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
-    sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
-    inverse = inverse_distances(sites, sites) ** power
-    rng = np.random.default_rng(1)
-    for dtype, roundoff in ((np.float64, ROUNDOFF), (np.float32, 2.0**-24)):
-        kernel = box.kernel(power, dtype)
-        assert kernel.total >= inverse.sum(axis=1).max() * (1 - 1e-12)
-        assert kernel.norm >= np.sqrt((inverse**2).sum(axis=1).max()) * (1 - 1e-12)
-        for field in (rng.standard_normal(shape), np.ones(shape), rng.random(shape) ** 20):
-            given = field.astype(dtype)
-            found = box.convolve(given, kernel.spectrum)
-            assert found.dtype == dtype
-            terms = inverse * given.ravel()
-            exact = np.array([math.fsum(row) for row in terms]).reshape(shape)
-            # The kernel itself is rounded before it is transformed; that is counted elsewhere.
-            slack = 24 * ROUNDOFF * power * (inverse @ np.abs(given).ravel()).reshape(shape)
-            lost = np.maximum(np.abs(found - exact) - slack, 0)
-            size = float(np.linalg.norm(given))
-            assert np.linalg.norm(lost) <= box.bound(kernel, roundoff) * size
-            assert lost.max() <= box.bound_each(kernel, roundoff) * size
 
 
 # The smoother.

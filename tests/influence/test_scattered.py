@@ -6,14 +6,8 @@ from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
 
-from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
-from convexrough.influence.softened import (
-    Softened,
-)
-from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
 
@@ -22,7 +16,7 @@ def meshed(operator: ScatteredInfluence) -> bool:
     return operator._double.splitting.meshed
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_product_and_its_bound(layout: str) -> None:
     rng = np.random.default_rng(1)
@@ -45,52 +39,13 @@ def test_product_and_its_bound(layout: str) -> None:
         assert rounding.relative <= 1e-12
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("power", [1, 2, 3])
-@pytest.mark.parametrize("order", [4, 8, 16])
-def test_error_of_a_pair(power: int, order: int) -> None:
-    """One load and one point, at distances where interpolation is at its worst."""
-    rng = np.random.default_rng(order)
-    kernel = Softened(power, order, 1.0)
-    splitting = Splitting(kernel, 1.0 / (1.2 * order), order)
-    worst = 0.0
-    for _ in range(30):
-        points = rng.uniform(0, 1.2, (40, 2))
-        product = Product.assemble(points, splitting, np.float64)
-        loads = np.zeros(len(points))
-        loads[0] = 1.0
-        error = product.apply(loads) - inverse_distances(points, points[:1])[:, 0] ** power
-        worst = max(worst, float(np.abs(error).max()))
-    bound = kernel.pair_error(splitting.spacing)
-    assert worst <= bound
-    assert worst >= 1e-3 * bound
-
-
-def test_upper_bounds_on_sums() -> None:
-    """Also where what is computed is too low, as on a mesh that is coarse enough."""
-    rng = np.random.default_rng(13)
-    points = rng.uniform(0, 1.2, (300, 2))
-    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
-    product = Product.assemble(points, splitting, np.float64)
-    inverse = inverse_distances(points, points) ** 3
-    too_low = 0
-    for i in range(20):
-        strengths = np.zeros(len(points))
-        strengths[i] = 1.0
-        assert (product.above(strengths) >= inverse[i]).all()
-        relative = product.rounding(strengths).relative
-        low = product.apply(strengths) < (1 - relative) * inverse[i]
-        too_low += int(low[inverse[i] > 0].sum())
-    assert too_low > 100
-
-
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("power", [2, 3])
 def test_falloff(layout: str, power: int) -> None:
     rng = np.random.default_rng(5)
     points = LAYOUTS[layout](rng)
-    rows = rng.integers(0, len(points), 300)
+    rows = rng.integers(0, len(points), 60)
     operator = ScatteredInfluence(points, SCALE)
     for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
         true, _ = inverse_sums(points[rows], points, strengths, power=power)
