@@ -9,7 +9,7 @@ displacement at half the limiting shear force tends to Mindlin's.
 
     python examples/continuum_limit.py
 
-Every state is certified, and none takes more than a second.
+Every state is certified. The finest has 120,000 asperities in contact.
 """
 
 from __future__ import annotations
