@@ -41,7 +41,7 @@ def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
     assert brentq(over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.387687, abs=1e-6)
 
 
-@pytest.mark.parametrize("fraction", [0.37, 0.5, 0.8, -0.8, 1.0])
+@pytest.mark.parametrize("fraction", [0.37, -0.8, 1.0])
 def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
     """But for discs in place of points, an error of the displacements that slips are made of."""
     state = sheared(0.0, fraction)

@@ -88,8 +88,8 @@ def test_a_full_standard_output(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text())
     with open("/dev/full", "w") as full:
         done = module("run", "a.toml", "--no-figures", cwd=tmp_path, stdout=full.fileno())
-    assert done.returncode == 1
-    assert done.stderr == "convexrough: error: standard output: No space left on device\n"
+    said = "convexrough: error: standard output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (1, said)
     assert (tmp_path / "a-results" / "summary.json").exists()
 
 
