@@ -61,19 +61,3 @@ def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
         state = cr.shear(contact, force=-Q)
         assert_array_equal(appendix.slips(state), 0.0)
         assert_allclose(appendix.energies(state), cycle.asperity_losses, rtol=1e-12)
-
-
-def test_open_asperities_and_no_shear() -> None:
-    state = sheared(0.3, 0.5)
-    is_open = state.contact.loads == 0
-    assert is_open.any()
-    assert_array_equal(np.isnan(appendix.displacements(state)), is_open)
-    assert_array_equal(appendix.slips(state)[is_open], 0.0)
-    assert_array_equal(appendix.energies(state)[is_open], 0.0)
-    for contact in (pressed(0.3), pressed(0.3, approach=-1e-6)):
-        still = cr.shear(contact, force=0.0)
-        assert np.isnan(appendix.scatter(still))
-        assert_array_equal(appendix.slips(still), 0.0)
-        assert appendix.cycle_energy(contact, 0.0) == 0.0
-    with pytest.raises(cr.InputError, match="friction"):
-        appendix.cycle_energy(pressed(0.3, friction=None), 0.0)
