@@ -69,6 +69,7 @@ def deadly(whole: Plan, worst: int) -> Plan:
     return replace(whole, source=Deadly(whole.source.grid, whole.source.path, worst=worst))
 
 
+@pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
 def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
     contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
     whole = plan_of(contents, Path("sweep"))
@@ -81,6 +82,7 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
         assert same(table, cr.sweep(contents, executor=here))
 
 
+@pytest.mark.sample(0)
 def test_an_executor_that_broke_is_said_to_be() -> None:
     with (
         ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
