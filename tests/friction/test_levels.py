@@ -1,5 +1,6 @@
 """States, cycles and paths against levels in a hundred digits: values, and proved bounds."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -85,3 +86,14 @@ def test_a_prescribed_displacement(name: str, share: float) -> None:
     with ctx.workdps(DIGITS):
         assert_known(state.forces, state.certificate.force_errors, true.forces, BOUND)
         assert_known(state.force, state.certificate.force_error, true.f * true.T, BOUND)
+
+
+def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() -> None:
+    """The largest possible load of some asperity, 1e-23, is less than the error bounds of loads."""
+    k, within = 12, math.sqrt(2 * 5e-5)
+    array = cr.Asperities.hexagonal(spacing=0.0025 / k, tip_radius=0.02 / k, within=within)
+    scene = cr.Scene(1.0, array, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    contact = cr.press(scene, approach=5e-5)
+    state = cr.shear(contact, force=0.25 * contact.load)
+    assert state.order.startswith("proved")
+    assert state.certificate.displacement_error < 1e-14 * state.displacement
