@@ -105,8 +105,9 @@ def _proved(claim: Claim) -> str:
         return f"{claim.proved} not proved"
     near = f"{claim.many} correct to {_size(claim)}"
     if not claim.near_enough:
-        near += ", not near enough"
-    return f"{claim.proved} proved; {near}{'' if claim.total_holds else '; total load differs'}"
+        near = f"errors of up to {_size(claim)}, more than allowed"
+    total = "" if claim.total_holds else f"; total {claim.one} differs"
+    return f"{claim.proved} proved; {near}{total}"
 
 
 def _size(claim: Claim) -> str:
@@ -220,4 +221,5 @@ def _total(claim: Claim, unit: str) -> str:
         return f"{given} (as prescribed)"
     expected = f"{claim.total_prescribed:.10g} {unit}".rstrip()
     ratio = claim.total_given / claim.total_prescribed if claim.total_prescribed else math.inf
-    return f"{given}, prescribed {expected}: ratio {ratio:.7g}"
+    opposite = ", of opposite sign" if ratio < 0 else ""
+    return f"{given}, prescribed {expected}: ratio {ratio:.7g}{opposite}"
