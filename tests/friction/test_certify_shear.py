@@ -45,7 +45,7 @@ def test_right_forces_are_proved(name: str, influence: Any, fraction: float) -> 
     assert off(state.displacement, truth.displacement) <= 2 * judged.displacement_error
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.sampled_from(NAMES),
     st.sampled_from(FRACTIONS),

@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from convexrough.friction.curve import MemoryCurve
@@ -53,7 +53,6 @@ def _cubic(piece: object) -> Fraction:
     return (top - bottom) * (at(Fraction(0)) + 4 * at(Fraction(1, 2)) + at(Fraction(1))) / 6
 
 
-@settings(max_examples=30)
 @given(paths, st.lists(st.fractions(0, 1), max_size=3))
 def test_splitting_segments_changes_nothing(path: list[Point], cuts: list[Fraction]) -> None:
     split: list[Point] = []
@@ -67,7 +66,6 @@ def test_splitting_segments_changes_nothing(path: list[Point], cuts: list[Fracti
     assert loss(split) == loss(path)
 
 
-@settings(max_examples=30)
 @given(paths, st.lists(points(), min_size=2, max_size=6))
 def test_a_closed_path_is_periodic_after_one_cycle(past: list[Point], cycle: list[Point]) -> None:
     closed = [*cycle, cycle[0]]

@@ -195,7 +195,7 @@ def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
     found = sums(operator, loads)
     sizes = operator.apply(np.abs(loads)) / 0.37
     with ctx.workprec(200):
-        for row in rng.integers(0, len(points), 8).tolist():
+        for row in rng.integers(0, len(points), 4).tolist():
             off = abs(value(found, row) - exact(points, loads, row))
             assert off <= arb(float(found.radius[row]))
             if layout in EVEN:
@@ -213,7 +213,7 @@ def test_points_that_are_not_known() -> None:
     found = sums(ScatteredInfluence(points, 1.0, error), loads)
     exactly = sums(ScatteredInfluence(points, 1.0), loads)
     with ctx.workprec(200):
-        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 300)]
+        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 600)]
     worst = max(float(off.mid()) for off in offs)
     assert exactly.radius.max() < worst <= found.radius.max()
 
@@ -222,7 +222,7 @@ def test_points_that_are_not_known() -> None:
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     """Gaps of a press in ball arithmetic; loads are then proved to eleven digits."""
-    made = scene("scattered", 10.0)
+    made = scene("scattered", 8.0)
     given = cr.Scene(1.0, made.asperities, made.material, friction=0.5, geometry=geometry)
     problem = NormalProblem.assemble(given, approach=APPROACH)
     assert problem.influence.name == "scattered"

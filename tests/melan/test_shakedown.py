@@ -71,7 +71,7 @@ def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
     assert found.upper >= a * (1 - 1e-12)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("angle", [None, 0, 45, 90])
 def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""

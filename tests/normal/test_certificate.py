@@ -183,7 +183,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
         assert np.linalg.eigvalsh(hessian)[0] >= 1 - box.convexity_number - 1e-12
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 3))
 def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)

@@ -76,7 +76,7 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     assert bound * problem.units.length >= approach * (1 - 1e-12)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
     """On every convex scene, to the same answer."""

@@ -1,6 +1,6 @@
 """Forged proof files: whatever the checker accepts is true by the 50-digit reference.
 
-60 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
+30 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
 """
 
 import json
@@ -22,7 +22,7 @@ import convexrough as cr
 from convexrough import checker
 from convexrough.proof import prove
 
-FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "60"))
+FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "30"))
 
 ORDERS = ("proved", "proved for one step")
 
