@@ -271,6 +271,15 @@ def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
     assert settled.loss_error <= 1e-8 * energy
 
 
+def test_losses_by_asperities_where_the_load_falls_below_a_front() -> None:
+    """A cell begins with the front at a level that is above the load at the end of the cell."""
+    loads = P * np.array([1.0, 1e-3, 1e-3])
+    settled = cr.steady(PAPER, loads=loads, forces=0.5 * loads * [0.5, 0.1, 0.9])
+    off = abs(settled.asperity_losses.sum() - settled.loss)
+    assert off <= settled.asperity_loss_errors.sum() + settled.loss_error
+    assert (settled.asperity_losses >= 0).all()
+
+
 def random_path(seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Many steps at the limit |dQ| = f |dP|, where the front hardly runs."""
     rng = np.random.default_rng(seed)
