@@ -11,7 +11,7 @@ from scene_files import HEXAGONAL, scene_text
 import convexrough as cr
 from convexrough.atomic import replacing, to_json
 from convexrough.run import results
-from convexrough.run.results import write_results
+from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
 from convexrough.run.stages import NormalStage
 from convexrough.tabular.table import read_table
@@ -232,6 +232,27 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     write(None)
     assert path.read_text() == "new"
     assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
+
+
+def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+
+    def write(error: BaseException | None, text: str, *, force: bool = False) -> None:
+        with results_folder(folder, force=force) as new:
+            (new / "one.csv").write_text(text)
+            assert not folder.exists() or (folder / "one.csv").read_text() == "1"
+            if error is not None:
+                raise error
+
+    with pytest.raises(cr.FileError, match="b: cannot hold results: No space"):
+        write(OSError(28, "No space left on device"), "half")
+    assert not list((tmp_path / "a").iterdir())
+    write(None, "1")
+    assert json.loads((folder / MANIFEST).read_text())["files"] == ["one.csv"]
+    with pytest.raises(KeyboardInterrupt):
+        write(KeyboardInterrupt(), "2", force=True)
+    assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
+    assert (folder / "one.csv").read_text() == "1"
 
 
 def test_json_has_no_infinities() -> None:
