@@ -24,6 +24,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
 from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
+from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding keeps
@@ -262,10 +263,11 @@ class _Iterate(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """The largest defect of the equations; that of the total is converted to a displacement."""
-        stiffness = float(self.slopes.sum())
+        """The largest defect; what the total lacks beyond rounding counts as a displacement."""
+        stiffness, rounding = float(self.slopes.sum()), len(self.carried) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
-        return max(float(np.abs(self.defect).max()), missing if self.excess else 0.0)
+        beyond = abs(self.excess) > rounding * float(np.abs(self.carried).sum())
+        return max(float(np.abs(self.defect).max()), missing if beyond else 0.0)
 
     def newton(self, A: Array) -> tuple[Array, float]:
         """The changes of eta and x in a Newton step."""

@@ -251,6 +251,17 @@ def test_general_steps_where_many_begin_to_slide() -> None:
     assert (abs(path.asperity_forces) <= 0.5 * path.asperity_loads * (1 + 1e-12)).all()
 
 
+def test_general_steps_as_near_to_gross_sliding_as_rounding_allows() -> None:
+    points = [[-0.5, -0.9], [-1.0, 0.6], [0.8, 0.2], [0.5, 0.1], [0.9, 0.6]]
+    heights = [-0.007, -0.023, -0.035, -0.029, -0.049]
+    asperities = cr.Asperities(points, [0.1, 5.2, 0.1, 2.9, 0.2], heights)
+    scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+    contact, forces = cr.press(scene, load=2.0), np.array([1.0, -1.0]) * (1 - 3e-15)
+    path = cr.load_path(scene, loads=[2.0, 2.0], forces=forces, steps=1, start=contact)
+    assert path.asperity_forces.sum(axis=1) == pytest.approx(forces, rel=1e-15)
+    assert path.displacements[1] == pytest.approx(-path.displacements[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("fraction", [1e-6, 1e-5, 1e-4])
 def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
     force = fraction * 0.5 * P
@@ -258,6 +269,15 @@ def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
     energy = cr.cycle(cr.press(PAPER, load=P), maximum=force).loss
     assert settled.loss == pytest.approx(energy, rel=1e-8)
     assert settled.loss_error <= 1e-8 * energy
+
+
+def test_losses_by_asperities_where_the_load_falls_below_a_front() -> None:
+    """A cell begins with the front at a level that is above the load at the end of the cell."""
+    loads = P * np.array([1.0, 1e-3, 1e-3])
+    settled = cr.steady(PAPER, loads=loads, forces=0.5 * loads * [0.5, 0.1, 0.9])
+    off = abs(settled.asperity_losses.sum() - settled.loss)
+    assert off <= settled.asperity_loss_errors.sum() + settled.loss_error
+    assert (settled.asperity_losses >= 0).all()
 
 
 def random_path(seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,12 @@ from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
 
+from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
+from convexrough.influence.softened import Softened
+from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
 
@@ -37,6 +41,24 @@ def test_product_and_its_bound(layout: str) -> None:
         assert rounding.norm <= 1e-10 * np.linalg.norm(sizes)
         assert rounding.each <= 1e-10 * sizes.max()
         assert rounding.relative <= 1e-12
+
+
+def test_upper_bounds_on_sums() -> None:
+    """Also where what is computed is too low, as on a mesh that is coarse enough."""
+    rng = np.random.default_rng(13)
+    points = rng.uniform(0, 1.2, (300, 2))
+    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, splitting, np.float64)
+    inverse = inverse_distances(points, points) ** 3
+    too_low = 0
+    for i in range(20):
+        strengths = np.zeros(len(points))
+        strengths[i] = 1.0
+        assert (product.above(strengths) >= inverse[i]).all()
+        relative = product.rounding(strengths).relative
+        low = product.apply(strengths) < (1 - relative) * inverse[i]
+        too_low += int(low[inverse[i] > 0].sum())
+    assert too_low > 100
 
 
 @pytest.mark.sample(1)
