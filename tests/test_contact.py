@@ -187,15 +187,6 @@ def test_order_and_orientation_do_not_matter(sampled: Case, random: object, angl
     assert_allclose(second.loads, first.loads[order], rtol=1e-10, atol=1e-12 * top)
 
 
-def test_nothing_touches() -> None:
-    scene = cr.Scene(1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL, geometry="summit")
-    contact = cr.press(scene, approach=1e-7)
-    assert contact.load == 0
-    assert list(contact.status) == ["open", "open"]
-    assert contact.certificate.holds
-    assert_allclose(contact.gaps, [5e-7 - 1e-7, 2e-6 - 1e-7], rtol=1e-9)
-
-
 @pytest.mark.parametrize("influence", operators(paper()))
 def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> None:
     """Its last loads come in the scene's units and order, and are a start for the next attempt."""

@@ -44,7 +44,7 @@ def runs(block: Block) -> bool:
 
 
 @pytest.mark.usefixtures("no_processes")
-@pytest.mark.sample(10)
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(
     "page",
     [page for page in PAGES if any(map(runs, blocks(page)))],

@@ -65,15 +65,8 @@ def results() -> dict[str, Any]:
         contact.proof(),
         cr.load_path(scene, loads=contact.load * np.array([1.0, 0.7]), forces=[Q, -Q / 2]),
         cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q]),
-        cr.phase_losses(
-            scene,
-            load=contact.load,
-            load_amplitude=Q,
-            force_amplitude=Q / 2,
-            phases=[0.0, 1.0],
-            factors=[0.5, 1.0],
-            chords=6,
-        ),
+        cr.phase_losses(scene, load=contact.load, load_amplitude=Q, force_amplitude=Q / 2,
+                        phases=[0.0, 1.0], factors=[0.5, 1.0], chords=6),
         cr.compare_paths(scene, loads=[contact.load] * 2, forces=[Q, -Q]),
         cr.compare_paths(scene, loads=[contact.load], forces=[Q]).entries[0],
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
@@ -84,7 +77,7 @@ def results() -> dict[str, Any]:
         state.change(cr.Direction(heights=1e-8)),
         cr.Direction(heights=1e-8),
         cr.Objective(scene=scene, of="loss", load=contact.load, force=Q),
-    )
+    )  # fmt: skip
     return {type(each).__name__: each for each in found}
 
 

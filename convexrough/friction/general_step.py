@@ -24,6 +24,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
 from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
+from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding keeps
@@ -32,6 +33,10 @@ ACCURATE = 1e-14
 
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
+
+#: A Newton step must not leave more than the largest of so many last residuals. The residual may
+#: grow where an asperity begins or ceases to slide, and slopes jump.
+RECENT = 10
 
 #: The smallest and the largest number of steps per segment.
 FEWEST, MOST = 4, 64
@@ -134,20 +139,22 @@ class Stepper:
         trial = _Trial.of(self, now, level)
         size = float(np.abs(level.indentations).max())
         eta, x = trial.even(total)
-        iterate = trial.at(eta, x, total)
+        tried = [trial.at(eta, x, total)]
         for _ in range(ITERATIONS):
+            iterate, worst = tried[-1], max(each.residual for each in tried[-RECENT:])
             if iterate.residual <= ACCURATE * size:
                 break
             change, shift = iterate.newton(self.A)
             part = 1.0
             for _ in range(HALVINGS):
                 following = trial.at(iterate.eta + part * change, iterate.x + part * shift, total)
-                if following.residual < iterate.residual:
+                if following.residual < worst:
                     break
                 part /= 2
             else:
                 break
-            iterate = following
+            tried.append(following)
+        iterate = min(tried, key=lambda each: each.residual)
         if iterate.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {iterate.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
@@ -256,10 +263,11 @@ class _Iterate(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """The largest defect of the equations; that of the total is converted to a displacement."""
-        stiffness = float(self.slopes.sum())
+        """The largest defect; what the total lacks beyond rounding counts as a displacement."""
+        stiffness, rounding = float(self.slopes.sum()), len(self.carried) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
-        return max(float(np.abs(self.defect).max()), missing if self.excess else 0.0)
+        beyond = abs(self.excess) > rounding * float(np.abs(self.carried).sum())
+        return max(float(np.abs(self.defect).max()), missing if beyond else 0.0)
 
     def newton(self, A: Array) -> tuple[Array, float]:
         """The changes of eta and x in a Newton step."""

@@ -174,7 +174,7 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     some = max(1, NUMBERS // (4 + 4 * len(levels.candidates)))
     for start in range(0, len(parts), some):
         here = parts[start : start + some]
-        pairs = [(P, L) for _, loads, fronts in here for P in loads for L in fronts]
+        pairs = [(P, min(L, P)) for _, loads, fronts in here for P in loads for L in fronts]
         weights = exactly([weight for weight, _, _ in here])
         for k, values in enumerate(_of_pairs(levels, pairs)):
             one, other = values[1::4] - values[0::4], values[3::4] - values[2::4]

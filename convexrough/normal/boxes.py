@@ -21,7 +21,7 @@ from convexrough.influence.shells import fitted_shells
 from convexrough.normal.overlap import Nearest, overlapping_margin
 from convexrough.normal.problem import FITTED, NormalProblem
 from convexrough.normal.stack import Stack
-from convexrough.roundoff import ROUNDOFF
+from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
@@ -65,9 +65,22 @@ class Box(NamedTuple):
         )
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def closed(self) -> Box:
-        """The same box for another load or approach, whose solutions may lie outside it."""
-        return self._replace(faces=np.where(self.loads > 0, self.loads, np.inf))
+        """A box that contains this one, for another load or approach.
+
+        Its solutions may lie outside it. Where shells prove S_i <= theta, with the convexity number
+        theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
+        """
+        it, theta = self.problem, self.convexity_number
+        ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
+        shelled = it.convexity_at(self.stiffness) <= theta * (1 + 4 * SAFETY)
+        wider = shelled & (self.loads > 0) & (ends > self.loads) & np.isfinite(ends)
+        loads = np.where(wider, ends, self.loads)
+        h = np.where(wider, it.stiffness(loads), self.stiffness)
+        theta = np.where(shelled, np.maximum(theta, it.convexity_at(h)), theta)
+        faces = np.where(loads > 0, loads, np.inf)
+        return self._replace(loads=loads, stiffness=h, convexity_number=theta, faces=faces)
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:

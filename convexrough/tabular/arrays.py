@@ -75,9 +75,14 @@ def named_arrays(path: Path) -> dict[str, Any]:
     with path.open("rb") as raw, foreign():
         loaded = np.load(raw, allow_pickle=False)
         if isinstance(loaded, np.ndarray):
-            return {"": loaded}
-        with loaded:
-            return {name: np.asarray(loaded[name]) for name in loaded.files}
+            arrays = {"": loaded}
+        else:
+            with loaded:
+                arrays = {name: np.asarray(loaded[name]) for name in loaded.files}
+        for values in arrays.values():
+            if values.dtype.kind == "U":  # numpy reads numbers that are no characters, too
+                np.char.decode(np.char.encode(values, "utf-8"), "utf-8")
+        return arrays
 
 
 def read_arrays(path: Path, known: Sequence[str]) -> Columns:

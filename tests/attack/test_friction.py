@@ -224,6 +224,44 @@ def test_gross_sliding_where_order_fails() -> None:
     assert history.displacements[2] == pytest.approx(history.displacements[0], rel=1e-9)
 
 
+def test_general_steps_next_to_gross_sliding() -> None:
+    """Slopes jump where asperities begin or cease to slide. Here order is proved."""
+    points = [[0.8, -0.5], [-0.6, 0.7], [-0.7, -0.4], [-0.7, 0.1], [0.9, 0.1]]
+    heights = [-0.003, -0.006, -0.027, -0.04, -0.024]
+    asperities = cr.Asperities(points, [0.3, 8.0, 0.7, 0.3, 1.3], heights)
+    scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+    loads, forces = [0.5, 0.1875, 0.0625], 0.5 * np.array([-0.5, 0.1873125, 0.0625])
+    true = cr.load_path(scene, loads=loads, forces=forces)
+    assert true.order == "proved"
+    for steps in (1, 4):
+        path = cr.load_path(scene, loads=loads, forces=forces, steps=steps)
+        assert path.asperity_forces == pytest.approx(true.asperity_forces, abs=1e-11)
+        assert path.displacements == pytest.approx(true.displacements, rel=1e-9)
+
+
+def test_general_steps_where_many_begin_to_slide() -> None:
+    points = [[0.6, -0.3], [-0.9, 0.1], [-0.7, 0.4], [-0.3, -0.1], [1.0, 0.6], [0.7, 0.1]]
+    heights = [-0.003, -0.033, -0.005, -0.027, -0.002, -0.012]
+    asperities = cr.Asperities(points, [7.6, 0.1, 6.0, 0.6, 0.3, 1.2], heights)
+    scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+    forces = 0.5 * np.array([1.5, -1.5, 1.75 * (1 - 1e-9)])
+    path = cr.load_path(scene, loads=[2.0, 2.0, 1.75], forces=forces, steps=4)
+    assert path.order == "fails"
+    assert path.asperity_forces.sum(axis=1) == pytest.approx(forces, rel=1e-12)
+    assert (abs(path.asperity_forces) <= 0.5 * path.asperity_loads * (1 + 1e-12)).all()
+
+
+def test_general_steps_as_near_to_gross_sliding_as_rounding_allows() -> None:
+    points = [[-0.5, -0.9], [-1.0, 0.6], [0.8, 0.2], [0.5, 0.1], [0.9, 0.6]]
+    heights = [-0.007, -0.023, -0.035, -0.029, -0.049]
+    asperities = cr.Asperities(points, [0.1, 5.2, 0.1, 2.9, 0.2], heights)
+    scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+    contact, forces = cr.press(scene, load=2.0), np.array([1.0, -1.0]) * (1 - 3e-15)
+    path = cr.load_path(scene, loads=[2.0, 2.0], forces=forces, steps=1, start=contact)
+    assert path.asperity_forces.sum(axis=1) == pytest.approx(forces, rel=1e-15)
+    assert path.displacements[1] == pytest.approx(-path.displacements[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("fraction", [1e-6, 1e-5, 1e-4])
 def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
     force = fraction * 0.5 * P
@@ -231,6 +269,15 @@ def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
     energy = cr.cycle(cr.press(PAPER, load=P), maximum=force).loss
     assert settled.loss == pytest.approx(energy, rel=1e-8)
     assert settled.loss_error <= 1e-8 * energy
+
+
+def test_losses_by_asperities_where_the_load_falls_below_a_front() -> None:
+    """A cell begins with the front at a level that is above the load at the end of the cell."""
+    loads = P * np.array([1.0, 1e-3, 1e-3])
+    settled = cr.steady(PAPER, loads=loads, forces=0.5 * loads * [0.5, 0.1, 0.9])
+    off = abs(settled.asperity_losses.sum() - settled.loss)
+    assert off <= settled.asperity_loss_errors.sum() + settled.loss_error
+    assert (settled.asperity_losses >= 0).all()
 
 
 def random_path(seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -57,8 +57,6 @@ WRONG: dict[str, Spoil] = {
     "scaled": lambda loads, rng: loads * (1 + 10.0 ** rng.uniform(-12, 2)),
     "noise": lambda loads, rng: loads * rng.lognormal(0, 10.0 ** rng.uniform(-12, 0), len(loads)),
     "swapped": lambda loads, rng: rng.permutation(loads),
-    "even": lambda loads, rng: np.full(len(loads), loads.mean()),
-    "late: of another scene": lambda loads, rng: loads**2 * 3,
     "single": lambda loads, rng: loads.astype(np.float32),
 }
 

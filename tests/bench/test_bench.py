@@ -15,7 +15,7 @@ import convexrough as cr
 from convexrough.bench import measure, page, suite
 from convexrough.bench.measure import Attempt, reference
 from convexrough.bench.profile import Profile, profile_of
-from convexrough.bench.rows import Bench, Row, better_than_default, frontier
+from convexrough.bench.rows import Bench, Row, better_than_default
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton
 
@@ -74,21 +74,6 @@ def test_rows_of_those_that_do_not_answer() -> None:
 
 def row(name: str, seconds: float, error: float, setting: str = "default") -> Row:
     return Row("solve", "lattice", 61, solver=name, setting=setting, seconds=seconds, error=error)
-
-
-def test_frontier() -> None:
-    rows = [
-        row("fast", 1.0, 1e-3),
-        row("middle", 2.0, 1e-6),
-        row("worse", 2.5, 1e-5),
-        row("same", 2.0, 1e-6),
-        row("newton", 3.0, 1e-15),
-        row("slow", 4.0, 1e-15),
-        row("unknown", 0.1, np.nan),
-        replace(row("refused", 0.1, 1e-20), outcome="refused"),
-    ]
-    assert [each.solver for each in frontier(rows)] == ["fast", "middle", "same", "newton"]
-    assert better_than_default(rows) == []
 
 
 def test_who_is_better_than_the_default() -> None:

@@ -9,7 +9,6 @@ from fractions import Fraction
 from math import comb
 from typing import Any
 
-import numpy as np
 import pytest
 import sympy as sp
 
@@ -18,7 +17,6 @@ from convexrough.convex.cones import (
     FIVE_CONES_LIMIT,
     FOUR_CONES,
     FOUR_CONES_LIMIT,
-    power_cones,
 )
 
 S, s, t = sp.symbols("S s t", nonnegative=True)
@@ -138,21 +136,3 @@ def test_the_limits_are_sharp() -> None:
     assert sp.expand(slope.subs(s, 1) - 2 * (1 - S)) == 0
     factored = (1 - s) * (5 * s**3 + 9 * s**2 + 12 * s + 4) / 15
     assert sp.expand(E3.subs(S, 1) - factored) == 0
-
-
-def test_rows_of_many_lifts_are_those_of_each() -> None:
-    """Lifts scattered among other variables: every row says what its cone says."""
-    rng = np.random.default_rng(1)
-    for cones, names in ((FOUR_CONES, 5), (FIVE_CONES, 6)):
-        n, width = 4, 40
-        columns = rng.permutation(width)[: names * n].reshape(names, n)
-        rows = power_cones(list(columns), width)
-        assert rows.cones == len(cones) * n
-        x = rng.normal(size=width)
-        slack = (rows.constant - rows.matrix @ x).reshape(n, len(cones), 3)
-        for lift in range(n):
-            values = np.zeros(7)
-            values[0], values[7 - names :] = 1.0, x[columns[:, lift]]
-            product, other, mean = np.moveaxis(cones @ values, 1, 0)
-            expected = np.stack((product + other, product - other, 2 * mean), axis=1)
-            np.testing.assert_allclose(slack[lift], expected, atol=1e-14)

@@ -30,23 +30,6 @@ def test_an_asperity_that_nearly_touches_is_decided(fraction: float, ulps: int) 
     assert state.certificate.slip_errors.max() <= 1e-15 * state.displacement
 
 
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_at_the_limit_all_slide(control: str) -> None:
-    """Q that is f P to rounding is f P: each asperity carries all that it can.
-
-    The highest still touches its partner at the level 0, so of it no status is proved.
-    """
-    contact = pressed("paper", "dense", control)
-    for off in (0.0, 1e-15, -1e-15):
-        state = cr.shear(contact, force=FRICTION * contact.load * (1 + off))
-        assert state.status[0] == "undecided"
-        assert (state.status[1:][contact.loads[1:] > 0] == "sliding").all()
-        np.testing.assert_allclose(state.forces, FRICTION * contact.loads, rtol=1e-15)
-        assert not state.stick_radii.any()
-        assert state.certificate.order == "proved"
-        assert not state.certificate.holds  # as one status is open
-
-
 def test_just_before_gross_sliding_the_last_one_sticks() -> None:
     contact = pressed("paper")
     for short in (1e-11, 1e-14):

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attacks import ATTACKS, attack
 from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, in_doubt, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,34 +13,10 @@ from scenes import paper, twins
 
 import convexrough as cr
 
-ATTACKS = ["digits", "noise", "drop", "swap", "scale", "zero", "full", "wild", "backwards"]
 
-
-def spoiled(forces: Any, limits: Any, kind: str, rng: Any) -> Any:
-    """Forces with something wrong."""
-    wrong = np.array(forces)
-    loaded = np.flatnonzero(limits)
-    i, j = rng.choice(loaded, 2, replace=False)
-    if kind == "digits":
-        digits = rng.integers(1, 12)
-        wrong = np.array([float(f"{each:.{digits}e}") for each in wrong])
-    elif kind == "noise":
-        wrong *= 1 + 10.0 ** rng.uniform(-14, 0) * rng.standard_normal(len(wrong))
-    elif kind == "drop":
-        wrong[i] = 0.0
-    elif kind == "swap":
-        wrong[[i, j]] = wrong[[j, i]]
-    elif kind == "scale":
-        wrong[i] *= 10.0 ** rng.uniform(-3, 3)
-    elif kind == "zero":
-        wrong[:] = 0.0
-    elif kind == "full":
-        wrong = np.array(limits)
-    elif kind == "wild":
-        wrong = 10.0 ** rng.uniform(-30, 30, len(wrong)) * rng.choice([-1, 1], len(wrong))
-    else:
-        wrong = -wrong
-    return wrong
+def spoiled(forces: Any, limits: Any, kind: str, rng: np.random.Generator) -> Any:
+    """Forces with something wrong; "full" are the largest that friction bears."""
+    return limits if kind == "full" else rng.choice([1, 1, -1]) * attack(kind, forces, rng)
 
 
 def assert_covers(judged: cr.ShearCertificate, forces: Any, truth: Any) -> None:
@@ -68,28 +45,11 @@ def test_right_forces_are_proved(name: str, influence: Any, fraction: float) -> 
     assert off(state.displacement, truth.displacement) <= 2 * judged.displacement_error
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("digits", [4, 6, 9])
-@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.35, 0.5, 0.9, 0.999])
-@pytest.mark.parametrize("name", NAMES)
-def test_few_digits_are_enough_for_the_statuses(name: str, fraction: float, digits: int) -> None:
-    """And the bounds are of the size of what was rounded off."""
-    contact, truth = pressed(name), exact(name, fraction)
-    force = fraction * FRICTION * contact.load
-    state = cr.shear(contact, force=force)
-    forces = np.array([float(f"{each:.{digits - 1}e}") for each in state.forces])
-    judged = cr.certify_shear(contact, forces, force=force)
-    assert judged.holds
-    assert (judged.status == state.status).all()
-    assert_covers(judged, forces, truth)
-    assert judged.force_errors.max() < 10 * np.abs(forces - state.forces).max() + 1e-10 * force
-
-
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.sampled_from(NAMES),
     st.sampled_from(FRACTIONS),
-    st.sampled_from(ATTACKS),
+    st.sampled_from([*ATTACKS, "full"]),
     st.integers(0, 2**32 - 1),
     st.sampled_from(KINDS),
 )
@@ -108,7 +68,7 @@ def test_attacks(name: str, fraction: float, kind: str, seed: int, influence: An
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("digits", [3, 5, 8])
 @pytest.mark.parametrize("fraction", [0.1, 0.37, 0.999])
-@pytest.mark.parametrize("kind", ["digits", "noise", "drop", "full"])
+@pytest.mark.parametrize("kind", ["rounded", "perturbed", "dropped", "full"])
 def test_doubt_about_the_loads_is_counted(kind: str, fraction: float, digits: int) -> None:
     contact, truth = pressed("paper"), exact("paper", fraction)
     force = fraction * FRICTION * contact.load
@@ -153,15 +113,6 @@ def test_the_other_direction_and_none() -> None:
     still = cr.certify_shear(contact, 0.0, force=0.0)
     assert still.holds
     assert still.force_errors.max() < 1e-25
-
-
-def test_gross_sliding() -> None:
-    contact = pressed("paper")
-    limit = FRICTION * contact.load
-    judged = cr.certify_shear(contact, FRICTION * contact.loads, force=limit)
-    assert judged.status[0] == "undecided"  # the highest still touches at the level 0
-    assert (judged.status[1:][contact.loads[1:] > 0] == "sliding").all()
-    assert (judged.force_errors <= 1e-9 * limit).all()
 
 
 def test_where_nothing_touches_or_is_proved() -> None:

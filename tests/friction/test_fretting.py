@@ -117,6 +117,7 @@ def bristles(
     return float(np.ptp(slips)) / 2, *np.max(tractions, axis=0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "points",
     [

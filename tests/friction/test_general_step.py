@@ -13,25 +13,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, ONE, PAPER, TWO, path_of, shaded
+from path_scenes import LARGEST, PAPER, shaded
 from scenes import MATERIAL, random_scenes
 
 import convexrough as cr
 from convexrough.arrays import Array
-from convexrough.errors import SolverError
-from convexrough.friction import general_step
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import Bundle, Stepper, followed
-from convexrough.friction.levels import FrictionLevels, Snapshot
+from convexrough.friction.general_step import followed
+from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import couple
 
 #: c_t f of the scenes here.
 TRAVEL = 0.5 * (2 - 0.3) / (2 * (1 - 0.3))
-
-
-def seven() -> cr.Scene:
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0026)
-    return cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit")
 
 
 def agree(a: cr.LoadPath, b: cr.LoadPath, within: float) -> None:
@@ -42,35 +35,7 @@ def agree(a: cr.LoadPath, b: cr.LoadPath, within: float) -> None:
     assert_allclose(a.drifts, b.drifts, atol=within * X)
 
 
-@pytest.mark.parametrize("points", [ONE, TWO])
-def test_one_step_per_segment_is_the_memory_curve(points: list[tuple[float, float]]) -> None:
-    scene, P, Q = path_of("paper", points)
-    path = cr.load_path(scene, loads=P, forces=Q)
-    agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
-
-
-def test_a_step_is_cut_in_its_exact_middle() -> None:
-    """Of P and T as rational numbers, not of the sum of the forces that were found."""
-    third = Fraction(LARGEST["paper"]) / 3
-    levels = cr.press(PAPER, load=LARGEST["paper"]).cached(FrictionLevels)
-    asked: list[tuple[Fraction, Fraction]] = []
-
-    class OnceCut(Stepper):
-        def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = 6) -> Bundle:
-            asked.append((load, height))
-            return super().step(now, load, height, cuts)
-
-        def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
-            if len(asked) == 2:
-                raise SolverError("not this one", solver="general step")
-            return super()._solve(now, level, total)
-
-    first, last = (2 * third, third / 7), (third, third / 3)
-    OnceCut(levels).along(MemoryCurve.pressed(third), [first, last], 1)
-    assert asked == [first, last, ((first[0] + last[0]) / 2, (first[1] + last[1]) / 2), last]
-
-
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
 def test_random_paths(sampled: tuple[cr.Scene, float], seed: int) -> None:
     scene, approach = sampled
@@ -87,6 +52,7 @@ def test_random_paths(sampled: tuple[cr.Scene, float], seed: int) -> None:
     agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [1, 5])
 def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
     """Or none are given: against those of the memory curve, which are proved."""
@@ -106,14 +72,6 @@ def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
     assert (np.abs(found - path.losses) <= within)[known].all()
 
 
-def test_losses_that_do_not_settle_are_not_given(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(general_step, "MOST", general_step.FEWEST)
-    contact = cr.press(seven(), load=1e-6)
-    levels = contact.cached(FrictionLevels)
-    points = [(levels.load, levels.load / 2), (levels.load / 2, -levels.load / 4)]
-    assert np.isnan(followed(levels, MemoryCurve.pressed(levels.load), points).losses[-1])
-
-
 def test_where_order_fails() -> None:
     """The memory curve is not used, and the steps converge to the bristles."""
     scene = shaded()
@@ -127,11 +85,11 @@ def test_where_order_fails() -> None:
     fine = cr.load_path(scene, loads=P, forces=Q, steps=32)
     X = np.abs(path.displacements).max()
     assert_allclose(path.displacements, fine.displacements, atol=2e-3 * X)
-    bristles = Bristles(scene, largest, count=400)
+    bristles = Bristles(scene, largest, count=200)
     for load, force, X_step, Q_step in zip(
         P, Q, fine.displacements, fine.asperity_forces, strict=True
     ):
-        bristles.go(load, force / 0.5, steps=80)
+        bristles.go(load, force / 0.5, steps=40)
         assert TRAVEL * bristles.displacement == pytest.approx(X_step, abs=5e-3 * X)
         assert_allclose(0.5 * bristles.carried, Q_step, atol=5e-3 * Q.max())
 

@@ -1,5 +1,6 @@
 """States, cycles and paths against levels in a hundred digits: values, and proved bounds."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,6 @@ from flint import arb, ctx
 from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
 
 import convexrough as cr
-from convexrough.bench.scenes import scene as bench_scene
-from convexrough.friction.levels import FrictionLevels
 
 #: Half a unit in the last place of the largest, and what a bound may be of it.
 ULP, BOUND = 2.0**-53, 1e-14
@@ -89,11 +88,12 @@ def test_a_prescribed_displacement(name: str, share: float) -> None:
         assert_known(state.force, state.certificate.force_error, true.f * true.T, BOUND)
 
 
-def test_levels_of_a_held_approach_are_known_as_well_as_the_top() -> None:
-    """Their total load is known to within what P is; it enters all loads in proportion.
-
-    1,162 asperities touch. It was counted at the largest load, which cost a factor of 500.
-    """
-    levels = cr.press(bench_scene("scattered", 6.0), approach=5e-5).cached(FrictionLevels)
-    top, half = levels.top.loads, levels.at(levels.load / 2).loads
-    assert half.radius.max() < 20 * top.radius.max()
+def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() -> None:
+    """The largest possible load of some asperity, 1e-23, is less than the error bounds of loads."""
+    k, within = 12, math.sqrt(2 * 5e-5)
+    array = cr.Asperities.hexagonal(spacing=0.0025 / k, tip_radius=0.02 / k, within=within)
+    scene = cr.Scene(1.0, array, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    contact = cr.press(scene, approach=5e-5)
+    state = cr.shear(contact, force=0.25 * contact.load)
+    assert state.order.startswith("proved")
+    assert state.certificate.displacement_error < 1e-14 * state.displacement

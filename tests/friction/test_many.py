@@ -93,7 +93,7 @@ def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
             assert cycles.displacement_errors[k] <= 2 * cycle.displacement_error
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(random_scenes(crowding=1.2, most=10), st.integers(0, 2**32 - 1))
 def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
     """Also of scenes where nothing touches, or that the rows do not prove."""
@@ -112,14 +112,6 @@ def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
 
 
 def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    crowded = cr.press_many([shaded(), shaded()], load=2.96)
-    assert crowded.alone.tolist() == [0, 1]
-    one = cr.press(shaded(), load=2.96)
-    assert_same(crowded, 0, one)
-    cycles = crowded.cycles(0.1)
-    cycle = cr.cycle(one, maximum=0.1)
-    assert cycles.order.tolist() == [cycle.order] * 2
-    assert cycles.losses[0] == cycle.loss
     scenes = rough(3)
     lifted = cr.press_many(scenes, approach=[-1.0, 5e-5, 5e-5])
     assert_same(lifted, 0, cr.press(scenes[0], approach=-1.0))
@@ -132,10 +124,11 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
 
 
-@pytest.mark.parametrize("loads", [[0.01, 2.96], [0.01, 2.96, 0.02]])
-def test_cycles_of_rows_beside_one_that_is_not_proved(loads: list[float]) -> None:
+def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
+    loads = [0.01, 2.96]
     contacts = cr.press_many([shaded()] * len(loads), load=loads)
     assert contacts.alone.tolist() == [1]
+    assert_same(contacts, 1, cr.press(shaded(), load=2.96))
     cycles = contacts.cycles(0.2 * contacts.loads)
     for k in range(len(loads)):
         one = cycles[k]
@@ -151,15 +144,6 @@ def test_one_asperity_near_gross_sliding() -> None:
     cycles = contacts.cycles((1 - 1e-12) * F * contacts.loads)
     assert cycles.order.tolist() == ["proved"]
     assert abs(cycles.losses[0] - cycles[0].loss) <= cycles.loss_errors[0] + cycles[0].loss_error
-
-
-def test_batches_may_be_cut_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenes = rough(5)
-    whole = cr.press_many(scenes, approach=5e-5)
-    monkeypatch.setattr(rows, "MATRICES", 2 * 61**2)
-    parts = cr.press_many(scenes, approach=5e-5)
-    assert_array_equal(whole.asperity_loads, parts.asperity_loads)
-    assert_array_equal(whole.cycles(1e-8).losses, parts.cycles(1e-8).losses)
 
 
 def test_results_are_tables_and_sequences() -> None:

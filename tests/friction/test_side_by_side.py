@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from path_scenes import LARGEST, ONE, PAPER, TWO, path_of, shaded
+from path_scenes import ONE, PAPER, TWO, path_of, shaded
 from scenes import random_scenes
 
 import convexrough as cr
@@ -14,6 +14,7 @@ from convexrough.friction import conic_step
 from convexrough.solvers.programs import RawAnswer
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO])
 def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
     scene, P, Q = path_of("paper", points)
@@ -26,7 +27,7 @@ def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
     assert max(apart[2]) < 1e-5
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
 def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, float], seed: int) -> None:
     scene, approach = sampled
@@ -84,15 +85,6 @@ def test_a_wrong_answer_of_the_solver_shows(monkeypatch: pytest.MonkeyPatch) -> 
     scene, P, Q = path_of("paper", ONE)
     conic = cr.compare_paths(scene, loads=P, forces=Q).entries[2]
     assert conic.force_disagreement > 1e-3
-
-
-def test_gross_sliding_is_left_to_the_curve() -> None:
-    """At Q = f P Newton's method has nothing that sticks to hold on to."""
-    P = LARGEST["paper"]
-    found = cr.compare_paths(PAPER, loads=[P, P], forces=[0.1 * P, 0.5 * P])
-    assert found.entries[0].outcome == "failed"
-    assert found.entries[1].outcome == "answered"
-    assert found.entries[1].force_disagreement == 0.0
 
 
 def test_bad_input() -> None:

@@ -59,7 +59,7 @@ def test_the_paper_at_half_the_limit() -> None:
     assert np.isnan(onsets[contact.loads == 0]).all()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("influence", KINDS)
 def test_onsets_are_where_sliding_starts(influence: str, name: str) -> None:

@@ -92,7 +92,7 @@ def test_constant_load_is_a_cycle(name: str) -> None:
     assert_allclose(found.stick_radii[sticking], first.stick_radii[sticking], rtol=1e-9)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
 def test_every_later_cycle_is_the_same(sampled: tuple[cr.Scene, float], seed: int) -> None:
     scene, approach = sampled
@@ -152,7 +152,7 @@ def test_losses_against_phase() -> None:
 
 
 def test_where_order_fails_nothing_is_said_of_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few steps are enough to see that a cycle is the path that it stands for."""
+    """Few steps are enough to see that nothing is claimed."""
     for name in ("SETTLED", "SETTLED_MOTION"):
         monkeypatch.setattr(general_step, name, np.inf)
     scene = shaded()
@@ -162,10 +162,6 @@ def test_where_order_fails_nothing_is_said_of_cycles(monkeypatch: pytest.MonkeyP
     assert found.order == "fails"
     assert np.isinf([found.loss_error, found.loss_first_error]).all()
     assert set(found.status) == {"undecided"}
-    path = cr.load_path(
-        scene, loads=np.append(np.tile(P, 2), P[0]), forces=np.append(np.tile(Q, 2), Q[0])
-    )
-    assert found.loss == pytest.approx(path.losses[4] - path.losses[2], rel=1e-9)
     assert found.loss > 0
 
 

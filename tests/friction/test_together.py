@@ -1,101 +1,20 @@
 """Levels found together, in rows, against the same ones found one by one."""
 
-import pickle
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from levels_reference import SCENES
 from numpy.testing import assert_array_equal
-from path_scenes import shaded
-from scenes import NAMED, random_scenes
+from scenes import NAMED
 
 import convexrough as cr
-from convexrough.contact import levels_of
 from convexrough.friction import order
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
 from convexrough.friction.walk import follow
-from convexrough.normal import refine, together
-from convexrough.normal.level import Level
-from convexrough.normal.proved import POOR
-from convexrough.numbers.balls import Ball
-
-#: Of the load pressed with.
-PARTS = np.concatenate((10.0 ** np.arange(-12, -1), np.linspace(0.1, 0.999, 12), [1 - 1e-12]))
-
-
-def both(contact: cr.Contact, parts: np.ndarray) -> list[tuple[Level, Level | None]]:
-    """The levels at these parts of the load, alone and together."""
-    one, many = levels_of(contact), levels_of(contact)
-    loads = one.top.load * Ball.exact(parts)
-    together = many.prepare(loads)
-    assert many.presses == sum(level is not None for level in together)
-    return [(one.at(loads[k]), each) for k, each in enumerate(together)]
-
-
-def assert_same(alone: Level, level: Level) -> None:
-    """Words, all digits, and bounds that are as good, or too good to be sharpened by the law."""
-    assert_array_equal(alone.touching, level.touching)
-    assert_array_equal(alone.open, level.open)
-    for name in ("approach", "loads", "indentation", "energy"):
-        a, b = getattr(alone, name), getattr(level, name)
-        assert_array_equal(a.value, b.value)
-        assert (np.abs((a - b).value) <= a.radius + b.radius).all()
-        good = 2.0 * a.radius + 1e-29 * np.max(a.size)
-        assert (b.radius <= np.maximum(good, POOR * np.abs(b.value))).all()
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("name", NAMED)
-def test_levels_together_are_those_alone(name: str) -> None:
-    scene, approach = NAMED[name]
-    contact = cr.press(scene, approach=approach)
-    for pressed in (contact, cr.press(scene, load=contact.load)):
-        for alone, level in both(pressed, PARTS):
-            assert level is not None
-            assert_same(alone, level)
-
-
-@settings(max_examples=20, deadline=None)
-@given(random_scenes(crowding=0.9, most=12), st.integers(0, 2**32 - 1))
-def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = sampled
-    contact = cr.press(scene, approach=approach)
-    if contact.load == 0.0:
-        return
-    parts = 10.0 ** np.random.default_rng(seed).uniform(-9, 0, 6)
-    for alone, level in both(contact, parts):
-        if level is not None:
-            assert_array_equal(alone.touching, level.touching)
-            assert_array_equal(alone.open, level.open)
-            apart = (alone.loads - level.loads).value
-            assert (np.abs(apart) <= alone.loads.radius + level.loads.radius).all()
-
-
-def test_what_is_better_alone_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, approach = NAMED["paper"]
-    by_cones = cr.press(scene, approach=approach, solver="conic")  # stays a check by Clarabel
-    for copy in (by_cones, pickle.loads(pickle.dumps(by_cones))):
-        for alone, level in both(copy, PARTS[-2:]):
-            assert level is None
-            assert alone.touching.any()
-    crowded = levels_of(cr.press(shaded(), load=2.96))
-    assert crowded.top.solution is not None
-    if crowded.top.solution.box.fixed_open.any():
-        assert crowded.prepare(crowded.top.load * Ball.exact(PARTS[-2:])) == [None, None]
-    monkeypatch.setattr(together, "STEPS", 1)  # too few: not proved, or as good as ever
-    monkeypatch.setattr(refine, "CORRECTIONS", 1)
-    poor = both(cr.press(scene, approach=approach), PARTS)
-    assert any(level is None or level.loads.radius.max() > 1e-20 for _, level in poor)
-    for alone, level in poor:
-        if level is not None:
-            apart = (alone.loads - level.loads).value
-            assert (np.abs(apart) <= alone.loads.radius + level.loads.radius).all()
 
 
 def test_cycles_together_are_those_alone() -> None:

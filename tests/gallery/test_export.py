@@ -129,8 +129,6 @@ def test_the_index(pack: Path, index: Any) -> None:
         assert about["answer"]["loads"] == list(case.loads)
         assert about["touching"] == case.touching.sum()
         assert about["scene"]["heights"] == case.scene.asperities.heights.tolist()
-        undecided = about["certificate"]["undecided"]
-        assert (undecided == []) == (about["certificate"]["load_error"] is not None) or undecided
         for file in about["programs"]:
             assert (pack / file).stat().st_size < 2_000_000
     left_out = {name for name, about in index.items() if "bristles" in about["left_out"]}

@@ -123,14 +123,6 @@ def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
     np.testing.assert_allclose(same.loads, by_approach.change(raised).loads, rtol=1e-10, atol=1e-25)
 
 
-def test_who_is_open_and_stays_open_changes_no_load() -> None:
-    contact = pressed("paper", "load")
-    raised = np.where(contact.loads > 0, 0.0, 1e-9)
-    change = contact.change(cr.Direction(heights=raised))
-    assert not change.loads.any()
-    np.testing.assert_allclose(change.gaps[contact.loads == 0], -1e-9)
-
-
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("name", ["sphere_radius", "friction", "load", "approach", "force"])
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "1e-9", None])

@@ -100,15 +100,6 @@ def test_no_bound_is_too_small(seed: int) -> None:
     assert_both(contact, friction_state(contact, force, holding), force, holding, None)
 
 
-def test_a_height_that_is_off_by_its_bound_is_found() -> None:
-    """The comparison itself can fail."""
-    contact, state = pressed("rough", "load"), reference("rough", 0.4, "load")
-    gradient = cr.cycle(contact, maximum=0.4 * FRICTION * contact.load).gradient()
-    object.__setattr__(gradient, "height_errors", gradient.height_errors * 0.0)
-    with ctx.workdps(DIGITS), pytest.raises(AssertionError, match="heights"):
-        assert_entries(gradient, state.loss_slopes("load"), None)
-
-
 def test_a_cycle_that_does_not_move_costs_nothing_and_changes_nothing() -> None:
     contact = pressed("rough", "load")
     still = cr.cycle(contact, maximum=0.1 * contact.load, minimum=0.1 * contact.load).gradient()
@@ -198,7 +189,7 @@ def test_normalised(name: str, holding: Any) -> None:
 
 def test_many_asperities_by_every_operator() -> None:
     asperities = cr.Asperities.hexagonal(
-        spacing=2.5e-4, tip_radius=2e-3, within=4e-3, height_std=3e-8, seed=1
+        spacing=2.5e-4, tip_radius=2e-3, within=2.5e-3, height_std=3e-8, seed=1
     )
     scene = with_friction(cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"))
     found = {}

@@ -39,7 +39,7 @@ OBJECTIVES = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_its_gradient(name: str) -> None:
     objective = OBJECTIVES[name]
@@ -58,7 +58,7 @@ def test_its_gradient(name: str) -> None:
 
 
 def test_scipy_straight_away() -> None:
-    """The load that gives an approach; and heights within bounds that cost more."""
+    """The load that gives an approach."""
     objective = of_loss(("load",), of="approach", force=None)
     scale, wanted = float(objective.start[0]), 4e-5
 
@@ -70,16 +70,6 @@ def test_scipy_straight_away() -> None:
     found = minimize(missed, [1.0], jac=True, method="BFGS", options={"gtol": 1e-12})
     again = cr.press(objective.scene, load=scale * float(found.x[0]))
     assert again.approach == pytest.approx(wanted, rel=1e-9)
-    loss = of_loss()
-    first, _ = loss(loss.start)
-
-    def gain(x: Array) -> tuple[float, Array]:
-        value, slopes = loss(loss.start + 1e-7 * x)
-        return -value / first, -slopes * 1e-7 / first
-
-    n = len(loss.start)
-    best = minimize(gain, np.zeros(n), jac=True, bounds=[(-1, 1)] * n, options={"maxiter": 8})
-    assert -best.fun > 1.01
 
 
 def test_jax() -> None:

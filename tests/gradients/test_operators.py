@@ -8,6 +8,7 @@ import convexrough as cr
 from convexrough.influence import couple
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("count", [2, 30, 200])
 def test_slopes_of_the_surface_are_its_derivative(seed: int, count: int) -> None:

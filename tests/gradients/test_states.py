@@ -293,7 +293,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
         assert float(slope) == pytest.approx(gradient.friction, rel=1e-12)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "number"),
     [

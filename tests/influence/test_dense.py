@@ -1,15 +1,11 @@
 """The coupling as a matrix, its rounding bound, and the shell lemma."""
 
-from fractions import Fraction
-from typing import Any
-
 import numpy as np
 import pytest
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum
-from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
 from convexrough.influence.choice import couple
@@ -93,27 +89,6 @@ def test_sums_are_known(
         assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("made", [False, True])
-@pytest.mark.parametrize("count", [20, 61, 300, 700])
-def test_sums_among_some(count: int, made: bool) -> None:
-    """Out of the matrix of all, if that is made: the same, to what is said of them."""
-    rng = np.random.default_rng(count)
-    points, loads = rng.uniform(-1, 1, (count, 2)), Pair.exact(rng.random(count))
-    operator = DenseInfluence.assemble(points, 1.0)
-    if made:
-        operator.sums(loads)
-    for which in (
-        np.flatnonzero(rng.random(count) < 0.3),
-        np.concatenate((np.arange(5), np.arange(count - 9, count))),
-        rng.permutation(count)[:10],
-    ):
-        found = operator.restricted(which).sums(loads.at(which))
-        fresh = DenseInfluence.assemble(points[which], 1.0).sums(loads.at(which))
-        assert ((found - fresh).size <= 2.1 * (found.radius + fresh.radius)).all()
-        assert (found.radius < 1e-24 * found.value).all()
-
-
 def test_sums_where_points_are_pairs() -> None:
     """Of the closest-point geometry as many digits as of summits, and of the true points."""
     scene = rough("closest")
@@ -136,48 +111,6 @@ def test_sums_of_what_is_no_number() -> None:
         loads = np.full(len(points), 1.0)
         loads[3] = bad
         assert (DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads)).radius == np.inf).all()
-
-
-def test_point_error_is_counted() -> None:
-    """Contact points of the closest geometry are rounded: the product bound covers that too."""
-    scene = rough("closest")
-    error = 3 * 2.0**-53 * np.abs(scene.contact_points).max()
-    operator = DenseInfluence.assemble(scene.contact_points, SCALE, error)
-    exact_points = [
-        [Fraction(float(c)) * Fraction(1) / (Fraction(1) + Fraction(float(rho))) for c in position]
-        for position, rho in zip(
-            scene.asperities.positions, scene.asperities.tip_radii, strict=True
-        )
-    ]
-    ctx.dps = 60
-    (xi, yi), (xj, yj) = exact_points[5], exact_points[17]
-    square = (xi - xj) ** 2 + (yi - yj) ** 2
-    true = arb(SCALE) / (arb(square.numerator) / arb(square.denominator)).sqrt()
-    relative = abs(float((arb(float(operator.matrix[5, 17])) - true) / true))
-    assert relative <= operator.entry_error
-
-
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_elsewhere(geometry: Any) -> None:
-    """Displacements at other points; 0 from a point to itself."""
-    scene = rough(geometry)
-    points, error = scene.contact_points, scene.point_error
-    among, others = points[::3], np.concatenate((points[1::3], points[:1], [[0.3, 0.4]]))
-    operator = DenseInfluence.assemble(among, SCALE, error)
-    coupling = operator.onto(others)
-    loads = np.random.default_rng(1).random(len(among))
-    rows = SCALE * inverse_distances(others, among)
-    assert (rows == 0).sum() == 1  # of the first point onto itself
-    assert_allclose(coupling.apply(loads), rows @ loads, rtol=1e-14)
-    exact = two_product(np.concatenate((among, others)), SCALE, np.append(loads, 0 * others[:, 0]))
-    bounds = coupling.rounding(loads).of(coupling.apply(loads))
-    for value, true, bound in zip(coupling.apply(loads), exact[len(among) :], bounds, strict=True):
-        if true.is_finite():  # a point at itself is infinitely close in these words
-            assert abs(float(arb(float(value)) - true)) <= bound
-    for power in (2, 3):
-        assert_allclose(coupling.falloff(loads, power), (rows / SCALE) ** power @ loads, rtol=1e-11)
-        assert (coupling.falloff(loads, power) >= (rows / SCALE) ** power @ loads).all()
-    assert len(operator.onto(others[:0]).apply(loads)) == 0
 
 
 def test_crowding() -> None:

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from scenes import rough
 
 from convexrough.influence.convolution import SiteBox
 from convexrough.influence.coupling import inverse_distances
@@ -89,11 +88,6 @@ def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, s
     assert len(np.unique(sites, axis=0)) == len(points)
 
 
-def test_unequal_tip_radii_move_contact_points_off_a_lattice() -> None:
-    assert rough("closest").lattice is None
-    assert rough("closest").asperities.lattice is not None
-
-
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("shift", [0.0, 1e3, 1e6])
@@ -114,7 +108,7 @@ def test_blur_is_a_bound(name: str, shift: float) -> None:
             assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.site_error)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.floats(0.3, 1.0))
 def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> None:
     """Also where most sites are empty, except around the middle, where it is looked for."""
@@ -174,7 +168,7 @@ def loadings(count: int, seed: int = 0) -> dict[str, Array]:
     }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("shift", [0.0, 300.0, 1e6])
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [40, 500, 1000])
@@ -208,7 +202,7 @@ def test_products(name: str, count: int, shift: float) -> None:
         assert_allclose(single, exact, rtol=0, atol=1e-6 * top)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.integers(1, 60))
 def test_random_sublattices(name: str, seed: int, count: int) -> None:
     """`among` some, in any order, and `onto` others on the lattice and off it."""
@@ -236,38 +230,6 @@ def test_random_sublattices(name: str, seed: int, count: int) -> None:
             assert (coupling.falloff(loads, power) >= inverse**power @ loads).all()
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("count", [30, 300, 2000])
-def test_falloff(name: str, count: int) -> None:
-    """An upper bound, high by at most a few per cent of the largest."""
-    points = patch(turned(BASES[name], 0.3), count)
-    A, inverse = operator(points), inverse_distances(points, points)
-    for strengths in map(np.abs, loadings(count).values()):
-        for power in (2, 3):
-            exact, bound = inverse**power @ strengths, A.falloff(strengths, power)
-            assert (bound >= exact).all()
-            assert bound.max() <= 1.01 * exact.max()
-            assert (bound - exact).max() <= 0.01 * exact.max()
-    assert (A.falloff(np.zeros(count), 3) == 0).all()
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    st.sampled_from(sorted(BASES)),
-    st.integers(0, 2**32 - 1),
-    st.floats(0.01, 1),
-    st.sampled_from([0.0, 0.3, 3.0]),
-)
-def test_crowding(name: str, seed: int, coverage: float, width: float) -> None:
-    """Of all pairs as in a matrix: also of few that touch, and of very different sizes."""
-    rng = np.random.default_rng(seed)
-    points = patch(turned(BASES[name], 0.2), 120)
-    radii = rng.lognormal(0, width, 120) * (rng.random(120) < coverage)
-    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
-    assert A.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
@@ -290,11 +252,8 @@ def test_fitted_shells_do_not_overlap(
         assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
 
 
-# Rounding of the transforms.
-
-
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (33, 47), (50, 31)])
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (17, 23)])
 @pytest.mark.parametrize("power", [1, 2, 3])
 def test_convolutions(shape: tuple[int, int], power: int) -> None:
     """Also on a box of one row, or one site; and what they lose stays below the bounds."""
@@ -320,6 +279,3 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
             size = float(np.linalg.norm(given))
             assert np.linalg.norm(lost) <= box.bound(kernel, roundoff) * size
             assert lost.max() <= box.bound_each(kernel, roundoff) * size
-
-
-# The smoother.

@@ -127,16 +127,3 @@ def test_points_off_their_sites_are_counted(seed: int, share: float, off: float)
         return
     matrix = DenseInfluence.assemble(points, SCALE).matrix
     assert np.linalg.eigvalsh(matrix + SCALE / radius * np.eye(100))[0] >= 0
-
-
-def test_what_is_known_of_lattices() -> None:
-    points = np.stack(np.divmod(np.arange(900), 30), axis=1) @ HEXAGONAL
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    A = LatticeInfluence.assemble(points, lattice, SCALE)
-    exact = -1 / closed_forms()[0]
-    assert A.semidefinite_with(exact * 0.998)
-    assert not A.semidefinite_with(exact * 1.0001)
-    assert not DenseInfluence.assemble(points, SCALE).semidefinite_with(0.1)
-    far = Lattice(lattice.origin, lattice.basis, 0.01)
-    assert not LatticeInfluence.assemble(points, far, SCALE).semidefinite_with(exact * 0.998)

@@ -10,9 +10,7 @@ from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
-from convexrough.influence.softened import (
-    Softened,
-)
+from convexrough.influence.softened import Softened
 from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
@@ -22,7 +20,7 @@ def meshed(operator: ScatteredInfluence) -> bool:
     return operator._double.splitting.meshed
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_product_and_its_bound(layout: str) -> None:
     rng = np.random.default_rng(1)
@@ -45,27 +43,6 @@ def test_product_and_its_bound(layout: str) -> None:
         assert rounding.relative <= 1e-12
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("power", [1, 2, 3])
-@pytest.mark.parametrize("order", [4, 8, 16])
-def test_error_of_a_pair(power: int, order: int) -> None:
-    """One load and one point, at distances where interpolation is at its worst."""
-    rng = np.random.default_rng(order)
-    kernel = Softened(power, order, 1.0)
-    splitting = Splitting(kernel, 1.0 / (1.2 * order), order)
-    worst = 0.0
-    for _ in range(30):
-        points = rng.uniform(0, 1.2, (40, 2))
-        product = Product.assemble(points, splitting, np.float64)
-        loads = np.zeros(len(points))
-        loads[0] = 1.0
-        error = product.apply(loads) - inverse_distances(points, points[:1])[:, 0] ** power
-        worst = max(worst, float(np.abs(error).max()))
-    bound = kernel.pair_error(splitting.spacing)
-    assert worst <= bound
-    assert worst >= 1e-3 * bound
-
-
 def test_upper_bounds_on_sums() -> None:
     """Also where what is computed is too low, as on a mesh that is coarse enough."""
     rng = np.random.default_rng(13)
@@ -84,13 +61,13 @@ def test_upper_bounds_on_sums() -> None:
     assert too_low > 100
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("power", [2, 3])
 def test_falloff(layout: str, power: int) -> None:
     rng = np.random.default_rng(5)
     points = LAYOUTS[layout](rng)
-    rows = rng.integers(0, len(points), 300)
+    rows = rng.integers(0, len(points), 60)
     operator = ScatteredInfluence(points, SCALE)
     for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
         true, _ = inverse_sums(points[rows], points, strengths, power=power)
@@ -109,7 +86,7 @@ def test_among_and_onto() -> None:
     part = operator.restricted(which)
     assert len(part) == len(which)
     assert_allclose(part.apply(loads), DenseInfluence.assemble(points[which], SCALE).apply(loads))
-    others = np.concatenate((rng.uniform(-2, 2, (200, 2)), points[:5]))
+    others = np.concatenate((rng.uniform(-2, 2, (60, 2)), points[:5]))
     loads = rng.random(len(points))
     few = operator.onto(others)
     true, rest = inverse_sums(others, points, loads, SCALE)
@@ -154,16 +131,16 @@ def test_point_error_is_counted() -> None:
     operator = ScatteredInfluence(points, SCALE, error)
     loads = rng.random(len(points))
     computed = operator.apply(loads)
-    true, rest = inverse_sums(moved[:200], moved, loads, SCALE)
-    error = np.abs(computed[:200] - true - rest)
-    assert (error <= operator.rounding(loads).of(computed)[:200]).all()
+    true, rest = inverse_sums(moved[:60], moved, loads, SCALE)
+    error = np.abs(computed[:60] - true - rest)
+    assert (error <= operator.rounding(loads).of(computed)[:60]).all()
     exactly = ScatteredInfluence(points, SCALE).rounding(loads)
     assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
     far = points + rng.choice([-2e-6, 2e-6], points.shape)
     rough = ScatteredInfluence(points, SCALE, 2e-6)
     for power in (2, 3):
-        above = rough.falloff(loads, power)[:200]
-        assert (above >= inverse_sums(far[:200], far, loads, power=power)[0]).all()
+        above = rough.falloff(loads, power)[:60]
+        assert (above >= inverse_sums(far[:60], far, loads, power=power)[0]).all()
     assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
 
 

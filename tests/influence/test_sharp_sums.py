@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.typing import NDArray
-from point_layouts import LAYOUTS, clustered, disc, jittered
+from point_layouts import LAYOUTS, disc, jittered
 from scenes import scattered, solve_exactly
 
 import convexrough as cr
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.influence import scattered as scattered_points
 from convexrough.influence import sharp_sums as sharp
-from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened, exact_series
@@ -181,7 +180,7 @@ def test_values_at_points(order: int) -> None:
     assert missed > 2
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("kind", ["smooth", "rough", "few"])
 def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
@@ -196,7 +195,7 @@ def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
     found = sums(operator, loads)
     sizes = operator.apply(np.abs(loads)) / 0.37
     with ctx.workprec(200):
-        for row in rng.integers(0, len(points), 8).tolist():
+        for row in rng.integers(0, len(points), 4).tolist():
             off = abs(value(found, row) - exact(points, loads, row))
             assert off <= arb(float(found.radius[row]))
             if layout in EVEN:
@@ -204,41 +203,6 @@ def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
     if layout in EVEN:
         plain = operator.rounding(loads).of(0.37 * sizes).max()
         assert found.radius.max() * 0.37 < 0.1 * plain
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
-def test_interpolation_counts(tolerance: float) -> None:
-    """Where it is all of the error."""
-    rng = np.random.default_rng(6)
-    points = disc(rng)
-    operator = ScatteredInfluence(points, 1.0, tolerance=tolerance)
-    loads = rng.random(len(points))
-    found = sums(operator, loads)
-    worst = 0.0
-    with ctx.workprec(200):
-        for row in range(0, 4000, 400):
-            off = float(abs(value(found, row) - exact(points, loads, row)).mid())
-            worst = max(worst, off)
-    assert 1e-4 * found.radius.max() < worst <= found.radius.max()
-    product = operator._double
-    far = sharp._relative(product) * float(product.apply(loads).max())
-    parts = float(product.interpolation(loads).max()) + far
-    assert parts <= found.radius.max() <= 1.1 * parts
-
-
-def test_near_pairs_are_as_sharp_as_others() -> None:
-    """Points very near to another: the sums are known to sixteen digits of the largest."""
-    rng = np.random.default_rng(7)
-    points = disc(rng)
-    points[1::2] = points[::2] + rng.uniform(1, 2, (2000, 2)) * 1e-9
-    loads = rng.random(len(points))
-    found = sums(ScatteredInfluence(points, 1.0), loads)
-    assert found.radius.max() <= 1e-16 * found.mid.high.max()
-    with ctx.workprec(200):
-        for row in range(0, 4000, 100):
-            off = abs(value(found, row) - exact(points, loads, row))
-            assert off <= arb(float(found.radius[row]))
 
 
 def test_points_that_are_not_known() -> None:
@@ -249,26 +213,16 @@ def test_points_that_are_not_known() -> None:
     found = sums(ScatteredInfluence(points, 1.0, error), loads)
     exactly = sums(ScatteredInfluence(points, 1.0), loads)
     with ctx.workprec(200):
-        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 300)]
+        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 600)]
     worst = max(float(off.mid()) for off in offs)
     assert exactly.radius.max() < worst <= found.radius.max()
-
-
-def test_where_there_is_no_mesh() -> None:
-    """Few points go by their matrix; no loads, and no points, cost nothing."""
-    points = clustered(np.random.default_rng(9))
-    few, ones = points[:40], Pair.exact(np.ones(40))
-    dense = DenseInfluence.assemble(few, 1.0).sums(ones)
-    np.testing.assert_array_equal(ScatteredInfluence(few, 1.0).sums(ones).mid, dense.mid)
-    assert not ScatteredInfluence(points, 1.0).sums(Pair.exact(np.zeros(len(points)))).size.any()
-    assert ScatteredInfluence(points[:0], 1.0).sums(Pair.exact(np.zeros(0))).shape == (0,)
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     """Gaps of a press in ball arithmetic; loads are then proved to eleven digits."""
-    made = scene("scattered", 10.0)
+    made = scene("scattered", 8.0)
     given = cr.Scene(1.0, made.asperities, made.material, friction=0.5, geometry=geometry)
     problem = NormalProblem.assemble(given, approach=APPROACH)
     assert problem.influence.name == "scattered"
@@ -290,7 +244,7 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     assert certificate.load_error < 1e-11 * loads.max() * problem.units.force
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("by_load", [False, True])

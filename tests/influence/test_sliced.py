@@ -53,28 +53,6 @@ def among(ball: Ball, m: int) -> arb:
     return middle(ball[m]) + arb(0, float(ball.radius[m]))
 
 
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("largest", [8, 300, 4000, 100_000])
-def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
-    basis, unit = taken(name, size)
-    distances = Distances.of(exactly(basis, unit), largest)
-    assert distances.error < (1e-29 if largest < 1000 and name != "long" else 1e-20)
-    rng = np.random.default_rng(largest)
-    i, j = rng.integers(0, largest, 12), rng.integers(-largest + 1, largest, 12)
-    i[0] = j[0] = 0
-    found = distances.at(i, j)
-    with ctx.workprec(200):
-        for m, n in np.ndindex(found.high.shape):
-            value = arb(float(found.high[m, n])) + arb(float(found.low[m, n]))
-            if i[m] == j[n] == 0:
-                assert value == 0
-                continue
-            exact = 1 / distance(basis, unit, int(i[m]), int(j[n]))
-            assert abs(value - exact) <= arb(distances.error) * exact
-
-
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [2, 3, 4, 5])

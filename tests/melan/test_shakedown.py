@@ -2,18 +2,18 @@
 
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
 from flint import arb, arb_mat
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, PAPER, ROUGH, SCENES, shaded
+from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import solve_exactly, twins
 
 import convexrough as cr
 from convexrough.arrays import Array
 from convexrough.melan import program as melan
-from convexrough.melan import shakedown
 from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
 from convexrough.vector_shear.problem import VectorProblem
 
@@ -53,6 +53,7 @@ def test_exact_limits_at_constant_load() -> None:
     assert np.flatnonzero(found.mechanism > 0.5).tolist() == list(range(31, 37))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("angle", "a", "b"),
     [
@@ -70,7 +71,7 @@ def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
     assert found.upper >= a * (1 - 1e-12)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("angle", [None, 0, 45, 90])
 def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
@@ -88,18 +89,6 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
         slip = found.slips[asperity]
         assert np.ptp(drift) == pytest.approx(slip, abs=1e-12 * path.displacements.max())
         assert (slip > 0) == slides
-
-
-@pytest.mark.parametrize(("name", "exact", "elastic"), [("rough", 0.3101185108701, 0.2238120185)])
-def test_rough(name: str, exact: float, elastic: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The limit alone, without those of all asperities."""
-    monkeypatch.setattr(shakedown, "MOST_ONSETS", 0)
-    swing = 0.5 * LARGEST[name] * np.array([1.0, -1.0])
-    found = cr.shakedown(ROUGH, loads=LARGEST[name], force_amplitudes=swing)
-    assert found.factor == pytest.approx(exact, rel=1e-9)
-    assert found.lower <= found.factor <= found.upper
-    below = cr.shakedown(ROUGH, loads=LARGEST[name], force_amplitudes=swing, kind="elastic")
-    assert below.factor == pytest.approx(elastic, rel=1e-9)
 
 
 @pytest.mark.sample(1)
@@ -120,25 +109,6 @@ def test_vector_limits(ratio: float, along: float, across: float) -> None:
         assert found.factor == pytest.approx(limit, rel=1e-9)
         assert found.lower <= found.upper
         assert found.gap < 1e-8
-
-
-def test_vector_limits_of_other_paths() -> None:
-    def limit(path: Array, mean: tuple[float, float] = (0.0, 0.0)) -> float:
-        return cr.shakedown(
-            PAPER,
-            loads=P,
-            forces=RADIUS * np.array(mean),
-            force_amplitudes=RADIUS * path,
-            kind="vector",
-        ).factor
-
-    angles = 2 * np.pi * np.arange(24) / 24
-    circle = np.column_stack((np.cos(angles), np.sin(angles)))
-    assert limit(circle) == pytest.approx(0.2419789620, rel=1e-8)
-    assert limit(np.array([[0, 0], [1.0, 0]])) == pytest.approx(0.49849890, rel=1e-8)
-    assert limit(np.array([[0, 0], [1.0, 0], [1, 1]])) == pytest.approx(0.34487646, rel=1e-7)
-    across = np.array([[0, 1.0], [0, -1.0]])
-    assert limit(across, (0.5, 0.0)) == pytest.approx(0.24197896, rel=1e-7)
 
 
 def test_a_path_that_follows_never_slides() -> None:
@@ -316,20 +286,14 @@ def test_a_solver_that_lies_does_not_move_the_limit(
     assert found.gap > truth.gap or lie == "doubled"
 
 
-def test_without_order_no_exact_limit_is_claimed() -> None:
-    scene = shaded()
-    load = cr.press(scene, approach=1.4).load
-    found = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
-    assert found.order == "fails"
-    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
-
-
-def test_a_negative_share_has_no_closed_form() -> None:
-    """The shaded asperity is pushed back by a shear force on all: nothing is claimed."""
+@pytest.mark.parametrize("kind", ["exact", "elastic"])
+def test_without_order_no_exact_limit_is_claimed(kind: Any) -> None:
+    """The shaded asperity is pushed back by a shear force on all."""
     scene = shaded()
     load = cr.press(scene, approach=1.4).load
     swing = [0.1 * load, -0.1 * load]
-    found = cr.shakedown(scene, loads=load, force_amplitudes=swing, kind="elastic")
+    found = cr.shakedown(scene, loads=load, force_amplitudes=swing, kind=kind)
+    assert kind == "elastic" or found.order == "fails"
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
 
 
@@ -356,15 +320,6 @@ def test_one_asperity_slides_on_only_as_all_do(kind: str) -> None:
     assert found.gross == pytest.approx(5.0)
     assert found.proved
     assert found.gap < 1e-10
-
-
-def test_the_mechanism_closes_exactly() -> None:
-    swing = np.column_stack((SWING, 0.3 * SWING))
-    contact = cr.press(PAPER, load=P)
-    slips = melan.solve(contact, np.zeros(2), swing / 0.5).slips[:, contact.loads > 0]
-    net = slips.sum(axis=0)
-    assert (net == net[0]).all()
-    assert (slips == np.round(slips)).all()
 
 
 def test_bad_input() -> None:

@@ -42,7 +42,7 @@ def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
     scene, approach = NAMED[name]
     exact = reference(scene, approach=approach)
     contact = cr.press(scene, approach=approach)
-    for seed in range(5):
+    for seed in range(3):
         wrong = attack(kind, contact.loads, np.random.default_rng(seed))
         judged = cr.certify(scene, wrong, approach=approach, influence=operator)
         assert_honest(judged, wrong, exact)
@@ -52,7 +52,7 @@ def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
             assert_honest(judged, wrong, exact_load)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ATTACKS)
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
@@ -61,7 +61,7 @@ def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
     scene = cr.Scene(1.0, lattice, MATERIAL, geometry="summit")
     contact = cr.press(scene, approach=PAPER_APPROACH, influence="dense")
     assert contact.certificate.scope == "local"
-    for seed in range(8):
+    for seed in range(4):
         wrong = attack(kind, contact.loads, np.random.default_rng(seed))
         certificate = cr.certify(scene, wrong, approach=PAPER_APPROACH, influence=operator)
         assert kind != "none" or certificate.scope == "local"
@@ -183,7 +183,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
         assert np.linalg.eigvalsh(hessian)[0] >= 1 - box.convexity_number - 1e-12
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 3))
 def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
@@ -320,7 +320,7 @@ def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -
             assert abs(arb(float(load)) - true) <= arb(float(bound))
 
 
-@pytest.mark.parametrize("factor", [3.0, 1e10, 1e25])
+@pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
     scene = paper()

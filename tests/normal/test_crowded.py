@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from scenes import MATERIAL, OPERATORS, operators, solve_exactly
 
 import convexrough as cr
+from convexrough.bench.scenes import scene as bench
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.normal.boxes import CROWDED_MARGINS, crowded
+from convexrough.normal.boxes import CROWDED_MARGINS
+from convexrough.normal.other_solutions import OtherSolutions
 from convexrough.normal.overlap import overlapping_margin, overlaps
 from convexrough.normal.problem import NormalProblem
+from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
 
@@ -170,19 +173,6 @@ def test_an_isolated_pair_is_proved_up_to_pi() -> None:
         assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
 
 
-def test_who_is_in_the_way() -> None:
-    """The pair that can be no least of the energy; else those whose shells meet."""
-    points = np.array([[0.0, 0.0], [1.6e-4, 0.0], [2e-3, 0.0], [2.36e-3, 0.0], [5e-3, 0.0]])
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
-    problem = NormalProblem.assemble(scene, approach=5e-5)
-    loads = 4 / 3 * 3e-4**3 / scene.relative_radii / problem.units.force  # of discs of 3e-4
-    assert list(crowded(problem, loads)) == [0, 1]
-    loads[0] = 0.0
-    assert list(crowded(problem, loads)) == [2, 3]
-    loads[2] = 0.0
-    assert list(crowded(problem, loads)) == [1, 3, 4]
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(-0.2, 0.6))
 def test_sparse_elimination_proves_no_more_than_is_true(seed: int, count: int, lift: float) -> None:
@@ -225,11 +215,33 @@ def test_energies_are_bounded(seed: int, count: int, size: float, digits: float)
         assert judged.duality_gap < 1e-9 * 5e-5 * contact.load
 
 
-def test_nothing_is_eliminated_that_would_take_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loads from anywhere may crowd any number of contacts: an honest "none" comes soon."""
-    monkeypatch.setattr("convexrough.normal.overlap.MOST_ELIMINATED", 100)
-    points = 0.01 * np.stack(np.divmod(np.arange(101.0), 11), axis=1)
-    apart = DenseInfluence.assemble(points, 1.0)
-    assert overlapping_margin(apart, np.full(101, 1e-4), CROWDED_MARGINS) == 0.0
-    few = DenseInfluence.assemble(points[:100], 1.0)
-    assert overlapping_margin(few, np.full(100, 1e-4), CROWDED_MARGINS) > 0.0
+def test_lattices_exclude_more_other_solutions() -> None:
+    """Where shells of the secants meet, the lattice may still say that there is one solution."""
+    rng, by_lattice = np.random.default_rng(3), 0
+    for size in np.linspace(3.0, 8.0, 11):
+        array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02 * size, within=0.0102)
+        problem = NormalProblem.assemble(
+            cr.Scene(1.0, array, MATERIAL, geometry="summit"), approach=1e-4, influence="lattice"
+        )
+        loads, most = Newton().solve(problem).loads, problem.bounds(problem.approach_bound)
+        others, A = OtherSolutions.of(problem, loads, problem.approach_bound), problem.influence
+        secant = problem.coefficients * (np.cbrt(most) ** 2 - np.cbrt(loads) ** 2) / (most - loads)
+        if A.crowding(A.scale / secant) <= 1:
+            assert not others.possible
+            continue
+        if others.possible:
+            continue
+        by_lattice += 1
+        for Q in (most, *(most * rng.random((20, len(most))))):
+            secant = problem.coefficients * (np.cbrt(Q) ** 2 - np.cbrt(loads) ** 2) / (Q - loads)
+            assert np.linalg.eigvalsh(np.diag(secant) + A.matrix)[0] > 0
+    assert 2 <= by_lattice < 11
+
+
+def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
+    """Shells that do not overlap show it of a third as many; three times as many are too many."""
+    smaller = cr.press(bench("lattice", 12.0), approach=5e-5)
+    assert smaller.certificate.scope == "global"
+    assert smaller.certificate.meaning == "the only solution"
+    larger = cr.press(bench("lattice", 20.0), approach=5e-5)
+    assert larger.certificate.scope == "local"

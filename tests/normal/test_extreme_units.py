@@ -2,12 +2,10 @@
 
 import itertools
 
-import numpy as np
 import pytest
 from scenes import MATERIAL
 
 import convexrough as cr
-from convexrough.normal.units import Units
 from convexrough.scene.lattice import Lattice
 
 HEXAGON = cr.Asperities.hexagonal(spacing=0.25, tip_radius=1.0, within=0.5).positions
@@ -27,7 +25,7 @@ def test_tip_radii_and_heights_too_small(size: float) -> None:
         cr.Asperities([[0, 0], [1, 0]], 1.0, [-size, 0.0])
 
 
-@pytest.mark.parametrize("exponent", [-59, -70, -82, -100, -140])
+@pytest.mark.parametrize("exponent", [-59, -70, -140])
 def test_contact_points_too_near_to_each_other(exponent: int) -> None:
     """Reached by "closest" from positions of a good size: no status, and no search without end."""
     points = HEXAGON * 10.0**exponent
@@ -43,7 +41,7 @@ def test_contact_points_too_near_to_each_other(exponent: int) -> None:
 SIZES = (1e-60, 1e-20, 1e20, 1e60)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("modulus", [1e-60, 1.0, 1e60])
@@ -63,9 +61,3 @@ def test_extremes_are_answered_or_refused(modulus: float, geometry: str, control
         except (cr.InputError, cr.SolverError):
             continue
         assert ((contact.status != "contact") | (contact.loads > 0)).all()
-
-
-@pytest.mark.parametrize("approach", [0.0, np.inf, np.nan])
-def test_no_units_for_nothing(approach: float) -> None:
-    with pytest.raises(cr.InputError, match=r"scene: found indentations of .* other units"):
-        Units.of(approach, 1.0)

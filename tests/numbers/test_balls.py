@@ -241,13 +241,3 @@ def test_building() -> None:
     np.testing.assert_array_equal(chosen.value, [1, 0])
     np.testing.assert_allclose(chosen.radius, [0, 0.5], rtol=1e-11)
     assert ((1.0 - third * chosen) / 2.0).shape == (2,)
-
-
-def test_one_number_stands_for_all_of_many() -> None:
-    """Also where it is an array of one, and before those of many."""
-    many = Ball.exact(np.linspace(1.0, 2.0, CHUNK + 1))
-    one = Ball.exact(np.array([3.0]))
-    for found in (one * many, many * one):
-        np.testing.assert_array_equal(found.value, 3.0 * many.value)
-    none = Ball.exact(np.zeros(CHUNK + 1))
-    assert residual(one, many, none, none).shape == (CHUNK + 1,)

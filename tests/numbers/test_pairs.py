@@ -6,12 +6,10 @@ from math import fsum
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from convexrough.numbers.pairs import MANY, PAIR_ROUNDOFF, Pair, in_parts, square_sum, two_sum
-
-Exactly = Callable[[Fraction, Fraction], Fraction]
 
 
 def random_pair(seed: int, count: int, scale: float = 1.0) -> Pair:
@@ -33,6 +31,7 @@ def off(found: Pair, exact: Callable[[int], Fraction]) -> float:
     return float(max(errors))
 
 
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1e-100, 1.0, 1e100]))
 def test_arithmetic(seed: int, scale: float) -> None:
     """Each operation loses less than a roundoff of pairs; differences of near numbers, too."""

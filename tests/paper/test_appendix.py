@@ -41,7 +41,7 @@ def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
     assert brentq(over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.387687, abs=1e-6)
 
 
-@pytest.mark.parametrize("fraction", [0.37, 0.5, 0.8, -0.8, 1.0])
+@pytest.mark.parametrize("fraction", [0.37, -0.8, 1.0])
 def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
     """But for discs in place of points, an error of the displacements that slips are made of."""
     state = sheared(0.0, fraction)
@@ -61,19 +61,3 @@ def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
         state = cr.shear(contact, force=-Q)
         assert_array_equal(appendix.slips(state), 0.0)
         assert_allclose(appendix.energies(state), cycle.asperity_losses, rtol=1e-12)
-
-
-def test_open_asperities_and_no_shear() -> None:
-    state = sheared(0.3, 0.5)
-    is_open = state.contact.loads == 0
-    assert is_open.any()
-    assert_array_equal(np.isnan(appendix.displacements(state)), is_open)
-    assert_array_equal(appendix.slips(state)[is_open], 0.0)
-    assert_array_equal(appendix.energies(state)[is_open], 0.0)
-    for contact in (pressed(0.3), pressed(0.3, approach=-1e-6)):
-        still = cr.shear(contact, force=0.0)
-        assert np.isnan(appendix.scatter(still))
-        assert_array_equal(appendix.slips(still), 0.0)
-        assert appendix.cycle_energy(contact, 0.0) == 0.0
-    with pytest.raises(cr.InputError, match="friction"):
-        appendix.cycle_energy(pressed(0.3, friction=None), 0.0)

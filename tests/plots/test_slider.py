@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
-from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 from convexrough.paper import example
@@ -92,23 +91,7 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
 
 
-def test_of_many_some_can_be_followed(contact: cr.Contact, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slider, "MOST_FOLLOWED", 20)
-    data = inside(page_of(contact))
-    assert len(data["discs"]["index"]) == data["touching"] == 37
-    assert len(data["followed"]["disc"]) == 20
-    assert data["left_out"] == ["20 of the asperities can be followed."]
-
-
 # What the command line writes.
-
-
-def test_run_writes_the_page(command: Any, tmp_path: Path) -> None:
-    more = "[friction]\ncoefficient = 0.5"
-    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL, more=more))
-    ran = command("run", "a.toml", "--html", "--no-figures")
-    assert (ran.status, "slider.html" in ran.out) == (0, True)
-    assert "slider.html" in json.loads((tmp_path / "a-results/files.json").read_text())["files"]
 
 
 # In a browser.

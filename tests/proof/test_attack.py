@@ -1,6 +1,6 @@
 """Forged proof files: whatever the checker accepts is true by the 50-digit reference.
 
-60 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
+30 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
 """
 
 import json
@@ -22,7 +22,7 @@ import convexrough as cr
 from convexrough import checker
 from convexrough.proof import prove
 
-FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "60"))
+FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "30"))
 
 ORDERS = ("proved", "proved for one step")
 
@@ -163,8 +163,13 @@ def several_statuses(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def swapped_scene(rng: random.Random, document: Any) -> Any:
-    document["scene"] = deepcopy(rng.choice(honest())["scene"])
+def swapped_part(rng: random.Random, document: Any) -> Any:
+    """All that another proof claims, or its scene, what it prescribes, its friction."""
+    other = deepcopy(rng.choice(honest()))
+    part = rng.choice(["scene", "claims", "prescribed", "sheared"])
+    document[part] = other[part]
+    if part == "sheared":
+        document["claims"]["shear"] = other["claims"]["shear"]
     return document
 
 
@@ -173,10 +178,7 @@ def changed_scene(rng: random.Random, document: Any) -> Any:
 
 
 def changed_control(rng: random.Random, document: Any) -> Any:
-    if rng.random() < 0.5:
-        return one_number(rng, document, "prescribed")
-    document["prescribed"] = deepcopy(rng.choice(honest())["prescribed"])
-    return document
+    return one_number(rng, document, "prescribed")
 
 
 def changed_box(rng: random.Random, document: Any) -> Any:
@@ -206,10 +208,6 @@ def changed_radii(rng: random.Random, document: Any) -> Any:
 
 
 def changed_friction(rng: random.Random, document: Any) -> Any:
-    if not document["sheared"]:
-        document["sheared"] = deepcopy(honest()[0]["sheared"])
-        document["claims"]["shear"] = deepcopy(honest()[0]["claims"]["shear"])
-        return document
     entries = document["sheared"]
     what = rng.choice(["order", "fewer", "force", "radii"])
     if what == "order":
@@ -224,19 +222,10 @@ def changed_friction(rng: random.Random, document: Any) -> Any:
 
 
 def no_number(rng: random.Random, document: Any) -> Any:
-    path = a_number(rng, document)
-    values: list[Any] = [
-        "nan",
-        "inf",
-        "-inf",
-        "0x1.8p+99999",
-        "0x1p-5000",
-        "1e-3",
-        "0X1.8P+1",
-        None,
-    ]
-    values += [1, 0.5, True, [], {}, "", " 0x1.0000000000000p+0", "0x1p+0", float("nan"), 10**400]
-    put(document, path, rng.choice(values))
+    values: list[Any] = ["nan", "inf", "-inf", "0x1.8p+99999", "0x1p-5000", "1e-3", "0X1.8P+1"]
+    values += ["", " 0x1.0000000000000p+0", "0x1p+0"]
+    values += [None, 1, 0.5, True, [], {}, float("nan"), 10**400]
+    put(document, a_number(rng, document), rng.choice(values))
     return document
 
 
@@ -261,12 +250,6 @@ def missing_or_more(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def another_claim(rng: random.Random, document: Any) -> Any:
-    """All that another proof claims."""
-    document["claims"] = deepcopy(rng.choice(honest())["claims"])
-    return document
-
-
 FORGED: tuple[Forgery, ...] = (
     one_digit,
     one_number,
@@ -274,7 +257,7 @@ FORGED: tuple[Forgery, ...] = (
     tighter_bound,
     one_status,
     several_statuses,
-    swapped_scene,
+    swapped_part,
     changed_scene,
     changed_control,
     changed_box,
@@ -283,7 +266,6 @@ FORGED: tuple[Forgery, ...] = (
     no_number,
     huge_number,
     missing_or_more,
-    another_claim,
 )
 
 

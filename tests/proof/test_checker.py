@@ -241,23 +241,6 @@ def test_an_asperity_that_is_dragged_along_is_refused() -> None:
         contact.proof(sheared=[state])
 
 
-def test_order_is_as_the_inverse_says() -> None:
-    """Row sums above 1, entries of both signs: by LAPACK, to the rounding of float64 numbers."""
-    rng = np.random.default_rng(4)
-    A = rng.uniform(0, 0.3, (12, 9))
-    np.fill_diagonal(A, 0.0)
-    rows = {i: [int(x * checker.ONE) for x in row] for i, row in enumerate(A)}
-    found = checker.missed_by_inverse(rows, list(range(9)), 2, lambda line: None)
-    H = np.linalg.inv(np.eye(9) + A[:9])
-    H = np.vstack((H, -A[9:] @ H))
-    assert (H[:9] > 0).sum() > 9  # some off the diagonal, too
-    for i, row in enumerate(H):
-        own = row[i] if i < 9 else 1.0
-        true = np.maximum(-row / own, 0).sum() - 1.0
-        assert float(found[i]) / checker.ONE == pytest.approx(true, abs=1e-12)
-        assert found[i] > checker.ONE * (Fraction(true) - Fraction(1e-13))
-
-
 def test_a_loss_is_claimed_in_order_alone() -> None:
     """Four contacts where the middle one falls as the load rises, at first."""
     contact = cr.press(replace(shaded(), friction=0.5), load=2.96)
@@ -348,22 +331,6 @@ def test_intervals_hold_what_they_should() -> None:
 def test_pi() -> None:
     with ctx.workdps(60):
         assert exact(checker.PI.low) < arb.pi() < exact(checker.PI.high)
-
-
-def test_distances_hold_the_true_ones() -> None:
-    scene, _ = scenes.scattered(5, 12, 0.5, 0.5)
-    scene = cr.Scene(scene.sphere_radius, scene.asperities, scene.material, geometry="closest")
-    read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
-    R, tips = Fraction(scene.sphere_radius), [Fraction(t) for t in scene.asperities.tip_radii]
-    points = [
-        [Fraction(float(p)) * R / (R + t) for p in point]
-        for point, t in zip(scene.asperities.positions, tips, strict=True)
-    ]
-    everyone = list(range(len(points)))
-    for i, apart in checker.distances(read, everyone, everyone[:12], lambda line: None):
-        for j, m in enumerate(apart):
-            square = sum((p - q) ** 2 for p, q in zip(points[i], points[j], strict=True))
-            assert i == j or (m - 2) ** 2 < square * read.grid**2 < (m + 3) ** 2
 
 
 def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:

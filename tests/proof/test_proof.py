@@ -42,6 +42,7 @@ def width(bounds: list[str]) -> float:
     return float(high - low)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", scenes.NAMED)
 def test_named_scenes_are_proved_and_sharply(name: str) -> None:
     for contact in both_controls(*small(name)):
@@ -52,6 +53,7 @@ def test_named_scenes_are_proved_and_sharply(name: str) -> None:
             assert width(bounds) <= np.spacing(float.fromhex(bounds[0]))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["paper", "rough, closest"])
 def test_friction_states_and_losses_are_proved(name: str) -> None:
     for contact in both_controls(*small(name, friction=0.5)):
@@ -69,7 +71,7 @@ def test_friction_states_and_losses_are_proved(name: str) -> None:
 def test_random_scenes() -> None:
     """Where there is a certificate there is a proof, and no status of it is lost."""
     proved = 0
-    for seed in range(16):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         make = scenes.scattered if seed % 2 else scenes.on_lattice
         roughness = float(rng.choice([0.0, 0.1, 0.5, 2.0]))
@@ -88,7 +90,7 @@ def test_random_scenes() -> None:
             decided = contact.status != "undecided"
             assert (np.array(claims["status"]) == contact.status)[decided].all()
             proved += 1
-    assert proved > 16
+    assert proved > 8
 
 
 def test_loads_from_anywhere() -> None:

@@ -1,18 +1,20 @@
-"""Scene files that are no TOML: the line is shown, and what is meant."""
+"""Scene files that are no TOML, or that mutants brought to light: the line, and what is meant."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scene_files import scene_text
 
 import convexrough as cr
+from convexrough.run import scene_file
 from convexrough.run.scene_file import read_scene
 
 
 def refused(folder: Path, text: str) -> list[str]:
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(cr.FileError) as caught:
+    with pytest.raises(cr.ConvexroughError) as caught:
         read_scene(path)
     lines = str(caught.value).split("\n")
     assert all(line.startswith(f"{path}: ") for line in lines)
@@ -63,3 +65,45 @@ def test_all_slips_at_once(tmp_path: Path) -> None:
 def test_a_long_line_is_shown_in_part(tmp_path: Path, unit: str) -> None:
     lines = refused(tmp_path, "radius = x" + unit * 1_000_000)
     assert all(len(line) < 300 for line in lines)
+
+
+@pytest.mark.parametrize("text", ["{key} = 1", "[{key}]\na = 1", "a = {{ {key} = 1 }}"])
+def test_a_key_of_many_parts(tmp_path: Path, text: str) -> None:
+    """tomllib takes the square of their number, in time and memory."""
+    (said, *_) = refused(tmp_path, scene_text() + text.format(key="a." * 100_000 + "b"))
+    assert "a key of more than 100 parts" in said
+    assert "line 1" in said
+
+
+def test_a_scene_file_of_many_megabytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scene_file, "MOST_BYTES", 2**20)
+    assert refused(tmp_path, scene_text() + "#" * 2**20) == ["more than 1 MiB"]
+
+
+def test_a_thousand_mistakes_are_counted(tmp_path: Path) -> None:
+    said = refused(tmp_path, scene_text() + "".join(f"[t{i}]\na = 1\n" for i in range(1000)))
+    assert len(said) == 51
+    assert said[-1] == "and 950 more mistakes"
+
+
+STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
+STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
+SHAKEDOWN = '[friction]\ncoefficient = 0.5\n[shakedown]\nloads = 1e-8\nkind = "elastic"\n'
+
+
+def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any) -> None:
+    """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
+    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
+    (tmp_path / "a.toml").write_text(scene_text(layout, more=STEADY))
+    outcome = command("run", "a.toml", "--no-figures")
+    assert outcome.status == 3
+    assert "nan" not in outcome.out
+
+
+@pytest.mark.parametrize("kind", ["elastic", "exact"])
+def test_a_shakedown_of_no_amplitudes(tmp_path: Path, command: Any, kind: str) -> None:
+    text = SHAKEDOWN.replace("elastic", kind) + "force_amplitudes = []\n"
+    (tmp_path / "a.toml").write_text(scene_text(more=text))
+    outcome = command("run", "a.toml", "--no-figures")
+    assert outcome.status == 2
+    assert "force_amplitudes: found none, expected a path that moves" in outcome.err

@@ -83,26 +83,6 @@ def test_surface_displacement_is_the_mean_of_two_like_pairs() -> None:
     assert_allclose(moved(both.shear_modulus, both.poisson_ratio), mean, rtol=1e-12)
 
 
-def test_derivatives_by_the_constants_of_each_body() -> None:
-    """As docs/theory/bodies.md gives them: the chain rule of gradients."""
-    step, E, nu = 1e-5, np.array([210e9, 70e9]), np.array([0.3, 0.33])
-
-    def both(E: Any, nu: Any) -> Any:
-        pair = cr.Material.pair(*map(cr.Material.from_youngs, E, nu))
-        return np.array([pair.contact_modulus, pair.poisson_ratio])
-
-    (modulus, ratio), G = both(E, nu), E / (2 * (1 + nu))
-    share = (1 / G) / (1 / G).sum()
-    by_E = modulus**2 * (1 - nu**2) / E**2, -share * (nu - ratio) / E
-    by_nu = 2 * modulus**2 * nu / E, share * (1 + (nu - ratio) / (1 + nu))
-    for i in (0, 1):
-        unit = np.eye(2)[i]
-        change = both(E * (1 + step * unit), nu) - both(E * (1 - step * unit), nu)
-        assert_allclose(change / (2 * step * E[i]), [by_E[0][i], by_E[1][i]], rtol=1e-8)
-        change = both(E, nu + step * unit) - both(E, nu - step * unit)
-        assert_allclose(change / (2 * step), [by_nu[0][i], by_nu[1][i]], rtol=1e-8)
-
-
 def test_bad_bodies() -> None:
     both = cr.Material.pair(STEEL, ALUMINIUM)
     with pytest.raises(cr.InputError, match="base: found a pair, expected one body"):

@@ -14,7 +14,7 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError
-from convexrough.solvers.cone_boxes import ConeBoxes, judged, solve_in
+from convexrough.solvers.cone_boxes import ConeBoxes, solve_in
 from convexrough.solvers.programs import ProgramAnswer
 
 SOLVERS = [Conic(), ConicCVXPY()]
@@ -212,31 +212,10 @@ def test_wrong_loads_are_not_returned(factor: float) -> None:
         solver.solve(problem)
 
 
-@pytest.mark.parametrize("step", [False, True])
-def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
-    problem = problem_of(paper(), PAPER_APPROACH, "load")
-    solver, boxes = Conic(newton_step=step), ConeBoxes.choose(problem)
-    answer = solver.answer(problem, boxes)._replace(approach=np.nan)
-    with pytest.raises(cr.SolverError, match=r"^conic.*an approach that are not numbers; try"):
-        judged(solver, problem, boxes, answer)
-
-
 @pytest.mark.parametrize("solver", [Conic, ConicCVXPY])
 def test_settings_are_checked(solver: Any) -> None:
     with pytest.raises(cr.InputError, match="tolerance"):
         solver(tolerance=0.0)
-
-
-@pytest.mark.parametrize("five", [False, True])
-@pytest.mark.parametrize("control", CONTROLS)
-def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
-    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
-    assert model.program.is_dcp()
-    assert model.program.is_dpp()
-    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
-    assert sorted(model.variables) == names
-    expected = Newton().solve(model.normal)
-    assert disagreement(model.solve(), expected) < 1e-12
 
 
 @pytest.mark.sample(1)

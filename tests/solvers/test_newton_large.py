@@ -98,7 +98,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
     return problem.residual(loads, approach) / approach
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
@@ -176,44 +176,6 @@ def test_manufactured_contacts(
     assert not ((contact.status == "contact") & (gaps > 1e-9 * approach)).any()
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("kind", ["none", "one", "far", "huge", "random", "opposite"])
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_any_start(kind: str, control: str) -> None:
-    pressed, approach = SCENES["rough"]
-    known = dense_answer("rough")
-    n, rng = len(pressed), np.random.default_rng(3)
-    start = {
-        "none": np.zeros(n),
-        "one": 1e-9 * np.eye(n)[n // 2],
-        "far": 1e-9 * np.eye(n)[n - 1],
-        "huge": np.full(n, 1e-6),
-        "random": known.loads.max() * rng.random(n) ** 9 * (rng.random(n) < 0.3),
-        "opposite": known.loads.max() - known.loads,
-    }[kind]
-    prescribed: Any = {control: {"approach": approach, "load": known.load}[control]}
-    contact = cr.press(pressed, **prescribed, start=start, influence="lattice")
-    assert_solved(contact, steps=60)
-    assert_allclose(contact.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize(
-    ("approach", "steps"), [(-1e-6, 0), (1e-12, 6), (1e-8, 8), (1e-6, 8), (1e-5, 8), (1e-4, 12)]
-)
-def test_approaches_of_any_size(approach: float, steps: int) -> None:
-    """From nothing that touches to everything."""
-    pressed = scene(12, height_std=1e-8, seed=6)
-    contact = cr.press(pressed, approach=approach)
-    assert contact.certificate.holds
-    assert contact.iterations <= steps
-    assert (contact.load == 0) == (approach < 0)
-    if contact.load > 0:
-        again = cr.press(pressed, load=contact.load)
-        assert again.approach == pytest.approx(approach, rel=1e-9, abs=1e-12)
-        assert_allclose(again.loads, contact.loads, rtol=0, atol=1e-9 * contact.loads.max())
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("above", [1e-7, 4e-6])
 @pytest.mark.parametrize("control", ["approach", "load"])
@@ -253,30 +215,7 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("power", [-100, -60, 60, 90])
-def test_extreme_units_and_loads_a_little_off(power: int) -> None:
-    """Sums of 1 / r^3 stay in the range of single precision, and the bounds hold."""
-    unit = 2.0**power
-    asperities = cr.Asperities.square(
-        spacing=2.5e-3 * unit,
-        tip_radius=0.02 * unit,
-        within=0.03 * unit,
-        height_std=1e-6 * unit,
-        seed=1,
-    )
-    pressed = cr.Scene(unit, asperities, MATERIAL, geometry="summit")
-    true = cr.press(pressed, approach=1e-4 * unit, influence="dense")
-    loads = true.loads * (1 + 1e-3 * np.random.default_rng(0).standard_normal(len(pressed)))
-    judged = cr.certify(pressed, loads, approach=1e-4 * unit, influence="lattice")
-    assert judged.scope == "global"
-    assert (np.abs(loads - true.loads) <= judged.load_errors).all()
-    assert (np.abs(judged.gaps - true.gaps) <= judged.gap_errors).all()
-    through = cr.press(pressed, approach=1e-4 * unit, influence="lattice")
-    assert through.model_error == pytest.approx(true.model_error, rel=0.02)
-
-
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 def test_few_touching_under_a_load(kind: Kind, seed: int) -> None:
@@ -292,19 +231,3 @@ def test_few_touching_under_a_load(kind: Kind, seed: int) -> None:
     contact = cr.press(pressed, load=load, influence=kind)
     assert contact.certificate.holds
     assert cr.shear(contact, force=0.15 * load).certificate.holds
-
-
-@pytest.mark.parametrize("approach", [0.0, -1e-6, 5e-5])
-def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture) -> None:
-    asperities = cr.Asperities.square(
-        spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
-    )
-    caplog.set_level("DEBUG", logger="convexrough")
-    cr.press(
-        cr.Scene(1.0, asperities, MATERIAL, geometry="summit"),
-        approach=approach,
-    )
-    news = caplog.messages
-    assert news[-1] == "certifying"
-    assert news[0].startswith("newton: step 1, objective ")
-    assert ", residual " in news[0]

@@ -118,7 +118,7 @@ def test_statuses_and_bounds_against_exact_states(
     assert displacement[0] <= proof.displacement_error
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", VECTOR_NAMES)
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_bounds_are_sharp_up_to_where_all_slide(name: str, nu: float) -> None:
@@ -174,11 +174,11 @@ def test_the_last_one_is_proved_to_stick(count: int, fraction: float) -> None:
 def test_the_last_one_is_not_said_to_stick_where_all_slide(nu: float) -> None:
     """With it forces turn, and all slide a little below f P: nobody may be said to stick there."""
     all_slide = 0
-    for seed in range(6):
+    for seed in range(4):
         scene, approach = scattered(seed, 2 + seed % 3, 0.6, 0.3)
         material = cr.Material(scene.material.contact_modulus, nu)
         contact = cr.press(replace(scene, friction=0.5, material=material), approach=approach)
-        for missing in 10.0 ** np.arange(-12, -2, 0.5):
+        for missing in 10.0 ** np.arange(-12, -2, 1.0):
             force = (1 - missing) * FRICTION * contact.load
             try:
                 state = shear_vector(contact, force=force * np.array([0.6, 0.8]))
@@ -187,4 +187,4 @@ def test_the_last_one_is_not_said_to_stick_where_all_slide(nu: float) -> None:
             slides = lengths(state.slips) > 0
             all_slide += bool(slides[contact.loads > 0].all())
             assert not (state.status[slides] == "partial").any()
-    assert all_slide > 20
+    assert all_slide > 5

@@ -8,7 +8,6 @@ from friction_scenes import (
     FRICTION,
     VECTOR_FRACTIONS,
     VECTOR_NAMES,
-    cerruti,
     found,
     lengths,
     pressed,
@@ -139,28 +138,6 @@ def test_turning_the_force_turns_the_answer(fraction: float, conic: bool) -> Non
         assert_allclose(turned.slips[same], state.slips @ turn.T, atol=tolerance * travel)
         assert_allclose(turned.displacement, turn @ state.displacement, atol=tolerance * travel)
         assert (turned.status[same] == state.status).all()
-
-
-def test_small_forces_keep_their_digits() -> None:
-    """Elastic: the linear system, by its own formulas; every force to 1e-11 of itself."""
-    contact = pressed("rough")
-    touching = np.flatnonzero(contact.loads)
-    G, nu = contact.scene.material.shear_modulus, 0.3
-    stiffness = cerruti(contact.scene)[np.ix_(touching, touching)]
-    own = (2 - nu) / (4 * G * contact.contact_radii[touching])
-    stiffness[range(len(touching)), range(len(touching))] = own[:, None, None] * np.eye(2)
-    n = len(touching)
-    matrix = stiffness.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
-    both = np.linalg.solve(matrix, np.tile(np.eye(2), (n, 1)))
-    per_travel = both.reshape(n, 2, 2).sum(axis=0)
-    for fraction in (1e-40, 1e-25, 1e-16):
-        Q = fraction * FRICTION * contact.load * np.array([0.8, 0.6])
-        X = np.linalg.solve(per_travel, Q)
-        state = shear_vector(contact, force=Q)
-        expected = (both @ X).reshape(n, 2)
-        size = lengths(expected)
-        assert (lengths(state.forces[touching] - expected) <= 1e-11 * size).all()
-        assert_allclose(state.displacement, X, rtol=1e-11)
 
 
 def test_a_solver_that_is_missing_or_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

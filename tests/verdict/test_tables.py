@@ -121,6 +121,16 @@ def test_arrays(tmp_path: Path) -> None:
         assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
 
 
+def test_text_in_arrays_that_is_none(tmp_path: Path) -> None:
+    """Characters beyond the last one of Unicode, as in a corrupted file."""
+    np.save(tmp_path / "a.npy", np.array(["1.5", "0", "2"]).view("u4") * 2**24 + 1)
+    contents = (
+        (tmp_path / "a.npy").read_bytes().replace(b"'<u4'", b"'<U3'").replace(b"(9,)", b"(3,)")
+    )
+    with pytest.raises(cr.FileError, match=r"not an \.npy file"):
+        read_loads(written(tmp_path, contents, "a.npy"), small())
+
+
 def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pyarrow
     from pyarrow import parquet
