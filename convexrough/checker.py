@@ -161,7 +161,8 @@ def read(path: str) -> Any:
 def table(value: Any, *keys: str) -> list[Any]:
     """The values of the given keys. Other keys are refused, as they would not be checked."""
     if not isinstance(value, dict) or set(value) != set(keys):
-        found = ", ".join(value) if isinstance(value, dict) else type(value).__name__
+        names = ", ".join(value) or "none of them" if isinstance(value, dict) else ""
+        found = names or type(value).__name__
         raise Unreadable(f"expected a table of {', '.join(keys)}, found {found[:200]}")
     return [value[key] for key in keys]
 

@@ -40,6 +40,8 @@ def gallery(
     from convexrough.run.results import results_folder
     from convexrough.tabular.columns import aligned
 
+    if export is not None and (profile or solvers):
+        raise click.UsageError("--export excludes --profile and --solver.")
     wanted = wing.names(*names)
     if profile or solvers:
         chosen = [solver_named(each) for each in solvers]

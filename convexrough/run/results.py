@@ -55,7 +55,7 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
         if folder.exists() and not folder.is_dir():
             raise FileExistsError(17, "File exists")
         if folder.is_dir() and any(folder.iterdir()) and not force:
-            advice = "--force replaces its results, --out takes another"
+            advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")
         new.mkdir()
         try:

@@ -50,21 +50,27 @@ class Folder:
         write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
-        """Some columns of a part, by default all. Raises FileError if the part is damaged."""
+        """Some columns of a part, by default all.
+
+        Raises FileError if the part is damaged, or has other scenes than its name says.
+        """
         pyarrow, parquet = arrow()
         path = self.file(part)
+        wanted = list(self.manifest["columns"] if names is None else names)
         try:
             # Threads of pyarrow could outlive the interpreter and abort the process.
             found = parquet.read_table(
                 path,
-                columns=None if names is None else list(names),
+                columns=list({"scene", *wanted}),
                 use_threads=False,
                 pre_buffer=False,
                 page_checksum_verification=True,
             )
         except (OSError, pyarrow.ArrowException) as error:
             raise FileError(f"{path}: damaged ({error}); --resume computes it again") from error
-        arrays = {name: found[name].to_numpy() for name in found.column_names}
+        if not np.array_equal(found["scene"].to_numpy(), part):
+            raise FileError(f"{path}: has rows of other scenes; --resume computes it again")
+        arrays = {name: found[name].to_numpy() for name in wanted}
         return {  # pyarrow returns text as objects
             name: values.astype(np.str_) if values.dtype == object else values
             for name, values in arrays.items()
@@ -131,12 +137,20 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
         (path / MANIFEST).unlink()
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
-            (path / PARTS).mkdir(parents=True, exist_ok=True)
+            path.mkdir(parents=True, exist_ok=True)
             # Another process may write a manifest meanwhile, of the same sweep or another.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
+            orphans = any((path / PARTS).glob("*.parquet"))
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
         if not (path / MANIFEST).exists():
+            if orphans:  # a manifest is written before parts
+                raise FileError(
+                    f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they are: "
+                    f"restore it or remove {path / PARTS}; --out takes another folder"
+                )
+            with file_errors(path, "hold results"):
+                (path / PARTS).mkdir(exist_ok=True)
             write_text(path / MANIFEST, to_json(manifest) + "\n")
     folder = open_folder(path)
     there = folder.manifest

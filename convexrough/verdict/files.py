@@ -45,7 +45,8 @@ def verify_files(
     if contact is None:
         contact = solve(problem, start=np.where(verdict.claimed, verdict.loads, 0.0))
     sliding = _claimed_to_slide(shear, forces, contact)
-    sheared = verify_shear(contact, forces.values, force=force, within=within, sliding=sliding)
+    with blamed_on("--shear-force"):
+        sheared = verify_shear(contact, forces.values, force=force, within=within, sliding=sliding)
     return Verified(verdict, sheared, [given.note, forces.note])
 
 

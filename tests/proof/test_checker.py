@@ -97,6 +97,7 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
         (b'{"format": 1}', "the number 1: numbers are strings"),
         (b'{"format": NaN}', "the number NaN"),
         (b'{"format": "", "format": ""}', "a key appears twice"),
+        (b"{}", "found none of them"),
         (b'{"format": ""}', "expected a table of format, scene"),
         (b" " * (checker.MOST_BYTES + 1), "more than"),
     ],

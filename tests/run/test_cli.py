@@ -289,7 +289,14 @@ def test_bad_loads(command: Any, tmp_path: Path) -> None:
 
 
 def test_usage_errors(command: Any) -> None:
-    for line in ("run", "run a.toml --outt x", "walk", "verify a.toml", "run a b"):
+    for line in (
+        "run",
+        "run a.toml --outt x",
+        "walk",
+        "verify a.toml",
+        "run a b",
+        "gallery few --profile --export new",
+    ):
         outcome = command(*line.split())
         assert (outcome.status, outcome.out) == (2, ""), line
         assert "Usage: convexrough" in outcome.err

@@ -214,6 +214,31 @@ def test_other_versions_are_refused(here: Executor, folder: Path) -> None:
         cr.sweep(SMALL, executor=here, out=folder, resume=True)
 
 
+def test_parts_without_a_manifest_are_refused(here: Executor, folder: Path) -> None:
+    (folder / "manifest.json").unlink()
+    for how in ({"resume": True}, {"overwrite": True}):
+        with pytest.raises(cr.FileError, match=r"holds parts, but no manifest\.json"):
+            cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=folder, **how)
+    assert not (folder / "manifest.json").exists()
+
+
+def test_a_part_under_the_name_of_another(
+    here: Executor, whole: cr.SweepTable, folder: Path
+) -> None:
+    first, second, *_ = sorted((folder / "parts").iterdir())
+    shutil.copy(first, second)
+    with pytest.raises(cr.FileError, match=f"{second.name}: has rows of other scenes"):
+        cr.open_sweep(folder).read(["load"])
+    assert same(cr.sweep(SMALL, executor=here, out=folder, resume=True), whole)
+
+
+def test_a_folder_with_other_files_is_left_alone(here: Executor, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(cr.FileError, match=r"holds notes\.txt, but no sweep"):
+        cr.sweep(SMALL, executor=here, out=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
 def test_a_folder_of_another_sweep_is_refused(here: Executor, folder: Path, tmp_path: Path) -> None:
     before = sorted(path.name for path in (folder / "parts").iterdir())
     with pytest.raises(cr.FileError) as caught:
