@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -65,8 +66,10 @@ Variation = Annotated[float, expected(VARIATION, is_variation)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Phase = Annotated[float, expected(PHASE, is_phase)]
-Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool)]
-Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool)]
+#: Where the file has a number, a list of this number.
+ALSO_ONE = BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
+Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool), ALSO_ONE]
+Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool), ALSO_ONE]
 Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
 Text = Annotated[str, expected("text in quotes", bool)]
 Switch = Annotated[bool, expected("true or false")]

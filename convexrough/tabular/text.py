@@ -55,12 +55,15 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells and the decimal mark."""
+    """The separator of cells and the decimal mark; the name of the sheet of a workbook."""
 
     separator: str
     decimal: str
+    sheet: str = ""
 
     def __str__(self) -> str:
+        if self.sheet:
+            return f'sheet "{self.sheet}"'
         names = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
         comma = ", decimal comma" if self.decimal == "," else ""
         return f"separated by {names.get(self.separator, repr(self.separator))}{comma}"
@@ -146,8 +149,11 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     known : names of columns that distinguish the header from titles and comments
     """
     lines: list[tuple[int, str]] = []
-    comment, separator = "", "\t" if path.suffix.lower() in WORKBOOKS else ""
-    for number, line in sheet_lines(path, known) if separator else lines_of(path):
+    comment, separator, sheet = "", "", ""
+    numbered = lines_of(path)
+    if path.suffix.lower() in WORKBOOKS:
+        separator, (sheet, numbered) = "\t", sheet_lines(path, known)
+    for number, line in numbered:
         text = line.strip("\r\n")
         inner = text.strip()
         if not lines and not separator and re.fullmatch(r"sep=.", inner):  # written by Excel
@@ -159,7 +165,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
         raise FileError(f"{path}: empty")
-    styles = [Style(separator, mark) for mark in ".,"] if separator else STYLES
+    styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
     style = sniff([text for _, text in lines[:SAMPLE]], styles)
     read = (_row(number, text, style) for number, text in lines)
     rows = [row for row in read if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
@@ -241,24 +247,22 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
-def sheet_lines(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Numbered rows, with tabs, of the first sheet with a known column, else of the first sheet."""
+def sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
+    """Name and numbered rows, with tabs, of the first sheet with a known column, else the first."""
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
         pages = [
-            [["" if cell is None else _plain(cell) for cell in row]
-             for row in page.iter_rows(values_only=True)]
+            (page.title, [["" if cell is None else _plain(cell) for cell in row]
+                          for row in page.iter_rows(values_only=True)])
             for page in book.worksheets
         ]  # fmt: skip
-    if not pages:
-        return
 
     def wanted(page: list[list[str]]) -> bool:
         return any(bare(cell).lower() in known for row in page[:SAMPLE] for cell in row)
 
-    for number, row in enumerate(next((page for page in pages if wanted(page)), pages[0]), 1):
-        yield number, "\t".join(row)
+    found = next((each for each in pages if wanted(each[1])), pages[0] if pages else ("", []))
+    return found[0], enumerate(map("\t".join, found[1]), 1)
 
 
 def _plain(cell: Any) -> str:

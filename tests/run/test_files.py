@@ -270,3 +270,8 @@ def test_many_asperities_go_to_npz(
         assert tuple(arrays) == COLUMNS
         assert arrays["status"].tolist() == contact.status.tolist()
     assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
+
+
+def test_one_fraction_is_a_list_of_one(tmp_path: Path) -> None:
+    more = "[friction]\ncoefficient = 0.5\n[cycle]\nmaximum_fraction = 0.5\n"
+    assert read(tmp_path, more=more).stages["cycle"].maximum_fraction == [0.5]

@@ -282,3 +282,17 @@ def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
         read_summits(path, tip_radius=None if "neither" in expected else 1.0)
     assert str(caught.value).startswith(str(path))
     assert expected in str(caught.value)
+
+
+def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.active.append(["notes"])
+    page = book.create_sheet("Run 2")
+    for row in [
+        ("x", "y", "load"),
+        *((*place, load) for place, load in zip(PLACES, LOADS, strict=True)),
+    ]:
+        page.append(row)
+    book.save(tmp_path / "loads.xlsx")
+    note = read_loads(tmp_path / "loads.xlsx", small()).note
+    assert 'loads.xlsx: sheet "Run 2", matched by position' in note
