@@ -59,7 +59,7 @@ def read_grid(path: Path) -> HeightGrid:
     body: list[tuple[int, str]] = []
     workbook = path.suffix.lower() in WORKBOOKS
     names = ("x", "y", "height", *HEIGHTS)
-    for number, line in sheet_lines(path, names) if workbook else lines_of(path):
+    for number, line in sheet_lines(path, names)[1] if workbook else lines_of(path):
         text = line.strip()
         if text.startswith(("#", "%")) or (not body and _SAID.fullmatch(text)):
             comments.append(text)

@@ -271,7 +271,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             mistakes=[],
         )
     table = read_text_table(path, known)
-    separated = path.suffix.lower() not in WORKBOOKS
+    named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
     width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
     mistakes = []
     for row in table.rows:
@@ -285,7 +285,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
         columns=[[row.cells[i] for row in whole] for i in range(width)],
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],
-        style=str(table.style) if separated and (width > 1 or table.style.decimal == ",") else "",
+        style=str(table.style) if named and (width > 1 or table.style.decimal == ",") else "",
         number=table.style.number,
         numbers=table.style.numbers,
         mistakes=mistakes,
