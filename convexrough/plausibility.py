@@ -109,7 +109,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     elif normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
-            "surface; check the units of the spacing and of the approach or load"
+            "surface; check the units of the spacing, the heights and the approach or load"
         )
     if normal["extent"] > STEEP:
         yield (

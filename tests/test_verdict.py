@@ -140,6 +140,14 @@ def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     assert cr.verify(scene, loads, **control, within=1.0).holds
 
 
+def test_loads_a_thousand_times_too_large_do_not_hold_with_any_tolerance() -> None:
+    """Errors are fractions of the solution's largest load, where the given loads are larger."""
+    loads = 1e3 * cr.press(paper(), approach=PAPER_APPROACH).loads
+    verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, within=1.0)
+    assert not verdict.holds
+    assert verdict.error == pytest.approx(999, rel=1e-6)
+
+
 @pytest.mark.parametrize("noise", [1e-17, -1e-17])
 def test_noise_up_to_the_floor_is_open(noise: float) -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)

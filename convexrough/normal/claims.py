@@ -114,8 +114,9 @@ class Claim(ABC):
 
     @property
     def largest(self) -> float:
-        """[force] the size of the largest given force."""
-        return float(np.abs(self.values).max())
+        """[force] the size of the largest given force, or that of the solution if it is smaller."""
+        given, nearby = float(np.abs(self.values).max()), self.nearby()
+        return given if nearby is None else min(given, float(np.abs(nearby[0]).max()))
 
     @property
     def error(self) -> float:

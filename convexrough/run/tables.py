@@ -27,11 +27,17 @@ def read_text(path: Path, most: int) -> str:
 def read_summits(
     path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
 ) -> Asperities:
-    """Asperities from columns x, y and, if the file has them, height and tip_radius.
+    """Asperities from columns x, y and, if the file has them, height (or z) and tip_radius.
 
     tip_radius : one or (n,) [length] if the file has no such column; else None
     """
-    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
+    table = read_table(
+        path,
+        required=("x", "y"),
+        optional=("height", "tip_radius"),
+        also={"height": ("z", "h", "heights")},
+        how=how,
+    )
     columns = table.columns
     if (said := table.units.get("x", "")) and parsed(said) and not how.units.length:
         expected = f'[units] length in the scene file, as "{said}"'

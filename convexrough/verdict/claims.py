@@ -315,7 +315,7 @@ class _Placing:
         x, y = (bare(self.table.called[name]) for name in ("x", "y"))
         exchange = f"--column x={y} --column y={x}"
         if fits(points[:, ::-1]):
-            return f"x and y are exchanged: {exchange}"
+            return f"x and y are exchanged, or the array is turned: {exchange}"
         for signs, names in (([-1, 1], "x"), ([1, -1], "y"), ([-1, -1], "xy")):
             if fits(points * signs):
                 ways = " ".join(f"--scale {name}=-1" for name in names)
