@@ -14,8 +14,8 @@ A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
-checker computes with rationals and with intervals between rationals. The numbers (1) to (12) are
-those of docs/theory/proof-file-steps.md.
+checker computes with rationals and with intervals between rationals. Equation (1) is in
+docs/theory/proof-file.md, (2) to (12) are in proof-file-steps.md.
 
 Exit status: 0 if all claims are proved; 1 if one is refused, with the reason; 2 if unreadable.
 """

@@ -147,7 +147,8 @@ class Contact(Cached, Table, Plottable):
         """Derivatives of a weighted sum of results with respect to the scene, by one linear system.
 
         loads, gaps    : (n,) weights of the asperities' loads and gaps
-        approach, load : weights of the approach and the total load. At least one weight is needed
+        approach, load : weights of the approach and the total load; at least one of all four is
+        needed
         holding        : "load" or "approach", held constant; default: what was prescribed
 
         Raises InputError where no asperity is loaded, and SolverError where the state has no

@@ -89,7 +89,7 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:
-    """The warnings `cautions` about a contact."""
+    """The warnings that `cautions` gives for a contact."""
     return cautions(limits_of(contact), contact.scene.units)
 
 
@@ -177,7 +177,7 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """The smaller of max |x| / a and max |y| / b; of these a row of asperities has only one."""
+    """The smaller of max |x| / a and max |y| / b, with the half widths a, b of smooth contact."""
     smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:
         return None

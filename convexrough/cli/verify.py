@@ -118,12 +118,12 @@ def verify(
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
     Columns x and y, or an index, name the asperity of each row; without them the rows are in the
     order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
-    is a column pressure, rows are nodes or pixels, and their forces are summed at the nearest
+    is a column pressure, rows are nodes or pixels, and pressure times area is summed at the nearest
     asperities.
 
     Exit status: 0 only if the claimed set is proved right, every load and shear force is close
-    enough, and prescribed totals agree; 2 wrong input; 3 otherwise; 4 if the shear problem could
-    not be solved. With --explain it is 0 if the files can be read.
+    enough, and prescribed totals agree; 2 wrong input; 4 if the shear problem could not be solved;
+    3 otherwise. With --explain it is 0 if the files can be read.
     """
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene

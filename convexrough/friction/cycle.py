@@ -203,8 +203,8 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative: in gross sliding, if several asperities
-        slide last or the approach is kept constant.
+        Raises InputError if the loss has no derivative. In gross sliding this is so if several
+        asperities slide last, or if the approach is kept constant.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")

@@ -286,7 +286,7 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if every asperity is proved open at `lower`, or is `rising` and deeper at `upper`."""
+    """False if each asperity is proved open at `lower`, or is `rising` and deeper at `upper`."""
     if upper.solution is None:
         return True
     if lower.solution is None:

@@ -132,8 +132,8 @@ class ShearState(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if there is no derivative: in gross sliding, if several asperities slide
-        last or the approach is kept constant.
+        Raises InputError if there is no derivative. In gross sliding this is so if several
+        asperities slide last, or if the approach is kept constant.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")

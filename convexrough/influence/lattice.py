@@ -276,7 +276,10 @@ class LatticeInfluence(LatticeCoupling):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite, by the least symbol."""
+        """True if A + (scale / radius) I is proved positive semidefinite.
+
+        The proof is the least value of the symbol (docs/theory/operators-lattice.md).
+        """
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced

@@ -210,7 +210,7 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The limit of the scalar program: one asperity slips back and forth, or all slide."""
+    """The factor of the scalar program at which one asperity slips back and forth, or all slide."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())

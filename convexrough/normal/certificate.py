@@ -1,7 +1,8 @@
 """The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
 The data of the scene are the given float64 numbers. `refine` evaluates the contact law in ball
-arithmetic, `proved` proves a solution near the loads, and this module bounds the distance to it.
+arithmetic, `proved` proves that a solution exists near the loads, and this module bounds the
+distance to it.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ class Certificate(Table):
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
         prescribed, the loads are first scaled to it
     fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
-        unless contacts are crowded. No other solution nearby has the same asperities open
+        unless contacts are crowded. Uniqueness nearby is proved only among solutions with these
+        asperities open
     other_solutions_crowding : every other solution has a larger crowding than this: the largest sum
         of two contact radii over the distance of their asperities. It is infinite where there is no
         other solution, and 0 where nothing is known

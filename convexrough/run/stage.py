@@ -112,7 +112,7 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, else this attribute of `found`.
+    """The number of asperities with the status `name`, else the attribute `name` of `found`.
 
     An attribute that `found` lacks is that of `found.certificate`.
     """
@@ -135,7 +135,8 @@ class Result(Table, Plottable):
     found   : objects such as ShearState, one for each row, or one object with arrays along steps
 
     Subclasses set `printed` (headings of the printed columns, by key), `title` (of the printed
-    table), `digits` (of printed numbers) and `steps` (True if only the last rows are printed).
+    table), `digits` (of printed numbers) and `steps` (True if rows are steps: only the last are
+    printed).
     """
 
     printed: ClassVar[Mapping[str, str]] = {}
@@ -189,7 +190,7 @@ class Result(Table, Plottable):
         return {}
 
     def prepare(self, *, figures: bool) -> None:
-        """Compute what tables and figures need, so that writing them needs no further solution."""
+        """Compute what tables and figures need, so that writing them solves nothing."""
         _ = self.known
 
     def lines(self) -> list[str]:
@@ -294,6 +295,6 @@ def unit_of(name: str, units: UnitNames) -> str:
 
 
 def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
-    """The title, with those units of printed quantities that the scene names."""
+    """The title, followed by the units of the printed quantities that the scene names."""
     named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
     return f"{title}  ({', '.join(named)})" if named else title

@@ -117,7 +117,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """End this process when its parent, with the other end of the pipe, ends."""
+    """End this process when its parent, which has the other end of the pipe, ends."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -145,7 +145,7 @@ def _sheltered() -> Iterator[None]:
 
 @contextmanager
 def dask(address: str) -> Iterator[Executor]:
-    """An executor on the workers of a Dask scheduler, which may join and leave.
+    """An executor on the workers of a Dask scheduler; workers may join and leave.
 
     address : "tcp://host:port" of the scheduler; or its file, "scheduler.json"; or "local" for a
         new cluster on this machine

