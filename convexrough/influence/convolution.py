@@ -51,8 +51,8 @@ class SiteBox:
     def padded(self) -> tuple[int, int]:
         """The size of the transforms, in which no two differences of occupied sites coincide.
 
-        Twice the box is enough. A smaller size is enough if every period is longer than twice the
-        extent.
+        Twice the box is enough. A smaller size is enough if every vector by which the padded box
+        repeats is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
 
@@ -76,7 +76,8 @@ class SiteBox:
 
     @cached_property
     def loss(self) -> float:
-        """Error of one two-dimensional transform in roundoffs, relative to the 2-norm."""
+        """Error of one two-dimensional transform relative to the 2-norm, in units of the
+        roundoff."""
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
@@ -264,7 +265,7 @@ def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """The smallest number of places whose period exceeds `length` sites; at most `twice`."""
+    """The smallest padded number of sites that exceeds `length`; at most `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -279,7 +280,7 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Distances and differences (i, j) of two sites, nearest first, without (-i, -j)."""
+    """Distances and differences of two sites, nearest first; of (i, j) and (-i, -j) only one."""
     rows, columns = box.shape
     reach = 1
     done = 0.0
