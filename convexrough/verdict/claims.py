@@ -206,7 +206,8 @@ class _Placing:
                 if (numbered := self._numbered(name, index)) is not None:
                     found, by = numbered, f"column {name or 'without a name'}"
                     break
-        if rows != count and not (rows < count and by and self.manner.missing_open):
+        known = by or self.mistakes
+        if rows != count and not (rows < count and known and self.manner.missing_open):
             advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
             if rows < count and by:
                 advice = "; --missing-open takes the others for open"
@@ -334,7 +335,7 @@ class _Placing:
             tried = [positions.mean(axis=0) - points.mean(axis=0)]
         for shift in tried:
             if fits(points[:20] + shift) and fits(points + shift):
-                digit = 0.1 * allowed
+                digit = 0.1 * min(allowed, float(np.abs(shift).max()))
                 expected = f"expected them from the axis of the sphere, to {allowed:.3g}"
                 return f"all are shifted by {_pair(np.round(-shift / digit) * digit)}, {expected}"
         return ""
