@@ -631,7 +631,7 @@ def main(arguments: Sequence[str]) -> int:
         if sys.stderr.isatty():
             print(f"\r{line}\033[K", end="\r", file=sys.stderr, flush=True)
 
-    if len(arguments) != 1:
+    if len(arguments) != 1 or arguments[0].startswith("-"):
         print("usage: python checker.py proof.json", file=sys.stderr)
         return 2
     try:
