@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers, threads
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
@@ -26,7 +27,6 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import Trial, refined_loads, refines
 from convexrough.normal.units import Units
-from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
+from convexrough.arithmetic.balls import Ball, joined, of_rows, where
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 from convexrough.friction.levels import AT_THE_END
 from convexrough.friction.loss import asperity_losses
@@ -24,8 +26,6 @@ from convexrough.normal.boxes import Box
 from convexrough.normal.problem import Data, NormalProblem
 from convexrough.normal.stack import Stack
 from convexrough.normal.together import NUMBERS, Rows, solved
-from convexrough.numbers.balls import Ball, joined, of_rows, where
-from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz

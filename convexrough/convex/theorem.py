@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, largest, summed
-from convexrough.numbers.balls import Ball
 from convexrough.roundoff import SAFETY
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -33,7 +34,6 @@ from convexrough.friction.path import points_of, pressed_for
 from convexrough.friction.state import by_status, displacements_of, states_of, stick_radii
 from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
-from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table

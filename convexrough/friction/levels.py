@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import TINY, Ball, of_rows
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
@@ -28,8 +30,6 @@ from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, rows_of
 from convexrough.normal.together import Rows
-from convexrough.numbers.balls import TINY, Ball, of_rows
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 

@@ -15,12 +15,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
 from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, energies
 from convexrough.normal.together import NUMBERS, Rows
-from convexrough.numbers.balls import Ball, joined, of_rows, where
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 

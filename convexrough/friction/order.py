@@ -62,6 +62,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
@@ -70,7 +71,6 @@ from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level, rows_of
 from convexrough.normal.stack import Stack
 from convexrough.normal.together import Rows
-from convexrough.numbers.balls import Ball
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i

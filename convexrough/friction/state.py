@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.normal.level import Level
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 
 
 class States(NamedTuple):

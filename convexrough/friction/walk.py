@@ -15,6 +15,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import TINY, UP, Ball
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, frozen
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
@@ -22,8 +24,6 @@ from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
 from convexrough.friction.state import States, states_of, statuses_of, used_by
-from convexrough.numbers.balls import TINY, UP, Ball
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import SAFETY
 
 #: (P, T = Q / f) as exact fractions.

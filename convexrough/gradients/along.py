@@ -18,13 +18,13 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.gradients.pulled import ZERO, Moves, Part
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 
 #: The shift of loads and forces, and the distance below which levels of the two paths correspond,
 #: both divided by the largest load. SHIFT is less than any difference of float64 numbers.

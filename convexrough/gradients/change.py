@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
+from convexrough.arithmetic import balls
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -22,8 +24,6 @@ from convexrough.gradients.scene import Bending, Geometry, curvatures
 from convexrough.gradients.states import Frictional
 from convexrough.influence.choice import couple
 from convexrough.normal.level import Level
-from convexrough.numbers import balls
-from convexrough.numbers.balls import Ball
 from convexrough.record import Along, Record, Table
 from convexrough.scene.base import sphere_radius
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
@@ -21,7 +22,6 @@ from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
 from convexrough.gradients.scene import Derivatives
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.base import named

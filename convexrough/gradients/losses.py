@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath
@@ -15,7 +16,6 @@ from convexrough.gradients.along import NONE, Along
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
-from convexrough.numbers.balls import Ball
 
 
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:

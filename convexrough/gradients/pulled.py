@@ -14,9 +14,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball, where
 from convexrough.errors import InputError
 from convexrough.normal.level import Level
-from convexrough.numbers.balls import Ball, where
 
 ZERO = Ball.exact(0.0)
 

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.gradients.pulled import ZERO, Pulled
 from convexrough.influence import Influence
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.balls import Ball, joined, of_rows, where
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named
 from convexrough.scene.scene import Scene

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
+from convexrough.arithmetic import balls
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import InputError, ProofError
@@ -24,8 +26,6 @@ from convexrough.gradients.pulled import ZERO, Moves, Part, product
 from convexrough.normal.level import Level
 from convexrough.normal.proved import Obstacle, proved
 from convexrough.normal.refine import refined_loads
-from convexrough.numbers import balls
-from convexrough.numbers.balls import Ball
 
 #: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
 #: about 1e-15 at first, and each step raises it to the power 3/2.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.influence.coupling import Influence, Kind, inverse_distances
@@ -11,7 +12,6 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.sliced_matrix import MatrixSums
-from convexrough.numbers.pairs import Pair
 from convexrough.scene.layout import Layout
 from convexrough.scene.scene import Scene
 

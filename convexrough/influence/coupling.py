@@ -14,9 +14,9 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points. It is 1 after the
 #: differences, 3 after the squares, 4 after their sum, 3 after the root, and 8 at the end.

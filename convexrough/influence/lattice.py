@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Kernel, SiteBox, neighbours, through_waves
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
@@ -27,8 +29,6 @@ from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
 from convexrough.influence.slopes import pulls
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.layout import Layout

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.near_pairs import Order
 from convexrough.influence.softened import Softened, twofold_lagrange
 from convexrough.influence.splitting import Splitting
-from convexrough.numbers.pairs import Pair
 
 #: Largest number of points in a block: sums stay short, and a matrix product fits in the cache.
 BLOCK = 256

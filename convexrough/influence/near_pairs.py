@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.pairs import Pair, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
-from convexrough.numbers.pairs import Pair, two_sum
 
 #: Number of pairs processed together, and number of such pieces in memory at once.
 PIECE, BATCH = 2**17, 32

@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Kernel
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, known
@@ -22,8 +24,6 @@ from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.influence.slopes import by_mesh, mesh_pulls
 from convexrough.influence.splitting import Splitting
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 from convexrough.scene.neighbours import crowding, separations
 
 #: Largest relative error of a product by interpolation. It is most of the error of `sums`, 1e-16.

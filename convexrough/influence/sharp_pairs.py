@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from convexrough import threads
+from convexrough.arithmetic.pairs import CHUNK, Pair, rounded, two_sum
 from convexrough.arrays import Array
 from convexrough.influence.pair_sums import Product, within
 from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import Softened, exact_series
-from convexrough.numbers.pairs import CHUNK, Pair, rounded, two_sum
 from convexrough.roundoff import ROUNDOFF
 
 #: Binary places of the integers with which L is computed within the reach.

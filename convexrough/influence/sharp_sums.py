@@ -16,14 +16,14 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair, two_product, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.influence.mesh import PLACES, twofold_weights
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_pairs import SharpPairs, soft_terms, soft_values
 from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, lebesgue
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF
 
 #: Bits of a float64 number, and bits of a first slice.

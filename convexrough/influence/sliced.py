@@ -16,10 +16,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import TINY, Ball
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
-from convexrough.numbers.balls import TINY, Ball
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.roundoff import ROUNDOFF
 
 #: The error of a level may be at most this, so that rounding makes it exact.

@@ -17,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 
 from convexrough import threads
+from convexrough.arithmetic.balls import TINY, UP, Ball
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.numbers.balls import TINY, UP, Ball
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
 from convexrough.roundoff import ROUNDOFF
 
 #: Number of columns with the same unit; bits of the first and of the second slice of an entry.

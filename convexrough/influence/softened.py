@@ -15,8 +15,8 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from convexrough.arithmetic.pairs import Pair, two_sum
 from convexrough.arrays import Array
-from convexrough.numbers.pairs import Pair, two_sum
 
 #: Near pairs are omitted if 1 / r^q - L is below this fraction of the interpolation error. The
 #: number is a heuristic; omitted pairs are part of the error bound.

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.convex.theorem import distance
-from convexrough.numbers.balls import Ball
 from convexrough.roundoff import SAFETY
 from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.problem import VectorProblem

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
@@ -24,8 +26,6 @@ from convexrough.normal.other_solutions import NO_OTHERS, OtherSolutions
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import Trial, completed, refined, refines, trial
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene

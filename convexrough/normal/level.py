@@ -22,6 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball, where
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import distance, excess
@@ -32,8 +34,6 @@ from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, refined_loads
 from convexrough.normal.stack import Stack
 from convexrough.normal.together import NUMBERS, Rows, solved
-from convexrough.numbers.balls import Ball, where
-from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 

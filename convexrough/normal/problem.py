@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, taken
 from convexrough.convex.newton_step import correct
 from convexrough.influence import Influence, Kind, couple
@@ -35,8 +37,6 @@ from convexrough.normal.load_control import (
     smooth_displacement,
 )
 from convexrough.normal.units import Units
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, summed
 from convexrough.convex.theorem import distance
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Problem, Trial
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
 #: Number of boxes of touching asperities that are tried, and the ratio of a box to the latest error

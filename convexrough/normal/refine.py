@@ -17,14 +17,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import TINY, Ball, of_rows
+from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.stack import Stack
-from convexrough.numbers.balls import TINY, Ball, of_rows
-from convexrough.numbers.kernels import residual
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.sphere import hertz
 
 #: Largest number of corrections.

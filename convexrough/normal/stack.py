@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball, joined
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, largest
 from convexrough.normal.problem import Data, NormalProblem
-from convexrough.numbers.balls import Ball, joined
-from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
 

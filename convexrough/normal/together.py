@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, summed
 from convexrough.normal.boxes import Box
 from convexrough.normal.load_control import approach_bound, shifted_to_load
@@ -19,7 +20,6 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Proved, errors_in, solution_in, stays_in
 from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
-from convexrough.numbers.balls import Ball
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: Largest number of Newton steps.

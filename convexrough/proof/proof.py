@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checker, checks
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.atomic import replacing
 from convexrough.errors import InputError, ProofError
 from convexrough.normal.level import Level
-from convexrough.numbers.pairs import Pair
 from convexrough.progress import LOGGER
 from convexrough.proof.arguments import TrialState
 from convexrough.record import Record

@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.pairs import Pair, two_sum
 from convexrough.arrays import Array, even, evenly, frozen
 from convexrough.errors import InputError
-from convexrough.numbers.pairs import Pair, two_sum
 from convexrough.record import Record
 from convexrough.scene import base
 from convexrough.scene.asperities import Asperities

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball, quietly
 from convexrough.arrays import Array
 from convexrough.convex.theorem import distance
 from convexrough.friction.levels import AT_THE_END
-from convexrough.numbers.balls import Ball, quietly
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import SolverError
-from convexrough.numbers.balls import Ball
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along

@@ -16,6 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball, where
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.friction.levels import FrictionLevels
@@ -23,7 +24,6 @@ from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
 from convexrough.normal.units import Units
-from convexrough.numbers.balls import Ball, where
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import annulus

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.shear import ShearCertificate, shear
-from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum
 from scenes import paper, rough, scattered
 
+from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.choice import couple
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
-from convexrough.numbers.pairs import Pair
 
 SCALE = 0.37
 

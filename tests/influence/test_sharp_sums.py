@@ -13,6 +13,8 @@ from point_layouts import LAYOUTS, disc, jittered
 from scenes import scattered, solve_exactly
 
 import convexrough as cr
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.influence import scattered as scattered_points
 from convexrough.influence import sharp_sums as sharp
@@ -23,8 +25,6 @@ from convexrough.influence.splitting import Splitting
 from convexrough.normal.certificate import certify_on
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]

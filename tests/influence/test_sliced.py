@@ -10,13 +10,13 @@ from flint import arb, ctx
 from numpy.typing import NDArray
 
 import convexrough as cr
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
 from convexrough.scene.lattice import Lattice
 
 Array = NDArray[np.float64]

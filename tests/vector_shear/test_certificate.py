@@ -15,7 +15,7 @@ from vector_oracle import solve_vectors
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
-from convexrough.numbers.balls import Ball
+from convexrough.arithmetic.balls import Ball
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import VectorProblem
 

@@ -8,7 +8,7 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough import FrictionNewton
-from convexrough.numbers.balls import Ball
+from convexrough.arithmetic.balls import Ball
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import VectorProblem, VectorState
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.numbers.pairs import MANY, PAIR_ROUNDOFF, Pair, in_parts, square_sum, two_sum
+from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, in_parts, square_sum, two_sum
 
 
 def random_pair(seed: int, count: int, scale: float = 1.0) -> Pair:

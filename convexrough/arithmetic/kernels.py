@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from convexrough.arithmetic.balls import TINY, UP, Ball, elementwise, positive, power_error
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_product, two_sum
 from convexrough.arrays import Array
-from convexrough.numbers.balls import TINY, UP, Ball, elementwise, positive, power_error
-from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_product, two_sum
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:

@@ -13,9 +13,9 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.numbers.balls import Ball, where
-from convexrough.numbers.kernels import residual
-from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair, two_sum
+from convexrough.arithmetic.balls import Ball, where
+from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.pairs import CHUNK, PAIR_ROUNDOFF, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
 BITS = 4000

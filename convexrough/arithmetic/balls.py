@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
+from convexrough.arithmetic.pairs import CHUNK, PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array
-from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair
 
 #: Factor that covers the rounding errors of a few float64 operations on radii.
 UP = 1.0 + 2.0**-40
