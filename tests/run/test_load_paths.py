@@ -96,6 +96,14 @@ def test_loads_that_do_not_fit_those_of_normal(tmp_path: Path, table: str, messa
     assert any(each.startswith(message) for each in scene.cautions(scene.press()))
 
 
+def test_factors_of_amplitudes_count_in_the_largest_load(tmp_path: Path) -> None:
+    ellipse = "{ load = 3e-7, load_amplitude = 1e-7, force_amplitude = 1e-8 }"
+    steady = f"[steady]\nellipse = {ellipse}\nphases = [0.5]\nfactors = [0.5, 2.0]\n"
+    file = tmp_path / "scene.toml"
+    file.write_text(scene_text(HEXAGONAL, normal="load = 3e-7", more=FRICTION + steady))
+    assert cr.read_scene(file).stages["steady"].highest_load == pytest.approx(5e-7)
+
+
 VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
 
 

@@ -170,6 +170,14 @@ class SteadyStage(_Points):
     phases: Annotated[list[Phase], expected("a list of phases in radians", bool)] | None = None
     factors: Annotated[list[Positive], expected("a list of positive numbers", bool)] = Field([1.0])
 
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load, also with the largest of the factors."""
+        if self.ellipse is None:
+            return super().highest_load
+        amplitude = max(1.0, *self.factors) * abs(self.ellipse.load_amplitude)
+        return self.reference * (self.ellipse.load + amplitude)
+
     def compute(self, contact: Contact) -> SteadyResult:
         scene, influence = contact.scene, contact.influence
         with blamed_on(f"[{self.name}]"):
