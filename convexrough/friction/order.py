@@ -218,7 +218,7 @@ class _Span(NamedTuple):
         support = ~high.open
         c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
         # H + A >= (1 - theta) H gives C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
-        e = np.where(support, c * box.stiffness, 0.0).max(axis=1, keepdims=True)
+        e = np.where(support, c * box.compliance, 0.0).max(axis=1, keepdims=True)
         drop, depth = (high.approach - low.approach).upper[:, None], high.indentation.lower
         gaps = np.maximum(-high.indentation.upper, 0.0)
         steep = np.broadcast_to(k.upper**1.5, c.shape)
@@ -300,12 +300,12 @@ def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
     problem, touching = level.problem, level.loads.value > 0
     if not touching.any():
         return 0.0
-    c = np.where(touching, 1.0 / problem.stiffness(np.where(touching, level.loads.value, 1.0)), 0.0)
+    h = problem.compliance(np.where(touching, level.loads.value, 1.0))
     y: Array = correct(
         problem.influence,
         problem.shells,
-        np.sqrt(c),
-        -np.ones(len(c)),
+        np.where(touching, 1.0 / np.sqrt(h), 0.0),
+        -np.ones(len(h)),
         balanced=False,
         tolerance=SOLVED,
     )

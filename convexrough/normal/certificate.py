@@ -42,7 +42,7 @@ class Certificate(Table):
         contact radii near these (`meaning` describes the others that are possible); "none":
         nothing is proved, every bound is infinite and every asperity is undecided
     convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
-        the smallest eigenvalue of the Hessian, scaled by each asperity's local stiffness, is at
+        the smallest eigenvalue of the Hessian, scaled by each asperity's local compliance, is at
         least 1 - convexity_number
     status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
         "undecided"
@@ -248,7 +248,7 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
     # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
     part = np.cbrt(np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0))
     convex = part.min(initial=1.0) > box.convexity_number * (1 + SAFETY)
-    if not (convex or box.problem.convexity_at(problem.stiffness(most)) < 1):
+    if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
         return np.inf
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)

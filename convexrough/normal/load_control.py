@@ -34,16 +34,16 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array
     tau, and Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
-    indentation, softness = indentation - highest, 1.0 / coefficients
+    indentation, inverse = indentation - highest, 1.0 / coefficients
     most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
-        ratio = np.maximum(indentation + shift, 0.0) * softness
+        ratio = np.maximum(indentation + shift, 0.0) * inverse
         root = np.sqrt(ratio)
         total = summed(ratio * root)
         # (total^(2/3) - load^(2/3)) over its slope, without cancellation
         excess = -np.expm1(2 / 3 * np.log1p((load - total) / total)) * total
-        step = excess / summed(root * softness)
+        step = excess / summed(root * inverse)
         if steps > 0:
             step = np.where(step > 4 * ROUNDOFF * shift, step, 0.0)
         shift = shift - step

@@ -1,6 +1,6 @@
 """Bounds on the convexity of crowded contacts, by overlapping shells about the asperities.
 
-docs/theory/crowded.md, "Shells that overlap". Local stiffnesses h are given as lengths
+docs/theory/crowded.md, "Shells that overlap". Local compliances h are given as lengths
 t_i = 1 / (pi E* h_i). For distances r_ij, any radii s_i, and the energy U_ij of two shells of
 charge 1 with these radii, the matrix
 

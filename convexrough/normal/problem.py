@@ -285,7 +285,7 @@ class NormalProblem:
     def fitted_to(self, loads: Array) -> NormalProblem:
         """The same problem, with the largest shells that neighbours with these loads allow."""
         with np.errstate(divide="ignore"):
-            radii = (np.pi / 2.0) * self.influence.scale / self.stiffness(loads)
+            radii = (np.pi / 2.0) * self.influence.scale / self.compliance(loads)
         shells = fitted_shells(self.influence, radii, FITTED)
         return replace(self, shells=shells)
 
@@ -316,7 +316,7 @@ class NormalProblem:
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
 
-    def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
+    def compliance(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
         """(n,) h_i = (2/3) k_i P_i^(-1/3), the local part of the Hessian; it is 1 / (2 E* a_i)."""
         with np.errstate(divide="ignore"):
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
@@ -338,11 +338,11 @@ class NormalProblem:
 
     def convexity_number(self, loads: Array) -> float:
         """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
-        return float(self.convexity_at(self.stiffness(loads)))
+        return float(self.convexity_at(self.compliance(loads)))
 
-    def convexity_at(self, stiffness: Array) -> Any:
-        """The `convexity_number` at loads with this stiffness; (m, 1) for rows."""
-        return largest(self.shells / stiffness) * (1 + SAFETY)
+    def convexity_at(self, compliance: Array) -> Any:
+        """The `convexity_number` at loads with this compliance; (m, 1) for rows."""
+        return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
         """(n,) the offsets as pairs of float64 numbers: z - r^2 / (2 R), by axes."""
