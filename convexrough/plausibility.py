@@ -38,8 +38,8 @@ def limits_of(contact: Contact) -> dict[str, Any]:
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius
-    array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half widths
-        a and b of the contact of a smooth body at this load; None without such a contact
+    array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
+        widths a and b of the contact of a smooth body at this load; None without such a contact
     all_touch    : True if every asperity of the scene touches
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -176,7 +176,7 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """`array_extent` of `limits_of`; for asperities in one row along x or y, the ratio of this axis."""
+    """`array_extent` of `limits_of`; for a row of asperities along x or y only its own ratio."""
     smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:
         return None

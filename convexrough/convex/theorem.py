@@ -5,7 +5,7 @@ x with the violations e and the solution x*, on a box where the Hessian is at le
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.
 
-A component that is fixed has e_i = 0 and x_i - x*_i = 0.
+A component that is fixed has x_i = x*_i, and its e_i counts as 0.
 """
 
 from __future__ import annotations

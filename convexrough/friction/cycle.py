@@ -532,7 +532,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop with points where Q has fallen from its maximum, then risen, by 2 `way`."""
+    """The loop. `way`, times 2, are the falls of Q from its maximum, and then its rises."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

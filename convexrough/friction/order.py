@@ -296,7 +296,7 @@ def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
 
 
 def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
-    """The least rate y = (I + A C)^-1 1 of the rising asperities, at most 0."""
+    """The least rate y = (I + A C)^-1 1 of the rising asperities, or 0 if none is negative."""
     problem, touching = level.problem, level.loads.value > 0
     if not touching.any():
         return 0.0

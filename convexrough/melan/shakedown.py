@@ -47,10 +47,11 @@ class Shakedown(Table, Plottable):
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
         asperities that stick until they slide as a whole, with the scalar kernel or the full one;
         the load must be constant
-    factor  : the largest factor of the path at which, after some cycles, no asperity slides as a whole
+    factor  : the largest factor of the path at which, after some cycles, no asperity slides
+        as a whole
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
-    factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it is
-        not computed or the asperity does not touch at the load P0; for "vector" all are equal
+    factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
+        is not computed or the asperity does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
     witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
         path scaled by `lower`
@@ -212,14 +213,14 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The smaller of two factors: at one an asperity slides back and forth, at the other all slide."""
+    """The limit with the scalar kernel: that of one asperity, or of gross sliding if smaller."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """The factor at which the shear force of each asperity, divided by f, varies by 2 P_i."""
+        """The factor at which the shear force over f of each asperity varies by 2 P_i."""
         ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
         return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
 

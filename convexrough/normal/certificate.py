@@ -57,8 +57,8 @@ class Certificate(Table):
     fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
         unless contacts are crowded. Uniqueness nearby is proved only among solutions with these
         asperities open
-    other_solutions_crowding : every other solution has a larger crowding than this: the largest sum
-        of two contact radii over the distance of their asperities. It is infinite where there is no
+    other_solutions_crowding : lower bound on the crowding of every other solution: on its largest
+        (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where there is no
         other solution, and 0 where nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
@@ -255,11 +255,11 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch, and their negative gaps."""
+    """The asperities that cannot touch."""
 
     which: Indices  # in the scene
     coupling: Coupling | None  # from asperities that can touch; None if all can
-    indentation: Array  # prescribed approach less displacement
+    indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
 
 
