@@ -1,8 +1,8 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-Boxes of crowded contacts can only have touching asperities: docs/theory/crowded.md. In comments,
-h is the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the
-compliance operator, and mu = 1 - `convexity_number` the margin of convexity.
+In crowded contacts a box has touching asperities only (docs/theory/crowded.md). In comments, h is
+the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
+operator, and mu = 1 - `convexity_number` the margin of convexity.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Box(NamedTuple):
     loads: Array  # upper ends; the lower ends are 0
     compliance: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # limits below which the solution must still be proved to lie; or infinite
+    faces: Array  # that the solution is below them must still be proved; infinite where not
     fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:
@@ -67,10 +67,10 @@ class Box(NamedTuple):
     @property
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self) -> Box:
-        """A box that contains this one, for another load or approach.
+        """A box that contains this one, for use at another load or approach.
 
-        Its solutions may lie outside it. Where shells prove S_i <= theta, with the convexity number
-        theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
+        The solution there may lie outside. Where shells prove S_i <= theta, with the convexity
+        number theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -110,7 +110,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 
 
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """The least known upper bound on the approach of any solution, from loads and A times these."""
+    """The least known upper bound on the approach of any solution, from loads and A times loads."""
     if problem.load is None:
         return problem.approach_bound
     return min(problem.approach_bound, problem.overhang(loads, displacement))
@@ -153,7 +153,7 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Loaded asperities in pairs that no energy minimum has; else whose shells meet; else all."""
+    """Loaded asperities too close for an energy minimum; else those whose shells meet; else all."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which

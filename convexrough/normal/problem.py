@@ -42,7 +42,7 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Weight of the contact radii in the sizes of fitted shells; the rest is half the distances. A
+#: Weight of contact radii in the radii of fitted shells; half the distances have the rest. A
 #: heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which box", 3).
 FITTED = 0.9
 
@@ -254,7 +254,7 @@ class NormalProblem:
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
-        """The problem in which all but some of the candidates carry no load."""
+        """The problem in which only these candidates may carry loads."""
         return replace(
             self,
             candidates=self.candidates[which],
@@ -396,6 +396,6 @@ def _even_coefficient(tip: float, *constants: Any) -> Ball:
 
 
 def _middle(values: Array) -> float:
-    """About the median of the values, from a thousand of them."""
+    """The approximate median of the values, from a thousand of them."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])
