@@ -226,8 +226,14 @@ class LatticeInfluence(LatticeCoupling):
         return self.layout.sites[self.members]
 
     def restricted(self, which: Indices) -> LatticeInfluence:
+        last: LatticeInfluence | None = self._spectra.get("restricted")
+        if last is not None and np.array_equal(last.members, self.members[which]):
+            return last
         given = self.layout, self.lattice, self.scale, self.point_error
-        return self.of(self.array, self.members[which], *given)
+        found = self.of(self.array, self.members[which], *given)
+        if len(self) <= MOST_KEPT:
+            self._spectra["restricted"] = found
+        return found
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)

@@ -170,15 +170,22 @@ class NormalProblem:
 
         slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) F(delta), which the step reduces to 0
         enough : accept a step that reduces the defect by this factor
+
+        On a lattice the step leaves out asperities with slope and defect 0: the box is smaller.
         """
-        return correct(
-            self.influence,
-            self.shells,
-            np.sqrt(slopes),
-            defect,
+        some, influence = np.arange(len(self)), self.influence
+        if influence.cheap_sums:
+            some = ((slopes > 0) | (defect != 0)).nonzero()[0]
+            influence = influence.restricted(some)
+        step = correct(
+            influence,
+            taken(self.shells, some),
+            np.sqrt(slopes[some]),
+            defect[some],
             balanced=self.load is not None,
             tolerance=max(REDUCTION, enough),
         )
+        return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
         """A P for `others`, loads close to `loads`, from the difference if that is cheap."""
