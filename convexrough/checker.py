@@ -8,9 +8,9 @@ distances r_ij between contact points, the contact law is
 
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
 
-without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i: the
-height of the asperity minus the distance of the base from its tangent plane on the axis. Below,
-A_ij = 1 / (pi E* r_ij) and A_ii = 0.
+without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i of the
+asperity. The offset is its height minus the distance, at the asperity, between the base and the
+plane that touches the base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
@@ -201,7 +201,7 @@ def digest(scene: Any, prescribed: Any) -> str:
 
 
 class Scene(NamedTuple):
-    """The scene; only points and offsets are rounded, to the grid and outwards."""
+    """The scene. Points are rounded down to a grid and offsets outwards; all else is exact."""
 
     modulus: Fraction  # E*, used only for loads from radii
     ratio: Fraction  # Poisson's ratio
@@ -255,7 +255,7 @@ def read_scene(given: Any) -> Scene:
 def distances(
     scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
 ) -> Iterator[tuple[int, list[int]]]:
-    """Each i of `some` with integers m, m - 2 < r_ij < m + 3 in grid units, for `chosen` j (1)."""
+    """For each i of `some`: i, and for each j of `chosen` the integer m of (1)."""
     place = {j: k for k, j in enumerate(chosen)}
     points = [scene.points[j] for j in chosen]
     for i in some:
@@ -341,7 +341,7 @@ class State(NamedTuple):
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The unique solution in the box, with this load or, without one, the approach in `place`."""
+    """The only solution in the box, under this load, or if None, under the approach in `place`."""
     radii, centre = table(place, "radii", "approach")
     a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets

@@ -364,15 +364,15 @@ def covered(scene: Scene, radii: Array) -> int:
 def closest_changes(contact: Contact) -> Array:
     """(n,) [force] first-order load changes on a change to the "closest" geometry.
 
-    They are 0 if the scene has this geometry. There an asperity of tip radius rho, at a distance r
-    from the axis of a sphere of radius R, meets it at r R / (R + rho). So its offset is greater
-    by r^2 rho / (2 R (R + rho)), and compliances are greater by a fraction of about rho / R. At the
-    same approach, with the compliance operator A,
+    They are 0 if the scene has this geometry already. In it an asperity of tip radius rho, at the
+    distance r from the axis of a sphere of radius R, touches the sphere at r R / (R + rho). So its
+    offset is greater by r^2 rho / (2 R (R + rho)), and compliances are greater by a fraction of
+    about rho / R. At the same approach, with the compliance operator A,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
-    where H = (2/3) indentation / P is the local part of the Hessian. With two radii
-    of the sphere, the terms of x and y are added.
+    where H = (2/3) indentation / P is the local part of the Hessian. If the body has two principal
+    radii, the terms of x and y are added.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))

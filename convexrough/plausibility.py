@@ -34,13 +34,12 @@ STEEP = 0.2
 
 
 def limits_of(contact: Contact) -> dict[str, Any]:
-    """Measures of the validity of the model, by name; those without a unit are ratios or counts.
+    """Measures of the validity of the model, by name; ratios or counts where no unit is given.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius
-    array_extent : for each of the axes x and y, the largest distance of a summit from the centre,
-        over the half width of the contact of a smooth sphere at this load; the smaller of the two
-        ratios, or None without such a contact
+    array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
+        widths a and b of the contact of a smooth body at this load; None without such a contact
     all_touch    : True if every asperity of the scene touches
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -89,7 +88,7 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:
-    """The warnings that `cautions` gives for a contact."""
+    """The `cautions` about a contact."""
     return cautions(limits_of(contact), contact.scene.units)
 
 
@@ -177,7 +176,7 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """The smaller of max |x| / a and max |y| / b, with the half widths a, b of smooth contact."""
+    """`array_extent` of `limits_of`; for a row of asperities along x or y only its own ratio."""
     smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:
         return None

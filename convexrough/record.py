@@ -89,7 +89,7 @@ class Table(Record):
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays of the record with these names, by the singulars of the names."""
+        """The arrays with these names, in a mapping whose keys are the names in the singular."""
         return {singular(name): getattr(self, name) for name in names}
 
     def to_dataframe(self) -> pandas.DataFrame:

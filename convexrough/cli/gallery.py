@@ -1,4 +1,4 @@
-"""`gallery`: hard scenes with their answers, listed or written for other solvers."""
+"""`gallery`: hard scenes with their answers, lines_of_cases or written for other solvers."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ def gallery(
 
         with progress("timing"):
             found = profile_of(chosen or None, cases=wanted)
-        rows, told = found.rows(), []
+        rows, reported = found.rows(), []
         cells: list[list[str]] = [list(rows[0])]
         for row, each in zip(rows, found.outcomes, strict=True):
             cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
-            told.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
-        echo({"profile": told}, aligned(cells, left=1), as_json)
+            reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
+        echo({"profile": reported}, aligned(cells, left=1), as_json)
         return DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:
         heading = ["case", "family", "what is hard", "asperities", "touching"]
-        listed = [
+        lines_of_cases = [
             [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]
             for case in cases
         ]
-        lines = aligned([heading, *listed], left=3)
+        lines = aligned([heading, *lines_of_cases], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
         with results_folder(export, force=force) as new, progress("writing"):

@@ -102,7 +102,7 @@ def summits(
     crowding and model error for several values of --prune, and recommends one. With --whole it also
     presses every pixel at the same approach, for comparison.
 
-    The exit status is 3 where the contact at the given --prune is not certified.
+    The exit status is 3 if the contact at the given --prune is not certified.
     """
     from convexrough.surface import report
 

@@ -71,8 +71,8 @@ def sweep(
     them, and figures.
 
     Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or
-    workers died twice with the same scenes; 130 interrupted. Completed parts are kept, and --resume
-    continues.
+    workers died twice while computing the same scenes; 130 interrupted. Completed parts are kept,
+    and --resume continues.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

@@ -5,7 +5,7 @@ x with the violations e and the solution x*, on a box where the Hessian is at le
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.
 
-A component that is fixed has e_i = 0 and x_i - x*_i = 0.
+A component that is fixed has x_i = x*_i, and its e_i counts as 0.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
 
 
-def distance(excess: Array, stiffness: Array, margin: float | Array) -> Any:
+def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations.
 
     excess    : (n,) e
-    stiffness : (n,) the diagonal of H, infinite where x is fixed
+    h : (n,) the diagonal of H, infinite where x is fixed
     margin    : mu
     """
     most = largest(excess)
     with np.errstate(all="ignore"):
-        squared = summed((excess / np.where(most > 0, most, 1.0)) ** 2 / stiffness)
+        squared = summed((excess / np.where(most > 0, most, 1.0)) ** 2 / h)
         found = most * np.sqrt(squared) / margin * (1 + SAFETY + excess.shape[-1] * 2.0**-52)
     return np.where(most == 0, 0.0, np.where(np.isfinite(found), found, np.inf))[()]

@@ -78,8 +78,9 @@ class Cycle(Table, Plottable):
     displacement_amplitude : [length] half the range of the displacement at the points
     displacement_error : [length] proved bound on the error of the displacement amplitude
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so
-        loss and statuses are proved; "proved for one step": the loss is not proved; "fails":
-        nothing is proved, and a general step (docs/theory/without-order.md) gives the results
+        loss and statuses are proved; "proved for one step": statuses hold for the result of one
+        general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
+        nothing is proved, and general steps give the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 
@@ -540,7 +541,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop with points where Q has fallen from its maximum, then risen, by 2 `way`."""
+    """The loop through points where Q has fallen, and then risen, by the amounts 2 `way`."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

@@ -34,8 +34,8 @@ ACCURATE = 1e-14
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
-#: A Newton step must not leave more than the largest of so many last residuals. The residual may
-#: grow where an asperity begins or ceases to slide, and slopes jump.
+#: The residual after a Newton step may not exceed the largest of this many latest residuals. It may
+#: grow, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
 #: The smallest and the largest number of steps per segment.
@@ -128,7 +128,7 @@ class Stepper:
         return replace(found, load=load, height=height, work=now.work + mean * run)
 
     def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
-        """The state in which all asperities slide, at the least displacement that makes them."""
+        """The state in which all asperities slide, at the least displacement at which they do."""
         trial, on = _Trial.of(self, now, level), level.indentations > 0
         coupled = self.A @ (sign * level.loads - now.carried)
         taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]
@@ -185,7 +185,7 @@ class SteppedPath(NamedTuple):
 
     losses : (m,) [force length] energy lost since the start; nan if the doubling does not settle
     status : (m, N) "open" or "undecided"
-    fronts : (m, N) indentation at the slip front of each asperity; the full one if it sticks
+    fronts : (m, N) indentation at the slip front of each asperity; its indentation if it sticks
     """
 
     states: States
@@ -263,7 +263,7 @@ class _Iterate(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """The largest defect; what the total lacks beyond rounding counts as a displacement."""
+        """The largest defect, or the displacement that supplies what the total lacks."""
         stiffness, rounding = float(self.slopes.sum()), len(self.carried) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
         beyond = abs(self.excess) > rounding * float(np.abs(self.carried).sum())

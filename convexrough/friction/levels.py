@@ -245,8 +245,8 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
 
     The result is "proved", "proved for one step" or "fails", as in `Cycle.order`. Later results for
     this contact reuse the proof. For some asperities, mostly at the edge of the contact, the proof
-    needs a search of some milliseconds. Without this call it is made for at most 1,000 asperities,
-    and only if at most 10,000 touch.
+    needs a search of some milliseconds. Without this call the search is made for at most 1,000
+    asperities, and only if at most 10,000 touch.
 
     most : largest number of asperities for which the search is made; at most ten times as many may
         touch

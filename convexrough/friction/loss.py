@@ -108,7 +108,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     every, approach = energies(known), Ball.stacked([level.approach for level in known])
     which = [[place[load] for load in end] for end in ends]
     (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
-    softest = np.array([_softest(known[k]) for k in which[1]])
+    softest = np.array([_stiffest(known[k]) for k in which[1]])
     D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), _over(run.upper, softest)))
     m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
     first, last = D2 - D1, D3 - D1
@@ -121,11 +121,11 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     return where(found.lower >= 0.0, found, _sharper(found, least))
 
 
-def _softest(level: Level) -> float:
+def _stiffest(level: Level) -> float:
     """A lower bound on 2 E* a of the largest contact. The slope of D0 is at most 1 / (2 E* a)."""
     k = level.problem.exact.coefficients.upper
-    softness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
-    return float(softness.max(initial=0.0)) * (1 - SAFETY)
+    stiffness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
+    return float(stiffness.max(initial=0.0)) * (1 - SAFETY)
 
 
 @np.errstate(divide="ignore")

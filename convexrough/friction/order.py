@@ -10,31 +10,32 @@ L1 down to L0 if at all loads between, y_i >= 0 for each asperity i that may tou
 load of the path, and all others are open. The level at L1 can prove it, with these symbols:
 
 - The *support* is the set of asperities that are not proved open at L1.
-- C~ >= C(L1) is diagonal, 0 off the support, and I + A C is regular if 0 <= C <= C~ is diagonal.
-- delta is a diagonal matrix, 0 <= delta <= C~; C is any diagonal matrix, C~ - delta <= C <= C~.
+- C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for diagonal C', 0 <= C' <= C~.
+- delta is diagonal, 0 <= delta <= C~. From here on C is any diagonal matrix, C~ - delta <= C <= C~,
+  and y solves (I + A C) y = 1 with this C.
 - v_k are the *weights* for asperity i: any numbers on the support, except v_i = 0. w_k = v_k C~_k.
-- s_k = v_k + sum_j w_j A_jk,                                                                   (1)
-  r_k = |A_ik - s_k| if k != i, and r_i = max(-s_i, 0). In (2), r_k = max(A_ik - s_k, 0) will do.
+- t_k = v_k + sum_j w_j A_jk,                                                                   (1)
+  r_k = |A_ik - t_k| if k != i, and r_i = max(-t_i, 0). In (2), r_k = max(A_ik - t_k, 0) will do.
 
 Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
 
     y_i >= 1 - sum_k (w_k + max(-v_k, 0) delta_k m_k + r_k C~_k),                               (2)
-    y_i (1 - s_i C_i) <= 1 - sum_k (w_k - max(v_k, 0) delta_k m_k - r_k C~_k).                  (3)
+    y_i (1 - t_i C_i) <= 1 - sum_k (w_k - max(v_k, 0) delta_k m_k - r_k C~_k).                  (3)
 
-1. Let z = C y. Then y + A z = 1, so sum_k s_k z_k = sum_k w_k - sum_k v_k (C~_k - C_k) y_k.
-2. Row i is 1 - y_i = (A z)_i, and differs from that sum by s_i z_i and at most sum_k r_k z_k.
+1. Let z = C y. Then y + A z = 1, so sum_k t_k z_k = sum_k w_k - sum_k v_k (C~_k - C_k) y_k.
+2. Row i is 1 - y_i = (A z)_i, and differs from that sum by t_i z_i and at most sum_k r_k z_k.
 3. (2) and (3) follow from 0 <= z_k <= C~_k and 0 <= (C~_k - C_k) y_k <= delta_k m_k.
 
 (a) Start from m = 1 and decrease m by (3). For all i on the support, let (2) with 2 r in place of r
-have a positive right side, and let |1 - sum_k w_k| <= 2 (1 - max(s_i, 0) C~_i - sum_k r_k C~_k).
+have a positive right side, and let |1 - sum_k w_k| <= 2 (1 - max(t_i, 0) C~_i - sum_k r_k C~_k).
 Then all rates on the support are positive.
 
 1. If |y| <= Y, (2) and (3) hold for C = C~ and delta = 0, with Y r in place of r.
 2. So by the last condition Y = 2 is such a bound at C~, and by (2) the rates are positive there.
-3. Let C(t) = C~ - t D with 0 <= D <= delta, and let t rise from 0 to 1. As long as no rate is
+3. Let C = C~ - x D with 0 <= D <= delta, and let x rise from 0 to 1. As long as no rate is
    negative, y = 1 - A C y <= 1, so y <= m by (3), and y exceeds a positive constant by (2).
-4. The rates are continuous in t, so none of them becomes 0.
-5. If delta = C~, the last condition is not needed: C(t) = t C starts from y = 1 instead.
+4. The rates are continuous in x, so none of them becomes 0.
+5. If delta = C~, the last condition is not needed: replace C by x C, from x = 0 with y = 1.
 
 (b) Let F = D0(L1) - D0(L0) and delta_k >= C~_k - c_k(n_k(L1) - m_k F), with c_k as a function of
 n_k. Outside the support let y_i >= -u_i by (2), and let the gap at L1 exceed u_i F. Then y > 0 on
@@ -47,8 +48,8 @@ the support down to L0, and all other asperities stay open.
    that there is one solution. So the continued solution is the level of each load.
 5. If L0 = 0, this holds down to every L > 0.
 
-Asperities that are open at L1 but touch at the highest load need u_i <= 0. Weights with s_k = A_ik
-follow from the inverse X of I + C~ A: the row v = (A X)_i - t X_i, with the t that makes v_i = 0.
+Asperities that are open at L1 but touch at the highest load need u_i <= 0. Weights with t_k = A_ik
+follow from the inverse X of I + C~ A: the row v = (A X)_i - x X_i, with the x that makes v_i = 0.
 If too many asperities touch for an inverse, `friction.sweeping` finds weights of near neighbours.
 """
 
@@ -218,7 +219,7 @@ class _Span(NamedTuple):
         support = ~high.open
         c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
         # H + A >= (1 - theta) H gives C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
-        e = np.where(support, c * box.stiffness, 0.0).max(axis=1, keepdims=True)
+        e = np.where(support, c * box.compliance, 0.0).max(axis=1, keepdims=True)
         drop, depth = (high.approach - low.approach).upper[:, None], high.indentation.lower
         gaps = np.maximum(-high.indentation.upper, 0.0)
         steep = np.broadcast_to(k.upper**1.5, c.shape)
@@ -264,7 +265,7 @@ class _Span(NamedTuple):
         v = entries @ X
         v[:, s] -= (v[:, s, s] / X[:, s, s])[:, :, None] * X
         v[:, s, s] = 0.0
-        left = v @ matrix  # s of (1)
+        left = v @ matrix  # t of (1)
         own = np.maximum(left[:, s, s], 0.0) * self.c
         left -= entries
         left[:, s, s] = np.minimum(left[:, s, s], 0.0)
@@ -296,16 +297,16 @@ def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
 
 
 def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
-    """The least rate y = (I + A C)^-1 1 of the rising asperities, at most 0."""
+    """The least rate y = (I + A C)^-1 1 of the rising asperities, or 0 if none is negative."""
     problem, touching = level.problem, level.loads.value > 0
     if not touching.any():
         return 0.0
-    c = np.where(touching, 1.0 / problem.stiffness(np.where(touching, level.loads.value, 1.0)), 0.0)
+    h = problem.compliance(np.where(touching, level.loads.value, 1.0))
     y: Array = correct(
         problem.influence,
         problem.shells,
-        np.sqrt(c),
-        -np.ones(len(c)),
+        np.where(touching, 1.0 / np.sqrt(h), 0.0),
+        -np.ones(len(h)),
         balanced=False,
         tolerance=SOLVED,
     )

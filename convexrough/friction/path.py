@@ -48,8 +48,8 @@ class LoadPath(Table, Plottable):
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] the lowest normal-load level that the latest slip reached; nan
-        where nothing slips
+    fronts         : (m,) [force] the lowest level (total load) that the front of the latest slip
+        reached; nan where nothing slips
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
     order          : what is proved about order between the levels in use, as in `Cycle`

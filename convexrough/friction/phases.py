@@ -98,7 +98,7 @@ def phase_losses(
     >>> P = contact.load
     >>> swing = dict(load=P, load_amplitude=0.2 * P, force_amplitude=0.05 * P)
     >>> losses = cr.phase_losses(scene, **swing, phases=[0.0, np.pi / 2], chords=8)
-    >>> bool(losses.losses[1] < 1e-9 * losses.losses[0])  # in step, and no steeper than friction
+    >>> bool(losses.losses[1] < 1e-9 * losses.losses[0])  # P, Q in phase, |dQ| <= f |dP|: no slip
     True
     """
     f = checks.friction(scene.friction)

@@ -114,7 +114,7 @@ class ShearState(Table, Plottable):
 
     @property
     def order(self) -> Order:
-        """The order of the certificate."""
+        """Whether order is proved: as in `ShearCertificate`."""
         return self.certificate.order
 
     def gradient(
@@ -273,9 +273,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     force  : [force] the prescribed sum of the shear forces
 
     `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity keeps its status in the solution if its bound is small enough: for a sliding asperity,
-    smaller than 1 % of the friction limit f P_i; for a sticking one, smaller than f P_i - |Q_i|.
-    Otherwise its status is "undecided". The rest of the certificate is that of the solution.
+    asperity gets the status that it has in the solution if its bound is small enough: for
+    "sliding", smaller than 1 % of the friction limit f P_i; for "partial", smaller than the f P_i
+    - |Q_i| of the solution. Otherwise its status is "undecided". The rest of the certificate is
+    that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.

@@ -2,15 +2,15 @@ r"""Proof of order for many asperities: charges at near neighbours bound the rat
 
 C~, the support and the rates y(C) = (I + A C)^-1 1 are those of `friction.order`, and I + A C is
 regular for 0 <= C <= C~. Give asperity i weights w_j >= 0 for some neighbours j != i on the
-support, with the sum 1. Let t_i be a number such that for all k != i on the support
+support, with the sum 1. Let q_i be a number such that for all k != i on the support
 
-    A_ik <= t_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
+    A_ik <= q_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
 
-If 1 - t_i is positive for all i on the support, it is a lower bound on the rate y_i(C): this is (2)
-of `friction.order` with the weights t_i w_j and delta = C~.
+If 1 - q_i is positive for all i on the support, it is a lower bound on the rate y_i(C): this is (2)
+of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
 
 (1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
-of radius R_j = scale C~_j. Multiplied by t_i, the potential of these charges is nowhere below that
+of radius R_j = scale C~_j. Multiplied by q_i, the potential of these charges is nowhere below that
 of the unit charge.
 
 There are three ways to find weights:
@@ -18,7 +18,7 @@ There are three ways to find weights:
 - Where neighbours are all around i: weights of least energy whose first and second moments vanish,
   sum w_j d_j = sum w_j d_j^2 = 0, with complex numbers d_j for the vectors from i to j.
 - At an edge of the contact: a barrier method, which minimises the sum of the weights (before it is
-  scaled to 1) under (1) with t_i = 1, at near asperities and at some far ones.
+  scaled to 1) under (1) with q_i = 1, at near asperities and at some far ones.
 - Outside the contact: one neighbour alone, if all others are nearer to it than to i.
 """
 
@@ -242,7 +242,7 @@ class _Swept:
         return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) 1 - t of (1), and the k for which t is largest; -inf where all weights are 0."""
+        """(m,) 1 - q of (1), and the k for which q is largest; -inf where all weights are 0."""
         from scipy.sparse import csr_array
 
         total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
@@ -258,9 +258,9 @@ class _Swept:
             swept = charges @ (1.0 / self._apart(charged, seen, self.shells))
             swept *= self._apart(mine, seen, nowhere)
             least = swept.argmin(axis=1)
-            t = 1.0 / swept[rows, least]
-            worst[known] = np.where(t > most, seen[least], worst[known])
-            most = np.maximum(most, t)
+            q = 1.0 / swept[rows, least]
+            worst[known] = np.where(q > most, seen[least], worst[known])
+            most = np.maximum(most, q)
         rates[known] = 1.0 - (1.0 + self.lost) * most
         return rates, worst
 

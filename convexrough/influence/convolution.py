@@ -25,7 +25,7 @@ ROW = 512
 LAID_OUT = 2**17
 
 
-#: A function of differences of rows i, differences of columns j and their squared lengths
+#: A function of differences of rows i and of columns j of sites, and of their squared distances
 #: [spacing^2]; it returns the values of some kernels there, arrays (len(i), len(j)).
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
@@ -51,8 +51,8 @@ class SiteBox:
     def padded(self) -> tuple[int, int]:
         """The size of the transforms, in which no two differences of occupied sites coincide.
 
-        Twice the box is enough. A smaller size is enough if every vector by which the padded box
-        repeats is longer than twice the extent.
+        Twice the box is enough. A smaller size is enough if every vector between two periodic
+        images of a site is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
 
@@ -127,7 +127,7 @@ class SiteBox:
         return found[::-1]
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box, for the shortest differences that map there."""
+        """Values in some rows of the padded box: each at the shortest difference of its place."""
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []
@@ -265,7 +265,7 @@ def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """The smallest padded number of sites that exceeds `length`; at most `twice`."""
+    """A number of padded sites above `length` and at least `sites`; `twice` is always enough."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -280,7 +280,7 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Distances and differences of two sites, nearest first; of (i, j) and (-i, -j) only one."""
+    """Distances and differences (i, j) of sites, nearest first; of (i, j) and (-i, -j) only one."""
     rows, columns = box.shape
     reach = 1
     done = 0.0

@@ -1,9 +1,9 @@
 """The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
 The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
-box of sites that holds the asperities is padded with zeros, to at most about twice its size, so
-that there are no periodic images. The method, its rounding errors and the products with more digits
-("sharp" products) are explained in docs/theory/operators-lattice.md.
+box of sites that holds the asperities is padded with zeros, to at most about twice its size in
+each direction, so that there are no periodic images. docs/theory/operators-lattice.md explains the
+method, its rounding errors and the products with more digits ("sharp" products).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ENTRY_ROUNDOFFS = 24
 CHUNK = 2**14
 
 #: Fill ratio of a box below which a k-d tree finds neighbours. A heuristic: it affects speed, and
-#: how tight the nearest distances are from which docs/theory/convexity.md makes shells.
+#: the lower bounds on nearest distances, which determine the shells of docs/theory/convexity.md.
 FILLED = 0.2
 
 #: Number of asperities above which rarely needed spectra are not cached.
@@ -60,7 +60,7 @@ class LatticeCoupling:
 
     box     : the box of sites
     sources, targets : (n,), (m,) indices of the sites in the box, row by row
-    scale   : A_ij r_ij
+    scale   : A_ij r_ij, which is 1 / (pi E*)
     spacing : [length] the shortest distance of two sites
     site_error : [spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i
     """
@@ -149,7 +149,7 @@ class LatticeInfluence(LatticeCoupling):
 
     array       : (N, 2) [length] points, with errors of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact points before they were multiplied by `lattice.shrink`
+    layout      : the exact points, before multiplication by `lattice.shrink` (most often 1)
     lattice     : the lattice of the points
     """
 
@@ -264,7 +264,7 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """The largest (a_i + a_j) / r_ij, for contact radii a; pairs too far apart are skipped."""
+        """The largest (a_i + a_j) / r_ij, for contact radii a; the search ends at distant pairs."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
@@ -284,7 +284,7 @@ class LatticeInfluence(LatticeCoupling):
     def semidefinite_with(self, radius: float) -> bool:
         """True if A + (scale / radius) I is proved positive semidefinite.
 
-        The proof is the least value of the symbol (docs/theory/operators-lattice.md).
+        The least value of the symbol proves it (docs/theory/operators-lattice.md).
         """
         if radius * LEAST_NEGATIVE > self.spacing:
             return False

@@ -23,13 +23,14 @@ Single = NDArray[np.float32]
 #: Windows are so large that the relative variance of the mean of W^2 over a window is about this.
 SCATTER = 0.04
 
-#: Width of the Gaussian divided by the side of a window; with it both average over as many sites.
+#: Width of the Gaussian divided by the side of a window; with it the Gaussian and
+#: the window average over equally many sites.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
 #: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.
 FINE = 3.5
 
-#: Side of windows for smooth W. Then blocks have 2 x 2 sites, at a third of the cost of one site.
+#: Side of windows for smooth W. Then blocks have 2 x 2 sites, and cost a third of blocks of one.
 LEAST_WINDOW = 2 * FINE
 
 #: Side of the windows on which the scatter of W^2 is measured.

@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
 
-#: Number of pairs processed together, and number of such pieces in memory at once.
+#: Number of pairs processed together, and number of such groups in memory at once.
 PIECE, BATCH = 2**17, 32
 
 

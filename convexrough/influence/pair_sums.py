@@ -78,8 +78,8 @@ class Product:
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on the interpolation error of near pairs, for strengths of at least 0.
 
-        Near are pairs within the reach plus the `sway` of the stencils. The relative error of other
-        pairs is part of `rounding`.
+        Pairs within the reach plus the `sway` of the stencils count as near. The relative error of
+        other pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
         if not self.splitting.meshed:
@@ -104,7 +104,7 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Rounding errors outside the transforms: relative ones, and those per 2-norm of loads."""
+        """Rounding errors outside the transforms, over the sums and over the size of loads."""
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)

@@ -29,7 +29,7 @@ NODES, TERMS = 1024, 8
 
 
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
-    """The first terms of Taylor's series of reach L in (r / reach)^2, in units of 2^-FIXED.
+    """Terms of Taylor's series of reach times L in (r / reach)^2, at nodes, in units of 2^-FIXED.
 
     The nodes are r^2 = 0, step, 2 step, ...
     """
@@ -81,7 +81,7 @@ class SoftTable:
         return cls(step, soft_values(values, 1 / Fraction(kernel.reach)), slopes, error)
 
     def at(self, squares: Pair) -> Pair:
-        """L; the low parts are at most a hundredth of the high parts."""
+        """L at squared distances, as pairs; low parts are at most a hundredth of the high parts."""
         node = np.rint(squares.high / self.step).astype(np.intp)
         away = ((squares.high - node * self.step) + squares.low) / self.step
         value = self.terms[-1][node]

@@ -5,8 +5,8 @@ If the point c_i of asperity i is moved, its displacement changes with the deriv
     d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3.
 
 These are two sums with odd kernels, on the boxes and meshes of the compliance operator, without
-error bounds. On a mesh the smooth part is -grad L, which is r times the softened 1 / r^3 of one
-order less.
+error bounds. On a mesh the smooth part is -grad L, the distance vector times the softened 1 / r^3
+of one order less.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Shakedown: the largest factor of a load path at which asperities stop sliding."""
+"""Shakedown: the largest factor of a load path at which no asperity slides in every cycle."""

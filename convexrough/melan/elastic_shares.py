@@ -48,11 +48,11 @@ def scalar_shares(contact: Contact) -> Shares:
 def vector_shares(contact: Contact) -> Shares:
     """The shares with the full tangential kernel."""
     problem = VectorProblem.of(contact)
-    n, h = len(problem), problem.stiffness
+    n, h = len(problem), problem.compliance
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
-    stiffness = problem.kernel + np.diag(np.repeat(h, 2))
+    compliance = problem.kernel + np.diag(np.repeat(h, 2))
     together = np.tile(np.eye(2), (n, 1))
-    moved = np.linalg.solve(stiffness, together)
+    moved = np.linalg.solve(compliance, together)
     y = moved @ np.linalg.inv(together.T @ moved)  # (2n, 2)
     if problem.scope == "none":
         return _unproved(y.reshape(n, 2, 2), problem)
@@ -67,15 +67,15 @@ def vector_shares(contact: Contact) -> Shares:
 def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
     """(n,) bounds on the errors of shares (n, 2), from the residual of their equations."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
-    stiffness = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
-    moved = exact * stiffness + problem.couple(shares).T
+    compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
+    moved = exact * compliance + problem.couple(shares).T
     off = np.hypot(*(moved - moved.value.mean(axis=1)[:, None]).size)
     off += problem.product_error * (problem.influence.matrix @ np.hypot(*shares.T))
     missing = float(np.hypot(*(exact.sum() - total).size)) * (1 + SAFETY)
     off += missing * problem.reach[0]
-    off[0] += missing * stiffness.upper[0]
-    within = distance(off * (1 + SAFETY), 1.0 / problem.softness, problem.margin)
-    errors: Array = within * np.sqrt(problem.softness) * (1 + SAFETY)
+    off[0] += missing * compliance.upper[0]
+    within = distance(off * (1 + SAFETY), 1.0 / problem.stiffness, problem.margin)
+    errors: Array = within * np.sqrt(problem.stiffness) * (1 + SAFETY)
     errors[0] += missing
     return errors
 

@@ -1,6 +1,7 @@
-"""`shakedown`: the largest factor of a load path at which asperities stop sliding.
+"""`shakedown`: the largest factor of a load path at which sliding dies out.
 
-docs/theory/shakedown.md derives the exact limit and the programs of Melan's theorem.
+Sliding dies out if, after some cycles, no asperity slides as a whole; slip at the edges of contacts
+goes on. docs/theory/shakedown.md derives the exact limit and the programs of Melan's theorem.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Limit: TypeAlias = "Callable[..., Shakedown]"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shakedown(Table, Plottable):
-    """The shakedown limit of a load path: the largest factor at which asperities stop sliding.
+    """The shakedown limit of a load path: the largest factor at which sliding dies out.
 
     The path has m points (P0, Q0) + factor (p, q) of normal load and shear force. The scene has n
     asperities and the coefficient of friction f.
@@ -46,16 +47,18 @@ class Shakedown(Table, Plottable):
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
         asperities that stick until they slide as a whole, with the scalar kernel or the full one;
         the load must be constant
-    factor  : the largest factor of the path at which all asperities stop sliding
+    factor  : the largest factor of the path at which, after some cycles, no asperity slides
+        as a whole
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
-    factors : (n,) the largest factor at which each asperity stops sliding; nan where it is not
-        computed and where the asperity does not touch at the load P0; for "vector" all are equal
+    factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
+        is not computed or the asperity does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
     witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
         path scaled by `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
-    order   : for "exact" as in `Cycle`; bounds need "proved". None for other kinds
+    order   : for "exact" what is proved about order, as in `Cycle`: there are bounds only if it is
+        "proved"; None for other kinds
     load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
 
@@ -117,7 +120,7 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor of a closed path at which asperities stop sliding.
+    """The largest factor of a closed path at which sliding dies out.
 
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
@@ -210,14 +213,14 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The factor of the scalar program at which one asperity slips back and forth, or all slide."""
+    """The limit with the scalar kernel: that of one asperity, or of gross sliding if smaller."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """The factor at which the shear force of each asperity, over f, has the range 2 P_i."""
+        """The factor at which the shear force over f of each asperity varies by 2 P_i."""
         ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
         return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
 

@@ -1,7 +1,7 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-Boxes of crowded contacts can only have touching asperities: docs/theory/crowded.md. In comments,
-h is the local stiffness `NormalProblem.stiffness`, H the diagonal matrix of the h, A the compliance
+In crowded contacts a box has touching asperities only (docs/theory/crowded.md). In comments, h is
+the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
 operator, and mu = 1 - `convexity_number` the margin of convexity.
 """
 
@@ -48,9 +48,9 @@ class Box(NamedTuple):
     scope: Scope
     problem: NormalProblem | Stack  # with the shells that prove convexity
     loads: Array  # upper ends; the lower ends are 0
-    stiffness: Array  # h at the upper ends
+    compliance: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # limits below which the solution must still be proved to lie; or infinite
+    faces: Array  # that the solution is below them must still be proved; infinite where not
     fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:
@@ -58,7 +58,7 @@ class Box(NamedTuple):
         return self._replace(
             problem=problem,
             loads=self.loads[rows],
-            stiffness=self.stiffness[rows],
+            compliance=self.compliance[rows],
             convexity_number=self.convexity_number[rows],
             faces=self.faces[rows],
             fixed_open=self.fixed_open[rows],
@@ -67,27 +67,27 @@ class Box(NamedTuple):
     @property
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self) -> Box:
-        """A box that contains this one, for another load or approach.
+        """A box that contains this one, for use at another load or approach.
 
-        Its solutions may lie outside it. Where shells prove S_i <= theta, with the convexity number
-        theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
+        The solution there may lie outside. Where shells prove S_i <= theta, with the convexity
+        number theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
-        shelled = it.convexity_at(self.stiffness) <= theta * (1 + 4 * SAFETY)
+        shelled = it.convexity_at(self.compliance) <= theta * (1 + 4 * SAFETY)
         wider = shelled & (self.loads > 0) & (ends > self.loads) & np.isfinite(ends)
         loads = np.where(wider, ends, self.loads)
-        h = np.where(wider, it.stiffness(loads), self.stiffness)
+        h = np.where(wider, it.compliance(loads), self.compliance)
         theta = np.where(shelled, np.maximum(theta, it.convexity_at(h)), theta)
         faces = np.where(loads > 0, loads, np.inf)
-        return self._replace(loads=loads, stiffness=h, convexity_number=theta, faces=faces)
+        return self._replace(loads=loads, compliance=h, convexity_number=theta, faces=faces)
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
     """Boxes, the widest first: if possible one with every solution, else a local one."""
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
-    h = problem.stiffness(corner)
+    h = problem.compliance(corner)
     nowhere, none = np.full(len(problem), np.inf), np.zeros(len(problem), dtype=bool)
     if (theta := problem.convexity_at(h)) < 1:
         yield Box("global", problem, corner, h, theta, nowhere, none)
@@ -106,11 +106,11 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
         faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
         local = np.minimum(corner, faces)
         beyond = np.where(faces < corner, faces, np.inf)
-        yield Box("local", problem, local, problem.stiffness(local), theta, beyond, none)
+        yield Box("local", problem, local, problem.compliance(local), theta, beyond, none)
 
 
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """The least known upper bound on the approach of any solution, from loads and A times these."""
+    """The least known upper bound on the approach of any solution, from loads and A times loads."""
     if problem.load is None:
         return problem.approach_bound
     return min(problem.approach_bound, problem.overhang(loads, displacement))
@@ -127,7 +127,7 @@ def box_of_touching(
     influence = problem.influence.restricted(which)
     least = LEEWAY * loads + LEAST_LEEWAY * float(loads.max(initial=0.0))
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
-    h = problem.stiffness(box)
+    h = problem.compliance(box)
     shelled = replace(problem, shells=_shells(influence, h, which))
     number = shelled.convexity_at(h)
     if not number < 1:
@@ -137,45 +137,45 @@ def box_of_touching(
     return Box("local", shelled, box, h, number, np.where(touching, box, np.inf), ~touching)
 
 
-def crowded_margin(influence: Influence, stiffness: Array) -> float:
+def crowded_margin(influence: Influence, compliance: Array) -> float:
     """The largest proved mu: by Cholesky for small matrices, else by overlapping shells."""
     if not influence.stored and len(influence) > FACTORISED:
-        return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)
-    scaled, error = _scaled(influence, stiffness), influence.entry_error + 8 * ROUNDOFF
+        return overlapping_margin(influence, influence.scale / compliance, CROWDED_MARGINS)
+    scaled, error = _scaled(influence, compliance), influence.entry_error + 8 * ROUNDOFF
     return largest(CROWDED_MARGINS, lambda each: proved_margin(scaled, (each,), error) > 0)
 
 
-def _scaled(influence: Influence, stiffness: Array) -> Array:
+def _scaled(influence: Influence, compliance: Array) -> Array:
     """H^(-1/2) A H^(-1/2)."""
-    root = 1.0 / np.sqrt(stiffness)
+    root = 1.0 / np.sqrt(compliance)
     scaled: Array = influence.matrix * root * root[:, None]
     return scaled
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Loaded asperities in pairs that no energy minimum has; else whose shells meet; else all."""
+    """Loaded asperities too close for an energy minimum; else those whose shells meet; else all."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which
     influence = problem.influence.restricted(which)
-    near = Nearest.of(influence.points, influence.scale / problem.stiffness(loads)[which])
+    near = Nearest.of(influence.points, influence.scale / problem.compliance(loads)[which])
     for poor in (near.closest >= 1.0 - CROWDED_MARGINS[0], near.meeting):
         if poor.any():
             return which[poor]
     return which
 
 
-def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
+def _shells(influence: Influence, compliance: Array, which: Indices) -> Array:
     """(n,) shells fitted to the asperities `which`, 0 elsewhere."""
-    shells = np.zeros(len(stiffness))
-    radii = (np.pi / 2.0) * influence.scale / stiffness[which]
+    shells = np.zeros(len(compliance))
+    radii = (np.pi / 2.0) * influence.scale / compliance[which]
     shells[which] = fitted_shells(influence, radii, FITTED)
     return shells
 
 
-def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
+def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
     """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved by a stored matrix, else 0."""
     if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF
-    return proved_margin(_scaled(influence, stiffness), margins, error)
+    return proved_margin(_scaled(influence, compliance), margins, error)

@@ -42,7 +42,7 @@ class Certificate(Table):
         contact radii near these (`meaning` describes the others that are possible); "none":
         nothing is proved, every bound is infinite and every asperity is undecided
     convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
-        the smallest eigenvalue of the Hessian, scaled by each asperity's local stiffness, is at
+        the smallest eigenvalue of the Hessian, scaled by each asperity's local compliance, is at
         least 1 - convexity_number
     status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
         "undecided"
@@ -57,8 +57,8 @@ class Certificate(Table):
     fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
         unless contacts are crowded. Uniqueness nearby is proved only among solutions with these
         asperities open
-    other_solutions_crowding : every other solution has a larger crowding than this: the largest sum
-        of two contact radii over the distance of their asperities. It is infinite where there is no
+    other_solutions_crowding : lower bound on the crowding of every other solution: on its largest
+        (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where there is no
         other solution, and 0 where nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
@@ -248,18 +248,18 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
     # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
     part = np.cbrt(np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0))
     convex = part.min(initial=1.0) > box.convexity_number * (1 + SAFETY)
-    if not (convex or box.problem.convexity_at(problem.stiffness(most)) < 1):
+    if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
         return np.inf
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch, and their negative gaps."""
+    """The asperities that cannot touch."""
 
     which: Indices  # in the scene
     coupling: Coupling | None  # from asperities that can touch; None if all can
-    indentation: Array  # prescribed approach less displacement
+    indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
 
 

@@ -60,8 +60,8 @@ class Response(NamedTuple):
 class Springs(NamedTuple):
     """The contacts of a level as linear springs, for the system that `Level.response` solves.
 
-    touching  : (n,) True where the stiffness is known;  doubtful : (n,) others that may touch
-    slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : (n,) 1/c where touching
+    touching  : (n,) True where the compliance is known;  doubtful : (n,) others that may touch
+    slopes    : (n,) c = dP/dn, 0 where not touching;  compliance : (n,) 1/c where touching
     bound     : (n,) h <= 1/c where the asperity may touch; infinite where open
     margin    : mu of docs/theory/one-theorem.md, with H = diag(h); 0 where nothing is proved
     """
@@ -69,7 +69,7 @@ class Springs(NamedTuple):
     touching: NDArray[np.bool_]
     doubtful: NDArray[np.bool_]
     slopes: Array
-    stiffness: Ball
+    compliance: Ball
     bound: Array
     margin: float
 
@@ -153,20 +153,20 @@ class Level:
             inside = np.asarray(state.inside)
             own = state.gap + state.indentation  # k P^(2/3)
             ratio = where(inside, own / where(inside, Ball.exact(state.loads), 1 + zero), zero)
-            stiffness = ratio / 1.5
+            compliance = ratio / 1.5
             nowhere = np.full(len(self.problem), np.inf)
-            slopes = np.where(inside, 1.0 / np.where(inside, stiffness.value, 1.0), 0.0)
-            return Springs(inside, ~inside & False, slopes, stiffness, nowhere, 0.0)
-        softness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
-        touching = self.touching & self.loads.positive  # else nothing bounds its stiffness
+            slopes = np.where(inside, 1.0 / np.where(inside, compliance.value, 1.0), 0.0)
+            return Springs(inside, ~inside & False, slopes, compliance, nowhere, 0.0)
+        stiffness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
+        touching = self.touching & self.loads.positive  # else nothing bounds its compliance
         with np.errstate(divide="ignore"):
-            known = np.maximum(found.stiffness, (1.0 - SAFETY) / softness.upper)
+            known = np.maximum(found.compliance, (1.0 - SAFETY) / stiffness.upper)
         bound = np.where(self.open, np.inf, known)
         return Springs(
             touching,
             ~touching & ~self.open,
-            np.where(touching, softness.value, 0.0),
-            where(touching, 1.0 / where(touching, softness, 1 + zero), zero),
+            np.where(touching, stiffness.value, 0.0),
+            where(touching, 1.0 / where(touching, stiffness, 1 + zero), zero),
             bound,
             1.0 - min(found.box.convexity_number, found.box.problem.convexity_at(bound)),
         )
@@ -183,7 +183,7 @@ class Level:
         Raises SolverError where the system is singular or nearly so, and no derivative exists.
         """
         problem, springs = self.problem, self.springs
-        touching, c, stiffness = springs.touching, springs.slopes, springs.stiffness
+        touching, c, compliance = springs.touching, springs.slopes, springs.compliance
         weights, largest = c / c.sum(), int(np.argmax(c))
 
         def completed(x: Pair) -> Pair:
@@ -194,7 +194,7 @@ class Level:
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
             """x / c + A x - right - beta, and beta, the mean weighted by c that is subtracted."""
-            above = stiffness * x + product - right
+            above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
             return above - beta, beta
@@ -248,7 +248,7 @@ class Level:
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
             e = left.size + missing_effect
-            e[j] += missing * float(springs.stiffness.upper[j])
+            e[j] += missing * float(springs.compliance.upper[j])
             return e, missing, missing_effect
 
         carried = np.zeros(len(h))
@@ -262,7 +262,7 @@ class Level:
         errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
         errors[j] += missing
         moved = within / np.sqrt(float(known.min())) * problem.row_norm + missing_effect
-        each = (left.size + springs.stiffness.upper * errors)[touching]
+        each = (left.size + springs.compliance.upper * errors)[touching]
         off = (float(each.min()) + moved) * (1 + SAFETY)
         return Response(Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off))
 

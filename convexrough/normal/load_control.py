@@ -17,8 +17,8 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Smallest radius of a scene over the smooth contact radius, and the factor by which the scene is
-#: wider on which the approach is bounded to find the radius.
+#: Smallest radius of a scene, over the smooth contact radius; and the factor by which the scene on
+#: which the approach is bounded is wider.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on
@@ -34,16 +34,16 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array
     tau, and Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
-    indentation, softness = indentation - highest, 1.0 / coefficients
+    indentation, inverse = indentation - highest, 1.0 / coefficients
     most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
-        ratio = np.maximum(indentation + shift, 0.0) * softness
+        ratio = np.maximum(indentation + shift, 0.0) * inverse
         root = np.sqrt(ratio)
         total = summed(ratio * root)
         # (total^(2/3) - load^(2/3)) over its slope, without cancellation
         excess = -np.expm1(2 / 3 * np.log1p((load - total) / total)) * total
-        step = excess / summed(root * softness)
+        step = excess / summed(root * inverse)
         if steps > 0:
             step = np.where(step > 4 * ROUNDOFF * shift, step, 0.0)
         shift = shift - step
@@ -157,9 +157,8 @@ def all_that_could_touch(
     scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for a narrower one with all asperities of the approximate
-    loads, as lambda of (2) of docs/theory/certificate.md is at least the displacement at every
-    asperity.
+    A bound found on a wide scene also holds for a narrower one if this has all asperities with an
+    approximate load: (2) of docs/theory/certificate.md is then the same sum with the same lambda.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

@@ -40,7 +40,7 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:
-    radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
+    radii: Array = np.pi / 2.0 * problem.influence.scale / problem.compliance(loads) * (1 + SAFETY)
     return radii
 
 

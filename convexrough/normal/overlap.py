@@ -1,6 +1,6 @@
 """Bounds on the convexity of crowded contacts, by overlapping shells about the asperities.
 
-docs/theory/crowded.md, "Shells that overlap". Local stiffnesses h are given as lengths
+docs/theory/crowded.md, "Shells that overlap". Local compliances h are given as lengths
 t_i = 1 / (pi E* h_i). For distances r_ij, any radii s_i, and the energy U_ij of two shells of
 charge 1 with these radii, the matrix
 
@@ -22,8 +22,9 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and the largest
-#: decrease of radii to a neighbour, over its distance. Heuristics: any radii give valid bounds.
+#: Radii of shells over t, the cheapest first; a factor that widens the shells of nearly singular
+#: pairs; and the largest difference of the radii of two neighbours, over their distance.
+#: Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -32,7 +33,7 @@ NEAREST = 8
 #: Largest number of pairs of shells for each asperity, limited by memory.
 MOST_PAIRS = 200
 
-#: Shells wider than this many times the median are searched one by one. It affects speed only.
+#: Overlaps of shells wider than this many times the median are searched one by one, for speed only.
 WIDE = 2.0
 
 #: Largest number of asperities: an elimination takes 5 s at 100,000, and a proof needs several.

@@ -42,7 +42,7 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Weight of the contact radii in the sizes of fitted shells; the rest is half the distances. A
+#: Weight of contact radii in the radii of fitted shells; half the distances have the rest. A
 #: heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which box", 3).
 FITTED = 0.9
 
@@ -261,7 +261,7 @@ class NormalProblem:
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
-        """The problem in which all but some of the candidates carry no load."""
+        """The problem in which only these candidates may carry loads."""
         return replace(
             self,
             candidates=self.candidates[which],
@@ -292,7 +292,7 @@ class NormalProblem:
     def fitted_to(self, loads: Array) -> NormalProblem:
         """The same problem, with the largest shells that neighbours with these loads allow."""
         with np.errstate(divide="ignore"):
-            radii = (np.pi / 2.0) * self.influence.scale / self.stiffness(loads)
+            radii = (np.pi / 2.0) * self.influence.scale / self.compliance(loads)
         shells = fitted_shells(self.influence, radii, FITTED)
         return replace(self, shells=shells)
 
@@ -323,7 +323,7 @@ class NormalProblem:
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
 
-    def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
+    def compliance(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
         """(n,) h_i = (2/3) k_i P_i^(-1/3), the local part of the Hessian; it is 1 / (2 E* a_i)."""
         with np.errstate(divide="ignore"):
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
@@ -345,11 +345,11 @@ class NormalProblem:
 
     def convexity_number(self, loads: Array) -> float:
         """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
-        return float(self.convexity_at(self.stiffness(loads)))
+        return float(self.convexity_at(self.compliance(loads)))
 
-    def convexity_at(self, stiffness: Array) -> Any:
-        """The `convexity_number` at loads with this stiffness; (m, 1) for rows."""
-        return largest(self.shells / stiffness) * (1 + SAFETY)
+    def convexity_at(self, compliance: Array) -> Any:
+        """The `convexity_number` at loads with this compliance; (m, 1) for rows."""
+        return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
         """(n,) the offsets as pairs of float64 numbers: z - r^2 / (2 R), by axes."""
@@ -403,6 +403,6 @@ def _even_coefficient(tip: float, *constants: Any) -> Ball:
 
 
 def _middle(values: Array) -> float:
-    """About the median of the values, from a thousand of them."""
+    """The approximate median of the values, from a thousand of them."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])

@@ -56,7 +56,7 @@ class Proved:
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
     distance  : bound on || P - P* ||_H
-    stiffness : (n,) diagonal of H
+    compliance : (n,) diagonal of H
     loads, indentation : (n,) of the solution; negative indentations are gaps
     approach  : of the solution
     """
@@ -65,7 +65,7 @@ class Proved:
     trial: Trial
     box: Box
     distance: float
-    stiffness: Array
+    compliance: Array
     loads: Ball
     indentation: Ball
     approach: Ball
@@ -84,13 +84,13 @@ class Proved:
     def total(self) -> Ball:
         """The sum of the loads, with an error bound by Cauchy's inequality."""
         trial = Ball.exact(self.trial.loads).sum()
-        spread = self.distance * math.sqrt(float((1.0 / self.stiffness).sum())) * (1 + SAFETY)
+        spread = self.distance * math.sqrt(float((1.0 / self.compliance).sum())) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
         """(m,) bounds on the errors of A P at the m points to which `coupling` maps loads."""
         missing = self.trial.missing.size * self.problem.largest_entry
-        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
+        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
 
 
@@ -148,8 +148,8 @@ def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
     """(n,) bounds on the errors of the trial loads, valid if the box holds the solution."""
     missing = _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
-    within = distance(residual, box.stiffness, 1.0 - box.convexity_number)
-    return missing.errors(within, box.stiffness)
+    within = distance(residual, box.compliance, 1.0 - box.convexity_number)
+    return missing.errors(within, box.compliance)
 
 
 def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
@@ -157,7 +157,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     missing = _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
     near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
-    h = problem.stiffness(near)
+    h = problem.compliance(near)
     margin = 1.0 - np.minimum(box.convexity_number, box.problem.convexity_at(h))
     within = distance(residual, h, margin)
     errors = missing.errors(within, h)
@@ -176,7 +176,7 @@ class Known(NamedTuple):
     """The computed fields of `Proved`."""
 
     distance: Any
-    stiffness: Array
+    compliance: Array
     loads: Ball
     indentation: Ball
     approach: Ball
@@ -206,8 +206,8 @@ class _Missing(NamedTuple):
         known = part <= 0.5
         return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
 
-    def errors(self, within: Any, stiffness: Array) -> Array:
-        return np.asarray(within / np.sqrt(stiffness) * (1 + SAFETY) + self.loads)
+    def errors(self, within: Any, compliance: Array) -> Array:
+        return np.asarray(within / np.sqrt(compliance) * (1 + SAFETY) + self.loads)
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
@@ -229,13 +229,14 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
     """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
 
-    If none is: D0* is at most this where gaps are not negative, and touching begins at -max d.
+    If none is: D0* is at most this at every asperity, as gaps are not negative, and at least the
+    approach -max d at which contact begins.
     """
     if problem.load is None:
         return state.approach.radius
     least, exact = state.loads.high - errors, problem.exact
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
-    slope = problem.stiffness(np.where(least > 0, least, 1.0))
+    slope = problem.compliance(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
     above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
     above = np.where(box.fixed_open, np.inf, above)

@@ -113,11 +113,11 @@ class Stack:
         """(m, n) A P of other loads, to about thirty digits."""
         return self.product(others)
 
-    def convexity_at(self, stiffness: Array) -> Array:
-        """(m, 1) convexity numbers at loads with this stiffness."""
-        return np.asarray(largest(self.shells / stiffness) * (1 + SAFETY))
+    def convexity_at(self, compliance: Array) -> Array:
+        """(m, 1) convexity numbers at loads with this compliance."""
+        return np.asarray(largest(self.shells / compliance) * (1 + SAFETY))
 
-    def stiffness(self, loads: Array) -> Array:
+    def compliance(self, loads: Array) -> Array:
         """(m, n) h = (2/3) k P^(-1/3)."""
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 

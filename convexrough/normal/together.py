@@ -61,7 +61,7 @@ class Solved:
     box: Box
     good: NDArray[np.bool_]
     distance: Array
-    stiffness: Array
+    compliance: Array
     loads: Ball
     indentation: Ball
     approach: Ball
@@ -77,8 +77,12 @@ class Solved:
     def total(self) -> Ball:
         """(m,) the total load of each row."""
         trial = Ball.exact(self.trial.loads).sum()
+<<<<<<< HEAD
         with np.errstate(invalid="ignore"):  # only rows that are not good: no least stiffness
             spread = self.distance * np.sqrt(summed(1.0 / self.stiffness)) * (1 + SAFETY)
+=======
+        spread = self.distance * np.sqrt(summed(1.0 / self.compliance)) * (1 + SAFETY)
+>>>>>>> main
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
@@ -90,7 +94,7 @@ class Solved:
             Trial(of, *own, it.approach[k, 0], it.missing[k, 0]),
             self.box,
             float(self.distance[k, 0]),
-            self.stiffness[k],
+            self.compliance[k],
             self.loads[k],
             self.indentation[k],
             self.approach[k, 0],
@@ -207,6 +211,6 @@ def widest(stack: Stack, state: Trial) -> Box:
     depth = np.maximum(highest + stack.exact.offsets.upper, 0.0)
     alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
     corner = np.maximum(alone, state.loads.high)
-    h = stack.stiffness(corner)
+    h = stack.compliance(corner)
     nowhere, none = np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
     return Box("global", stack, corner, h, stack.convexity_at(h), nowhere, none)

@@ -13,8 +13,8 @@ from convexrough.errors import InputError
 class Units:
     """Scaled units of length and force: numbers of a problem are about 1 in them.
 
-    They are powers of two of the scene's units, that of force a power of eight, so that scaling a
-    float64 number (and its 2/3 power) is exact.
+    They are the units of the scene times powers of two (for force, of eight), so that scaling a
+    float64 number, or its 2/3 power, is exact.
     """
 
     length: float  # [length] of approach

@@ -176,7 +176,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     if form == "bristles":
         rows = BristleProgram.assemble(problem, bristles, form)
         if len(beyond := np.flatnonzero(rows.cut & (own >= rows.box))):
-            ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
+            ratios = problem.shells[beyond] / problem.compliance(own[beyond], beyond)
             raise TooDenseError(form, problem.candidates[beyond], ratios, LARGEST_S)
         data = rows.apply()
         try:
@@ -211,7 +211,7 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
         boxes = ConeBoxes.choose(problem, five=five)
         if not (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
             return boxes
-    theta = problem.shells / problem.stiffness(own)
+    theta = problem.shells / problem.compliance(own)
     raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
 
 
@@ -243,7 +243,7 @@ def _bristle_error(rows: BristleProgram, own: Array) -> float:
 def scaled_eigenvalues(problem: NormalProblem, own: Array) -> Array:
     """Ascending eigenvalues of the touching asperities' Hessian, scaled to a diagonal of 1."""
     touching = np.flatnonzero(own)
-    root = np.sqrt(1.0 / problem.stiffness(own[touching], touching))
+    root = np.sqrt(1.0 / problem.compliance(own[touching], touching))
     scaled = problem.influence.matrix[np.ix_(touching, touching)] * root * root[:, None]
     np.fill_diagonal(scaled, 1.0)
     return np.asarray(np.linalg.eigvalsh(scaled))

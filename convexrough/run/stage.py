@@ -1,8 +1,8 @@
 """Base classes of stages and of their results.
 
-A stage is a table of the scene file that requests a result, with its checks. It computes the
-result from a pressed contact; printed lines, tables, figures and the summary are derived from the
-result. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
+A stage is a table of the scene file that requests a result, and checks its own keys. It computes
+the result from a pressed contact; printed lines, tables, figures and the summary are derived from
+it. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
 an entry in `STAGES` there; docs/architecture.md shows an example with 40 lines.
 """
 
@@ -56,7 +56,7 @@ MOST_PRINTED = 20
 
 
 class Stage(FileTable):
-    """A table of the scene file that requests a result from a pressed contact, with its checks.
+    """A table of the scene file that requests a result of a pressed contact, and checks itself.
 
     name       : name of the table
     frictional : True if it needs the table [friction]
@@ -112,9 +112,9 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, else the attribute `name` of `found`.
+    """The number of asperities with the status `name`; if it is no status, the attribute.
 
-    An attribute that `found` lacks is that of `found.certificate`.
+    The attribute is that of `found`, or of `found.certificate` where `found` has none.
     """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)
@@ -135,8 +135,8 @@ class Result(Table, Plottable):
     found   : objects such as ShearState, one for each row, or one object with arrays along steps
 
     Subclasses set `printed` (headings of the printed columns, by key), `title` (of the printed
-    table), `digits` (of printed numbers) and `steps` (True if rows are steps: only the last are
-    printed).
+    table), `digits` (of printed numbers) and `steps` (True if rows are steps; then only the last
+    ones are printed).
     """
 
     printed: ClassVar[Mapping[str, str]] = {}

@@ -182,7 +182,7 @@ class Asperities(Record):
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
-    """[length] the largest random tip radius that `hexagonal` and `square` can produce."""
+    """[length] the largest random tip radius: random numbers are cut at CUT_DEVIATIONS."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
     return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
 

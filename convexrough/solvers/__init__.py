@@ -55,5 +55,5 @@ def _short(solver: object) -> str:
         return f"the class {solver.__name__}"
     if isinstance(solver, str):
         return repr(solver)
-    lacking = "" if callable(getattr(solver, "solve", None)) else ", which has no method solve"
-    return f"type {type(solver).__name__}{lacking}"
+    missing = "" if callable(getattr(solver, "solve", None)) else ", which has no method solve"
+    return f"type {type(solver).__name__}{missing}"

@@ -10,7 +10,7 @@ with integrals over 0 <= x <= b, for every P whose contact radius is at most b. 
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
 cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
 In scaled units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
-h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its stiffness, and phi_ij m times the force on cell j:
+h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its compliance, and phi_ij m times the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
@@ -62,7 +62,7 @@ LARGEST_S = 0.99
 #: matrix is definite. A heuristic, far above rounding.
 MARGIN = 0.001
 
-#: Smallest box over the largest. A heuristic: smaller loads need not be resolved, and stiffnesses,
+#: Smallest box over the largest. A heuristic: smaller loads need not be resolved, and compliances,
 #: proportional to load^(-1/3), differ by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
@@ -146,7 +146,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
-        h, depth = problem.stiffness(self.box), hertz.indentation(self.box, problem.coefficients)
+        h, depth = problem.compliance(self.box), hertz.indentation(self.box, problem.coefficients)
         cell = np.arange(1, m + 1)
         profile = depth[:, None] * (cell**2 - cell + 1 / 3) / m**2
         prescribed = problem.offsets + (problem.approach or 0.0)
@@ -176,13 +176,13 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         """
         problem, n, m = self.problem, len(self.problem), self.m
         P, e = raw.x[:n], raw.x[n:].reshape(n, m)
-        pushed = raw.multipliers[: n * m].reshape(n, m) * m / problem.stiffness(self.box)[:, None]
+        pushed = raw.multipliers[: n * m].reshape(n, m) * m / problem.compliance(self.box)[:, None]
         loads = np.maximum(P[:, None] + e + pushed, 0.0).mean(axis=1)  # pushed is not positive
         approach = -float(raw.multipliers[-1]) if problem.approach is None else problem.approach
         if problem.load is not None:
             loads = loads * (problem.load / loads.sum())
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
-            ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
+            ratios = problem.shells[beyond] / problem.compliance(loads[beyond], beyond)
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
         return ProgramAnswer(loads, approach, raw.iterations)
 
@@ -214,10 +214,10 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
     """A + diag(h) on the box; None unless Cholesky's method finds it definite with `MARGIN`."""
-    root = np.sqrt(1.0 / problem.stiffness(box))
+    root = np.sqrt(1.0 / problem.compliance(box))
     scaled = problem.influence.matrix * root * root[:, None]
     np.fill_diagonal(scaled, 1.0 - MARGIN)
     if not is_definite(scaled):
         return None
-    hessian: Array = problem.influence.matrix + np.diag(problem.stiffness(box))
+    hessian: Array = problem.influence.matrix + np.diag(problem.compliance(box))
     return hessian

@@ -93,7 +93,7 @@ class ConeBoxes:
         with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
             faces = (2.0 / 3.0 * limit * k / problem.shells[members]) ** 3
         loads = np.minimum(WIDENED**3 * bounds, faces)
-        S = problem.shells[members] / problem.stiffness(loads, members)
+        S = problem.shells[members] / problem.compliance(loads, members)
         return cls(members, loads, S, faces < bounds, five, limit)
 
     def energies(self, problem: NormalProblem) -> Array:
@@ -190,7 +190,7 @@ def judged(
     loads = np.where(indentation > 0, loads, 0.0)
     if solver.newton_step:
         step = _after_newton_step(solver, problem, loads, alone)
-        theta = problem.shells / problem.stiffness(step.loads)
+        theta = problem.shells / problem.compliance(step.loads)
         if (theta >= FIVE_CONES_LIMIT).any():
             beyond = np.where(theta < 1, 0.0, theta)[boxes.members]
             raise boxes.too_dense(problem, solver.name, beyond)
@@ -225,7 +225,7 @@ def _after_newton_step(
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
     Each asperity starts from the more accurate of the two, also where a load is almost 0.
     """
-    light = problem.stiffness(loads) > problem.influence.apply(np.ones(len(problem)))
+    light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)
     for steps in (1, 2):
         step = newton_step(problem, loads)

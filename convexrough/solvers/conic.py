@@ -1,8 +1,8 @@
 """The contact law as one second-order cone program, solved with Clarabel.
 
-It is (1) of docs/theory/exact-cones.md: D = D0 + d is the approach (under a prescribed load an
-upper bound on it) plus the offsets, and M = A + diag(shells). The solution satisfies the contact
-law.
+docs/theory/exact-cones.md states the program (1) and proves that its solution satisfies the contact
+law. `NormalProblem.shells` are the sigma_i there; D is the approach, or an upper bound on it if the
+load is prescribed, plus the offsets.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Conic(ConeSolver):
 class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are p, then y2 to y5 and z (with five cones y1 to y5 and z), in blocks of n.
+    The variables are p, y2 to y5 and z, in blocks of n. The form with five cones has y1 before y2.
     """
 
     problem: NormalProblem

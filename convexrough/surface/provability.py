@@ -79,7 +79,7 @@ class Provability(Table, Plottable):
 
     @property
     def trusted_from(self) -> float:
-        """The weakest pruning from which on all are trusted; nan if the strongest is not."""
+        """The smallest pruning such that this and all larger ones are trusted; nan if none is."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")

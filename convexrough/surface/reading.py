@@ -28,7 +28,7 @@ HEIGHTS = ("heights", "height", "z")
 SLOPES = (1e-5, 10.0)
 
 #: Numbers that mark holes, if they differ from the median of all other heights by more than FAR
-#: times the range of these; and the size from which on any such number marks a hole.
+#: times the range of these; and the size from which a number marks a hole always.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference up to which two pixel sizes count as equal.

@@ -69,7 +69,7 @@ def sweep(
     interruptions. The row of a failed scene has the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice with the same scenes, or if no worker is left.
+    workers died twice while computing the same scenes, or if none is left.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)

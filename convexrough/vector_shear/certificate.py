@@ -64,7 +64,7 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
 
 def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    sure, softness = problem.sure, problem.softness
+    sure, stiffness = problem.sure, problem.stiffness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
 
@@ -87,11 +87,11 @@ def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> Ve
 
     # 3. and 4. The residual, and the theorem.
     residual = np.where(sure, off + reach @ moved, 0.0)
-    within = distance(residual, 1.0 / softness, problem.margin)
-    distances = within * np.sqrt(softness) + moved
+    within = distance(residual, 1.0 / stiffness, problem.margin)
+    distances = within * np.sqrt(stiffness) + moved
 
     # 5. The displacement.
-    coupled = within * np.sqrt(reach**2 @ np.where(sure, softness, 0.0)) + reach @ moved
+    coupled = within * np.sqrt(reach**2 @ np.where(sure, stiffness, 0.0)) + reach @ moved
     turned = (off + coupled) * (1 + SAFETY)
     carried = float(np.where(sure, _steepest(problem, size - turned) * turned, 0.0).sum())
     displacement_error = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))

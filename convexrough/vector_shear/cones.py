@@ -1,7 +1,7 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
 docs/theory/vector-friction.md, "Cones", derives it, with t from |q| / P = 1 - t^3, u = 1 - t, the
-share S of the shift in the local stiffness, and epsilon, the elastic estimate of |q| / P. The
+share S of the shift in the local compliance, and epsilon, the elastic estimate of |q| / P. The
 solver's variables are those of order u^k over epsilon^k, and q over epsilon P. The multiplier of
 the total is the rigid displacement; that of |q_i| <= P_i (1 - t^3) is the sum of the slip and of
 the slope of the local energy.
@@ -238,7 +238,7 @@ def _too_dense(problem: VectorProblem) -> SolverError:
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(
         f"too dense for a convex program: the least shift of the tangential kernel is "
-        f"{problem.shift.shares.max():.4g} of the local stiffness, and at most 1 is convex. "
+        f"{problem.shift.shares.max():.4g} of the local compliance, and at most 1 is convex. "
         f"Largest convexity numbers, contact radii over (pi/4) times the distance to the nearest "
         f"neighbour, by their indices: {named}",
         solver="friction (conic)",

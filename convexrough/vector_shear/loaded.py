@@ -42,7 +42,7 @@ class Loaded:
     influence : operator A;  shells : added to its diagonal they make it positive semidefinite
     sure     : True where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
-    softness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
+    stiffness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
     stray    : bound on the total load of all asperities that are neither sure nor proved open
     stray_effect : bound on the displacement of any asperity by this load
     """
@@ -60,7 +60,7 @@ class Loaded:
     sure: NDArray[np.bool_]
     load_balls: Ball
     threshold_balls: Ball
-    softness: Array
+    stiffness: Array
     stray: float
     stray_effect: float
 
@@ -101,7 +101,7 @@ class Loaded:
             sure=sure,
             load_balls=where(sure, P, nothing),
             threshold_balls=where(sure, thresholds, nothing + 1.0),
-            softness=np.where(sure, (1.5 * P.cbrt() / k).upper, 0.0),
+            stiffness=np.where(sure, (1.5 * P.cbrt() / k).upper, 0.0),
             stray=stray,
             stray_effect=stray * level.problem.largest_entry * (1 + SAFETY) if stray else 0.0,
         )

@@ -48,7 +48,7 @@ class VectorState(NamedTuple):
 class Shift(NamedTuple):
     """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
 
-    shares : (n,) S_i = values_i / h_i with the least local stiffness h_i; the energy is convex if
+    shares : (n,) S_i = values_i / h_i with the least local compliance h_i; the energy is convex if
         all S_i <= 1: docs/theory/vector-friction.md, "Convexity"
     """
 
@@ -87,7 +87,7 @@ class VectorProblem(Loaded):
         return cls(**known, bias=bias, kernel=kernel.reshape(2 * n, 2 * n))
 
     @property
-    def stiffness(self) -> Array:
+    def compliance(self) -> Array:
         """(n,) h_i = (2/3) threshold_i / P_i; the local Hessian is at least h_i I."""
         h: Array = (2.0 / 3.0) * self.thresholds / self.loads
         return h
@@ -95,7 +95,7 @@ class VectorProblem(Loaded):
     @property
     def convexity_numbers(self) -> Array:
         """(n,) a_i / ((pi/2) s_i), with s_i half the distance to the nearest loaded asperity."""
-        numbers: Array = self.shells / self.stiffness
+        numbers: Array = self.shells / self.compliance
         return numbers
 
     @property
@@ -164,21 +164,21 @@ class VectorProblem(Loaded):
         nu = 2.0 * self.bias / (1.0 + self.bias)
         factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
         by_distance = factor * self.shells
-        shares = by_distance / self.stiffness
+        shares = by_distance / self.compliance
         if shares.max() <= 21 / 25:
             return Shift(by_distance, shares)
-        root = np.repeat(1.0 / np.sqrt(self.stiffness), 2)
+        root = np.repeat(1.0 / np.sqrt(self.compliance), 2)
         lowest = float(np.linalg.eigvalsh(self.kernel * root * root[:, None])[0])
         equal = np.full(len(self), max(-lowest, 0.0) + 1e-14 * (1 + len(self)))
-        return Shift(equal * self.stiffness, equal)
+        return Shift(equal * self.compliance, equal)
 
     @cached_property
     def margin(self) -> float:
         """A proved mu > 0 with I + H^-1/2 B H^-1/2 >= mu I for the true loads; 0 if none is found.
 
-        H = diag(h_i) of `stiffness`. Asperities not proved to touch are left out.
+        H = diag(h_i) of `compliance`. Asperities not proved to touch are left out.
         """
-        root = np.repeat(np.sqrt(self.softness), 2)
+        root = np.repeat(np.sqrt(self.stiffness), 2)
         scaled = self.kernel * root * root[:, None]
         return proved_margin(scaled, MARGINS, self.product_error + 8 * ROUNDOFF, spare=SAFETY)
 

@@ -1,7 +1,7 @@
 """Order is proved where no indentation falls, and never where one is seen to.
 
-The judges are the levels in between, and the rates (I + A C)^-1 1 of numpy at softnesses within the
-bounds that the proof speaks of.
+The judges are the levels in between, and the rates (I + A C)^-1 1 of numpy at stiffnesses within
+the bounds of the proof.
 """
 
 from fractions import Fraction

@@ -178,7 +178,7 @@ def test_cycles_below_and_above_melans_limit(kind: str) -> None:
             PAPER, loads=P, forces=0.5 * mean[0], force_amplitudes=0.5 * swing[:, 0], kind="elastic"
         )
         kernel = np.kron(problem.influence.matrix, np.eye(2))
-    K = kernel + np.diag(np.repeat(problem.stiffness, 2))
+    K = kernel + np.diag(np.repeat(problem.compliance, 2))
     unit = problem.units.force
     slid = {}
     for part in (0.99, 1.01):

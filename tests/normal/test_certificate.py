@@ -178,7 +178,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
         touching = box_of_touching(problem, loads, loads > 0, room * loads)
         boxes += [] if touching is None else [touching]
     for box in boxes:
-        root = 1 / np.sqrt(box.stiffness)  # 0 where fixed open
+        root = 1 / np.sqrt(box.compliance)  # 0 where fixed open
         hessian = np.eye(len(scene)) + root[:, None] * problem.influence.matrix * root
         assert np.linalg.eigvalsh(hessian)[0] >= 1 - box.convexity_number - 1e-12
 
@@ -190,7 +190,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     points = rng.uniform(-1, 1, (12, 2)) * 1e-2
     scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
     problem = NormalProblem.assemble(scene, approach=1e-4)
-    h = problem.stiffness(problem.bounds(problem.approach_bound) * size)
+    h = problem.compliance(problem.bounds(problem.approach_bound) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
     margin = convex_margin(problem.influence, h, MARGINS)
     smallest = np.linalg.eigvalsh(hessian)[0]

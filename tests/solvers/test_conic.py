@@ -94,7 +94,7 @@ def test_too_dense_is_refused(solver: Any, control: str) -> None:
     scene = hexagonal(1, tip_radius=0.6)
     problem = problem_of(scene, PAPER_APPROACH, control)
     loads = Newton().solve(problem).loads
-    theta = problem.shells / problem.stiffness(loads)
+    theta = problem.shells / problem.compliance(loads)
     with pytest.raises(TooDenseError, match=r"0 \(1\.\d+\).*expected less than 1$") as refusal:
         solver.solve(problem)
     assert isinstance(refusal.value, cr.ConvexroughError)

@@ -67,7 +67,7 @@ def test_too_dense_for_a_convex_program() -> None:
     assert contact.crowding > 1
     force = 0.1 * FRICTION * contact.load
     expected = (
-        r"too dense.* is 1\.\d+ of the local stiffness.*convexity numbers.*: \d+ \(\d\.\d+\), "
+        r"too dense.* is 1\.\d+ of the local compliance.*convexity numbers.*: \d+ \(\d\.\d+\), "
     )
     with pytest.raises(cr.SolverError, match=expected) as caught:
         shear_vector(contact, force=force, solver=FrictionConic())
