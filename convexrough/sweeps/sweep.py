@@ -142,7 +142,7 @@ def run(
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
-    """The parts that job k of n computes, as scenes; without `part`, all."""
+    """The parts that job k of n computes, each as a range of scenes; without `part`, all."""
     k, n = part or (1, 1)
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
