@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,12 +66,15 @@ def between(what: str, value: float | None, low: float, high: float) -> float:
 
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
     """A float64 copy, of any shape; raises InputError for text, dates and complex numbers."""
+    if isinstance(values, np.ma.MaskedArray) and values.mask.any():
+        found = f"{values.mask.sum()} masked values"
+        raise InputError(what, found=found, expected=f"{expected} without gaps")
     try:
         if np.asarray(values).dtype.kind not in "biufO":
             raise TypeError("no real numbers")
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(what, found=repr(values)[:60], expected=expected) from error
+        raise InputError(what, found=_short(values), expected=expected) from error
 
 
 def array(
@@ -111,6 +114,12 @@ def array(
     return vector
 
 
+def some(what: str, values: Sized) -> None:
+    """Raise InputError for an empty list."""
+    if len(values) == 0:
+        raise InputError(what, found="none", expected="at least one")
+
+
 def friction(coefficient: float | None) -> float:
     """The coefficient of friction f; raises InputError if the scene has none."""
     if coefficient is None:
@@ -145,6 +154,12 @@ def instance(what: str, value: object, kind: type) -> None:
         name = kind.__name__  # "Asperities" has no article
         article = "" if name.endswith("s") else "an " if name[0] in "AEIOU" else "a "
         raise InputError(what, found=found, expected=article + name)
+
+
+def _short(value: object) -> str:
+    """One line about a value in an error message."""
+    text = repr(value)
+    return f"type {type(value).__name__}" if "\n" in text else text[:60]
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:

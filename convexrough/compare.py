@@ -7,6 +7,7 @@ scope may differ: each box may contain a solution of its own.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -14,6 +15,8 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
+from pathlib import Path
+from traceback import extract_tb
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -215,7 +218,10 @@ def _enter(
     except Exception as error:  # a user's solver may raise anything
         if type(solver).__module__.startswith("convexrough."):
             raise
-        return Entry(solver.name, "failed", f"{type(error).__name__}: {error}")
+        file = getattr(sys.modules[type(solver).__module__], "__file__", None)
+        places = [each for each in extract_tb(error.__traceback__) if each.filename == file]
+        place = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
+        return Entry(solver.name, "failed", f"{type(error).__name__}: {error}{place}")
     risen = memory.risen()
     if reference is None:
         reference = contact if solver == _REFERENCE else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -121,9 +121,14 @@ class Contact(Cached, Table, Plottable):
         from convexrough.proof import NearState, prove, refuse_many  # a higher layer
 
         refuse_many(self.scene)
+        given = sheared if isinstance(sheared, Iterable) else [sheared]
+        for k, state in enumerate(given):
+            if not hasattr(state, "force"):
+                expected = "a shear state, a result of `shear`"
+                raise InputError(f"sheared[{k}]", found=repr(state)[:60], expected=expected)
         by_load, n = self.prescribed_load is not None, len(self.scene)
         levels, states = self.cached(levels_of), []
-        for state in sheared:
+        for state in given:
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
             level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
             states.append((state.force, NearState.of(level, n)))

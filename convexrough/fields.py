@@ -25,6 +25,7 @@ BLOCK = 2**14
 
 def peak_pressures(contact: Contact) -> Array:
     """(n,) [force / length^2] p0_i = 2 E* a_i / (pi R_i) with relative radii R_i, 0 where open."""
+    checks.instance("contact", contact, Contact)
     scene = contact.scene
     peaks: Array = hertz.peak_pressure(
         contact.contact_radii, scene.material.contact_modulus, scene.relative_radii
@@ -38,6 +39,7 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     The sum is over discs that contain the point r. Their centres are the contact points of the
     scene: the summits, or in the "closest" geometry the points where the paraboloids first touch.
     """
+    checks.instance("contact", contact, Contact)
     touching = np.flatnonzero(contact.loads)
     return superpose(
         points,

@@ -6,7 +6,7 @@ in this way are pressed one by one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks, threads
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, press
-from convexrough.errors import InputError
+from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle, cycle
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -177,6 +177,9 @@ def press_many(
     """
     checks.exactly_one("approach", approach, "load", load)
     by_load = load is not None
+    if not isinstance(scenes, Iterable):
+        found = f"type {type(scenes).__name__}"
+        raise InputError("scenes", found=found, expected="a list of scenes")
     scenes = tuple(scenes)
     for k, scene in enumerate(scenes):
         checks.instance(f"scenes[{k}]", scene, Scene)
@@ -198,7 +201,11 @@ def press_many(
             fields[found][each.places] = values
     known = dict[int, Contact]()
     for k in np.flatnonzero(alone).tolist():
-        one = known[k] = _pressed(scenes[k], name, controls[k])
+        try:
+            one = known[k] = _pressed(scenes[k], name, controls[k])
+        except SolverError as error:
+            what, solver, advice = f"scenes[{k}]: {error.what}", error.solver, error.advice
+            raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the roundoff of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error

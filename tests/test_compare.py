@@ -126,7 +126,9 @@ def test_solvers_that_do_not_answer() -> None:
         assert np.isnan(entry.disagreement)
         assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
     assert answered.outcome == "answered"
-    assert [(entry.outcome, entry.message) for entry in wrong] == [
+    assert [
+        (entry.outcome, entry.message.partition(" (test_compare.py:")[0]) for entry in wrong
+    ] == [
         ("failed", "ValueError: boom"),
         ("failed", "empty: returned NoneType, expected a Solution"),
     ]
@@ -287,6 +289,18 @@ class Zero:
         return replace(found, loads=0 * found.loads, refine=False, trial=None)
 
 class NoSolver: ...
+class NoName:
+    def solve(self, problem, start=None): ...
+class Short:
+    name = "short"
+    def solve(self, problem, start=None):
+        from convexrough.solvers import Solution
+        import numpy as np
+        return Solution.of(problem, np.ones(3), 1.0, 1)
+class Crash:
+    name = "crash"
+    def solve(self, problem, start=None):
+        return 1 / 0
 class Needs:
     def __init__(self, what): ...
 """
@@ -309,11 +323,16 @@ def test_a_solver_of_ones_own_by_its_name(
         ("desk_solvers.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),
         ("desk_solvers.Needs", "missing 1 required .* of a solver that needs no arguments"),
-        ("desk_solvers.NoSolver", "NoSolver object at .* expected one of"),
+        ("desk_solvers.NoSolver", "found type NoSolver, which has no method solve, expected one"),
+        ("desk_solvers.NoName", "found type NoName, expected an attribute `name`"),
         ("newtom", "found 'newtom', expected one of"),
     ):
         wrong = command("compare", "scene.toml", "--solver", name)
         assert wrong.status == 2
         assert re.search(said, wrong.err)
+    for name, said in (("Short", "loads of shape (3,), expected ("), ("Crash", "zero (desk_solv")):
+        assert said in command("compare", "scene.toml", "--solver", f"desk_solvers.{name}").out
     profiled = command("gallery", "--profile", "few", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
+    mine = json.loads(profiled.out)["profile"][1]
+    assert mine["right"] == mine["contact set right"] == len(mine["outcomes"]) > 0

@@ -2,8 +2,11 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 from scenes import PAPER_APPROACH, paper
 
@@ -36,9 +39,9 @@ def test_every_public_name_is_there() -> None:
 
 
 def wrong(call: str) -> Any:
-    scene = paper()
+    scene = replace(paper(), friction=0.5)
     contact = cr.press(scene, approach=PAPER_APPROACH)
-    return eval(call, {"cr": cr, "scene": scene, "contact": contact})
+    return eval(call, {"cr": cr, "np": np, "pd": pd, "scene": scene, "contact": contact})
 
 
 @pytest.mark.parametrize(
@@ -67,6 +70,21 @@ def wrong(call: str) -> Any:
         ("cr.smooth(contact, load=1.0)", "expected a Scene"),
         ("cr.Material(youngs_modulus=2.0, poisson_ratio=0.3)", r"Material\.from_youngs\("),
         ("cr.Material(1.0)", "poisson_ratio: found None, expected a number from 0"),
+        ("cr.Asperities(pd.DataFrame({'y': [0.0], 'x': [1.0]}), 1.0)", "found columns y, x"),
+        ("cr.Asperities([[0, 0]], np.ma.masked_equal([1.0], 1.0))", "tip_radii: found 1 masked"),
+        ("cr.certify(scene, np.ma.masked_less(np.ones(61), 2), load=1.0)", "found 61 masked"),
+        ("cr.press(scene, approach=5e-5, start=contact)", "start: found type Contact, expected n"),
+        ("cr.cycle(contact, maximum=[1e-8, 2e-8])", "maximum: found shape .2,., expected one numb"),
+        ("cr.cycles(contact, [])", "maximum: found none, expected at least one"),
+        ("cr.cycles(contact, [1e-8, 2e-8], [1e-9])", "minimum: .*expected 2 values, one per max"),
+        ("cr.loops(cr.cycle(contact, maximum=1e-8))", "cycles: found type Cycle, expected a list"),
+        ("cr.load_path(contact, loads=[1], forces=[0])", "scene: found type Contact"),
+        ("cr.load_path(scene, loads=[1], forces=[0], start=scene)", "start: found type Scene"),
+        ("cr.shear_vector(contact, force=1e-8, solver='conic')", "solver: found 'conic', expected"),
+        ("cr.fields.pressure(scene, [[0, 0]])", "contact: found type Scene"),
+        ("cr.press_many(scene, load=1.0)", "scenes: found type Scene, expected a list of scenes"),
+        ("cr.read_scene(5)", "path: found 5, expected the name of a scene file"),
+        ("contact.proof(sheared=[1e-8])", r"sheared\[0\]: found 1e-08, expected a shear state"),
     ],
 )
 def test_wrong_types_are_said(call: str, said: str) -> None:

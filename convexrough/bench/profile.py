@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array, frozen
 from convexrough.compare import compare, every_solver
@@ -29,12 +30,14 @@ class Profile(Table):
     solvers : (k,) names;  cases : (m,) names
     seconds : (k, m) of right answers, infinite where a solver gave none
     outcomes : (k, m) "right", "wrong", "refused" or "failed"
+    sets : (k, m) True where exactly the asperities that touch have a load
     """
 
     solvers: tuple[str, ...]
     cases: tuple[str, ...]
     seconds: Array
     outcomes: tuple[tuple[str, ...], ...]
+    sets: NDArray[np.bool_]
 
     @property
     def ratios(self) -> Array:
@@ -49,18 +52,17 @@ class Profile(Table):
         part: Array = (self.ratios <= factor).mean(axis=1)
         return part
 
-    def rows(self) -> list[list[str]]:
-        """A heading, and a line for each solver: outcomes, and parts within `FACTORS`."""
-        outcomes = ("right", "wrong", "refused", "failed")
+    def rows(self) -> list[dict[str, str | int | float]]:
+        """For each solver the numbers of outcomes and of right sets, and parts within `FACTORS`."""
         parts = np.array([self.part(factor) for factor in FACTORS]).T
-        heading = ["solver", *outcomes, *(f"within {factor}x" for factor in FACTORS)]
-        return [heading] + [
-            [
-                solver,
-                *(str(said.count(outcome)) for outcome in outcomes),
-                *(f"{p:.0%}" for p in row),
-            ]
-            for solver, said, row in zip(self.solvers, self.outcomes, parts, strict=True)
+        return [
+            {"solver": solver}
+            | {outcome: said.count(outcome) for outcome in ("right", "wrong", "refused", "failed")}
+            | {"contact set right": int(sets.sum())}
+            | {f"within {factor}x": float(p) for factor, p in zip(FACTORS, row, strict=True)}
+            for solver, said, sets, row in zip(
+                self.solvers, self.outcomes, self.sets, parts, strict=True
+            )
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -79,8 +81,9 @@ class Profile(Table):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "cases", f"{len(self.cases):,}"
-        for solver, *cells in self.rows()[1:]:
-            yield solver, f"{cells[0]} right, {cells[-4]} within 2x of the fastest"
+        for row in self.rows():
+            known = f"{row['right']} right, {row['within 2x']:.0%} within 2x of the fastest"
+            yield str(row["solver"]), known
 
     def _variables(self) -> Variables:
         both = ("solver", "case")
@@ -89,6 +92,7 @@ class Profile(Table):
             "case": (("case",), np.array(self.cases)),
             "seconds": (both, self.seconds),
             "outcome": (both, np.array(self.outcomes)),
+            "set_right": (both, self.sets),
         }
 
 
@@ -108,6 +112,7 @@ def profile_of(
     wanted = names(*cases)
     seconds = np.full((len(others), len(wanted)), np.inf)
     outcomes = [[""] * len(wanted) for _ in others]
+    sets = np.zeros(seconds.shape, dtype=bool)
     for column, name in enumerate(wanted):
         LOGGER.info(name)
         hard = case(name)
@@ -115,7 +120,9 @@ def profile_of(
         for row, entry in enumerate(entries):
             outcomes[row][column] = entry.outcome
             if (found := entry.contact) is not None:
-                near = hard.check(found.loads).error <= within
+                checked = hard.check(found.loads, within=within)
+                near = checked.error <= within
+                sets[row, column] = len(checked.wrongly_open) + len(checked.wrongly_loaded) == 0
                 outcomes[row][column] = "right" if near else "wrong"
                 seconds[row, column] = found.seconds if near else np.inf
     return Profile(
@@ -123,4 +130,5 @@ def profile_of(
         cases=wanted,
         seconds=frozen(seconds),
         outcomes=tuple(map(tuple, outcomes)),
+        sets=frozen(sets),
     )

@@ -1,4 +1,4 @@
-"""`gallery`: hard scenes with their answers, listed or written for other solvers."""
+"""`gallery`: hard scenes with their answers, lines_of_cases or written for other solvers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def gallery(
 
     NAMES are names of cases or of families; default: all. --export writes each case as a quadratic
     program (.npz for qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index.
-    --profile computes a performance profile of all solvers, or of those given by --solver.
+    --profile computes a performance profile of all solvers, or of those given by --solver. Loads
+    are right if all errors are at most 0.1 % of the largest load; the contact set is right if
+    exactly the asperities that touch have a load.
     """
     from convexrough import gallery as wing
     from convexrough.atomic import write_text
@@ -48,19 +50,23 @@ def gallery(
         from convexrough.bench.profile import profile_of
 
         with progress("timing"):
-            table = profile_of(chosen or None, cases=wanted).rows()
-        found = [dict(zip(table[0], row, strict=True)) for row in table[1:]]
-        echo({"profile": found}, aligned(table, left=1), as_json)
+            found = profile_of(chosen or None, cases=wanted)
+        rows, reported = found.rows(), []
+        cells: list[list[str]] = [list(rows[0])]
+        for row, each in zip(rows, found.outcomes, strict=True):
+            cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
+            reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
+        echo({"profile": reported}, aligned(cells, left=1), as_json)
         return DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:
         heading = ["case", "family", "what is hard", "asperities", "touching"]
-        rows = [
+        lines_of_cases = [
             [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]
             for case in cases
         ]
-        lines = aligned([heading, *rows], left=3)
+        lines = aligned([heading, *lines_of_cases], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
         with results_folder(export, force=force) as new, progress("writing"):

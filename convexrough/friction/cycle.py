@@ -285,9 +285,12 @@ def cycle(
     >>> print(f"{cycle.loss:.4g}", (cycle.status == "sliding").sum())
     1.367e-13 6
     """
-    upper = None if maximum is None else [maximum]
-    lower = None if minimum is None else [minimum]
-    moved = None if displacement is None else [displacement]
+    given = {"maximum": maximum, "minimum": minimum, "displacement": displacement}
+    for name, value in given.items():
+        if value is not None and (shape := np.shape(value)):
+            expected = "one number; `cycles` computes several cycles"
+            raise InputError(name, found=f"shape {shape}", expected=expected)
+    upper, lower, moved = (None if value is None else [value] for value in given.values())
     return cycles(contact, upper, lower, displacement=moved)[0]
 
 
@@ -313,14 +316,16 @@ def cycles(
             expected = "no minimum: a cycle of given displacement is symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
+        checks.some("displacement", amplitudes)
         heights = [levels.load - levels.displaced(x) for x in amplitudes]
         ends = [(height, -height) for height in heights]
         return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
     assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
+    checks.some("maximum", upper)
     lower = -upper
     if minimum is not None:
-        lower = checks.array("minimum", minimum, length=len(upper))
+        lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
         lower = checks.bearable("minimum", lower, limit)
     if (upper < lower).any():
         i = int(np.argmax(upper < lower))
@@ -521,6 +526,9 @@ def loops(
     """
     if not isinstance(points, int) or points < 4:
         raise InputError("points", found=points, expected="a whole number, at least 4")
+    if not isinstance(cycles, Sequence):
+        expected = "a list of cycles; `Cycle.loop` is for one"
+        raise InputError("cycles", found=f"type {type(cycles).__name__}", expected=expected)
     if not cycles:
         return []
     contact = cycles[0].contact

@@ -172,8 +172,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
     Q = checks.bearable("forces", checks.array("forces", forces), f * contact.load)
-    if len(Q) == 0:
-        raise InputError("forces", found="none", expected="at least one")
+    checks.some("forces", Q)
     levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
     return _path(contact, Q, Walk(levels, MemoryCurve.pressed(levels.load), points))
@@ -189,11 +188,13 @@ def walk(
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """The result of `load_path`, with a choice of the solver of general steps."""
+    checks.instance("scene", scene, Scene)
     points = points_of(scene, loads, forces)
     if steps is not None and (not isinstance(steps, int) or steps < 1):
         raise InputError("steps", found=steps, expected="a whole number, at least 1")
     curve = MemoryCurve()
     if start is not None:
+        checks.instance("start", start, Contact)
         if start.scene is not scene:
             expected = "one of this scene"
             raise InputError("start", found="a contact of another scene", expected=expected)

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle, steady
 from convexrough.friction.order import Order
 from convexrough.friction.shapes import elliptic_path
@@ -105,8 +104,7 @@ def phase_losses(
     f = checks.friction(scene.friction)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     for what, values in (("phases", turns), ("factors", sizes)):
-        if len(values) == 0:
-            raise InputError(what, found="none", expected="at least one")
+        checks.some(what, values)
     for i, turn in enumerate(turns):
         checks.phase(f"phases[{i}]", turn)
     alone = _smooth_alone(scene, load)

@@ -13,6 +13,7 @@ from convexrough.gallery.cases import FRICTION, MATERIAL
 from convexrough.influence.choice import couple
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
+from convexrough.scene.patterns import checked_seed
 from convexrough.scene.scene import Scene
 
 
@@ -47,7 +48,7 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InputError("count", found=repr(count), expected="a positive whole number")
     part = checks.between("touching", touching, 0.0, 1.0)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(checked_seed(seed))
     patch = Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=0.6 * np.sqrt(count) + 1)
     tips = random.uniform(4.0, 8.0, count)
     flat = Asperities(patch.positions[:count], tips)

@@ -72,11 +72,14 @@ def _columns(matrix: csc_matrix) -> dict[str, Any]:
 def cone_npz(program: ConeProgram) -> bytes:
     """The file with the arrays of a cone program.
 
-    P_data, P_indices and P_indptr are the arguments of scipy's `csc_array` for the upper triangle
-    of P; A_data, A_indices and A_indptr those for A. q, b and `equalities` are as in the program.
+    P_data, P_indices and P_indptr are the arguments of scipy's `csc_array` for P, both triangles;
+    A_data, A_indices and A_indptr those for A. q, b and `equalities` are as in the program.
     """
-    parts: dict[str, Any] = {}
-    for name, matrix in (("P", program.quadratic), ("A", program.constraints)):
+    from scipy import sparse  # takes 0.1 s to import
+
+    upper, parts = program.quadratic, dict[str, Any]()
+    whole = sparse.csc_matrix(upper + sparse.triu(upper, 1).T)
+    for name, matrix in (("P", whole), ("A", program.constraints)):
         for part in ("data", "indices", "indptr"):
             parts[f"{name}_{part}"] = getattr(matrix, part)
     file = io.BytesIO()

@@ -73,13 +73,17 @@ class Program(Record):
     def loads(self, values: ArrayLike) -> Array:
         """(n,) [force] loads of all asperities of the scene, from a solver's solution.
 
-        values : the solution x; of the dual, the multipliers of its equations, in their order and
-            with either sign convention
+        values : the solution x, also with the bound on the objective that a file in CBF adds; of
+            the dual, the multipliers of its equations, in their order and with either sign
         """
-        m = len(self.asperities)
-        given = np.asarray(values, dtype=np.float64).ravel()
-        if len(given) < m:
-            raise InputError("values", found=f"{len(given)} numbers", expected=f"at least {m}")
+        m, data = len(self.asperities), self.data
+        given = checks.numbers("values", values).ravel()
+        valid = [len(data.linear), len(data.linear) + 1]
+        if isinstance(data, ConeProgram) and self.form == "dual":
+            valid = [data.equalities, len(data.constant)]
+        if len(given) not in valid:
+            expected = " or ".join(f"{each:,}" for each in valid)
+            raise InputError("values", found=f"{len(given):,} numbers", expected=expected)
         own = np.abs(given[:m]) if self.form == "dual" else np.maximum(given[:m], 0.0)
         loads = np.zeros(self.count)
         loads[self.asperities] = self.force_unit * own
@@ -88,7 +92,7 @@ class Program(Record):
     def energy(self, objective: float) -> float:
         """[force length] the energy that corresponds to a value of the objective."""
         sign = -1.0 if self.form == "dual" else 1.0
-        return self.energy_unit * (sign * objective + self.constant)
+        return self.energy_unit * (sign * checks.finite("objective", objective) + self.constant)
 
     def save(self, path: Path | str) -> None:
         """Write the program to a file, in the format of the file's ending.
@@ -146,7 +150,12 @@ def program(
     SolverError if Newton's method finds no solution to compare with.
     """
     checks.instance("scene", scene, Scene)
+    if not isinstance(bristles, int) or bristles < 1:
+        raise InputError("bristles", found=bristles, expected="a whole number, at least 1")
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
+    if len(problem) == 0:
+        expected = "an approach at which an asperity touches"
+        raise InputError("approach", found=approach, expected=expected)
     return stated(problem, Newton().solve(problem).loads, form, bristles)
 
 

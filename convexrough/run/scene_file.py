@@ -119,6 +119,8 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     """
     from convexrough.run.study import validate
 
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
     path = Path(path)
     text = read_text(path, MOST_BYTES)
     study, mistakes = validate(parsed(path, text))

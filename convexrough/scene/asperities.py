@@ -188,6 +188,9 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 
 def _points(positions: ArrayLike) -> Array:
+    names = [str(each) for each in getattr(positions, "columns", ("x", "y"))]  # a data frame
+    if sorted(names) == ["x", "y"] and names != ["x", "y"]:
+        raise InputError("positions", found="columns y, x", expected="columns x, y")
     points = checks.numbers("positions", positions)
     if points.size == 0:
         raise InputError("positions", found="no asperity", expected="at least one")

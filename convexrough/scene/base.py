@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from convexrough import checks
 from convexrough.errors import InputError
 
@@ -18,7 +20,7 @@ Radius: TypeAlias = float | tuple[float, float]
 
 def checked(radius: Any) -> Radius:
     """The radius, checked; a pair of equal radii becomes one number."""
-    if not isinstance(radius, (tuple, list)):
+    if np.ndim(radius) == 0:
         return _length("sphere_radius", radius)
     if len(radius) != 2:
         expected = "a number, or the two radii of an ellipsoid, along x and along y"

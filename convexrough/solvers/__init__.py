@@ -42,8 +42,18 @@ def named(solver: Solver | str | None) -> Solver:
     if isinstance(solver, str) and solver in SOLVERS:
         return SOLVERS[solver]()
     if isinstance(solver, (str, type)) or not callable(getattr(solver, "solve", None)):
-        found = f"the class {solver.__name__}" if isinstance(solver, type) else repr(solver)[:60]
         names = ", ".join(f'"{name}"' for name in SOLVERS)
         expected = f"one of {names}, or settings such as solvers.Newton()"
-        raise InputError("solver", found=found, expected=expected)
+        raise InputError("solver", found=_short(solver), expected=expected)
+    if not isinstance(getattr(solver, "name", None), str):
+        raise InputError("solver", found=_short(solver), expected="an attribute `name`, a text")
     return solver
+
+
+def _short(solver: object) -> str:
+    if isinstance(solver, type):
+        return f"the class {solver.__name__}"
+    if isinstance(solver, str):
+        return repr(solver)
+    missing = "" if callable(getattr(solver, "solve", None)) else ", which has no method solve"
+    return f"type {type(solver).__name__}{missing}"

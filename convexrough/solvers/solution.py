@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial
 from convexrough.record import Record
@@ -41,6 +42,8 @@ class Solution(Record):
         refine: bool = True,
     ) -> Solution:
         """A solution with the residual that the problem computes; infinite if it is undefined."""
+        if np.shape(loads) != (len(problem),):
+            raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)
         residual = np.inf if np.isnan(residual) else residual
         return cls(loads, approach, iterations, residual, refine)

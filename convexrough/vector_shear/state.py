@@ -23,6 +23,7 @@ from convexrough.friction.shear import ShearCertificate, shear
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.problem import VectorProblem, VectorState
@@ -108,6 +109,9 @@ def shear_vector(
     """
     checks.instance("contact", contact, Contact)
     solver = FrictionNewton() if solver is None else solver
+    if isinstance(solver, (str, type, Newton, Conic, ConicCVXPY, BristleQP)):
+        expected = "a solver of friction, such as FrictionNewton() or FrictionConic()"
+        raise InputError("solver", found=repr(solver)[:60], expected=expected)
     friction = checks.friction(contact.scene.friction)
     Q = _vector(force)
     size = float(checks.bearable("force", np.hypot(*Q), friction * contact.load))

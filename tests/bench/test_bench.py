@@ -177,11 +177,12 @@ def test_a_performance_profile() -> None:
     """Parts of the cases by time over the least; nothing that is not right counts."""
     seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
     texts = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
-    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts)
+    sets = np.array([[True, True, True, False]] * 2)
+    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts, sets)
     assert found.part(1.0).tolist() == [0.25, 0.5]
     assert found.part(2.0).tolist() == [0.5, 0.5]
     assert found.part(4.0).tolist() == [0.5, 0.75]
-    assert found.rows()[1][:6] == ["a", "2", "1", "0", "1", "25%"]
+    assert list(found.rows()[0].values())[:7] == ["a", 2, 1, 0, 1, 3, 0.25]
     assert [len(line.get_xdata()) for line in found.plot().lines] == [4, 4]
 
 

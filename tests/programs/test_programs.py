@@ -65,6 +65,7 @@ def by_scs(path: Path) -> tuple[Any, Any, float]:
     data = np.load(path)
     n, m = len(data["q"]), len(data["b"])
     given = {"P": matrix(data, "P", (n, n)), "A": matrix(data, "A", (m, n))}
+    assert abs(given["P"] - given["P"].T).max() == 0  # SCS itself reads the upper triangle only
     given |= {"b": data["b"], "c": data["q"]}
     equal = int(data["equalities"])
     cones = {"z": equal, "q": [3] * ((m - equal) // 3)}
@@ -131,8 +132,14 @@ def test_programs_that_are_not_made(tmp_path: Path) -> None:
     made = cr.program(SCENE, approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match=r"the ending '\.mps', expected one of \.cbf, \.json"):
         made.save(tmp_path / "scene.mps")
-    with pytest.raises(cr.InputError, match="found 3 numbers, expected at least 19"):
+    with pytest.raises(cr.InputError, match="found 3 numbers, expected 114 or 115"):
         made.loads([1, 2, 3])
+    with pytest.raises(cr.InputError, match="found 50 numbers, expected 114 or"):
+        cr.program(SCENE, "dual", approach=PAPER_APPROACH).loads(np.zeros(50))
+    with pytest.raises(cr.InputError, match="approach: found 0, expected an approach at which an"):
+        cr.program(SCENE, approach=0)
+    with pytest.raises(cr.InputError, match="bristles: found 0, expected a whole number"):
+        cr.program(SCENE, "bristles", approach=PAPER_APPROACH, bristles=0)
     with pytest.raises(cr.InputError, match=r'form: .* a form of program; did you mean "cones"'):
         cr.program(SCENE, "cone", approach=PAPER_APPROACH)  # type: ignore[arg-type]
     above = cr.gallery.case("convexity-end-above")
