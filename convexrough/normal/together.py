@@ -77,12 +77,8 @@ class Solved:
     def total(self) -> Ball:
         """(m,) the total load of each row."""
         trial = Ball.exact(self.trial.loads).sum()
-<<<<<<< HEAD
-        with np.errstate(invalid="ignore"):  # only rows that are not good: no least stiffness
-            spread = self.distance * np.sqrt(summed(1.0 / self.stiffness)) * (1 + SAFETY)
-=======
-        spread = self.distance * np.sqrt(summed(1.0 / self.compliance)) * (1 + SAFETY)
->>>>>>> main
+        with np.errstate(invalid="ignore"):  # only rows that are not good: no least compliance
+            spread = self.distance * np.sqrt(summed(1.0 / self.compliance)) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
