@@ -341,7 +341,10 @@ class State(NamedTuple):
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The only solution in the box, under this load, or if None, under the approach in `place`."""
+    """The only solution in the box, under this load, or if None, under the approach in `place`.
+
+    place : the table of the file with radii near the solution and the approach
+    """
     radii, centre = table(place, "radii", "approach")
     a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
@@ -437,8 +440,8 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     """An amount by which D0 can decrease from this state so that no indentation increases (11).
 
-    Let `missed` be minus the lower bound on the rate of each asperity. It must be negative for all
-    that may touch. The gap of any other must exceed the amount times `missed`, where positive.
+    `missed` is minus the lower bound on the rate of each asperity. It must be negative for all that
+    may touch. Where it is positive for others, their gaps must exceed it times the amount.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]

@@ -50,8 +50,8 @@ class Contact(Cached, Table, Plottable):
     approach      : D0 [length];  load : total [force]
     prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : leading relative error of the displacements at loaded asperities because point
-        forces replace pressures: the largest of `surface.model_errors`
+    model_error   : estimated relative error of the displacements at loaded asperities that is due
+        to point forces in place of pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; above 1
         contact discs overlap and the model fails
     covered       : number of open summits under the contact disc of a neighbour, where a point
@@ -152,12 +152,11 @@ class Contact(Cached, Table, Plottable):
         """Derivatives of a weighted sum of results with respect to the scene, by one linear system.
 
         loads, gaps    : (n,) weights of the asperities' loads and gaps
-        approach, load : weights of the approach and the total load; at least one of all four is
-        needed
+        approach, load : weights of the approach and the total load
         holding        : "load" or "approach", held constant; default: what was prescribed
 
-        Raises InputError where no asperity is loaded, and SolverError where the state has no
-        derivative because the energy is not convex there.
+        Raises InputError if no weight is given or no asperity is loaded, and SolverError where the
+        state has no derivative because the energy is not convex there.
 
         >>> print(f"{contact.gradient(load=1.0, holding='approach').approach:.5g}")
         0.012145

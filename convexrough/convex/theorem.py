@@ -30,7 +30,7 @@ def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations.
 
     excess    : (n,) e
-    h : (n,) the diagonal of H, infinite where x is fixed
+        h         : (n,) the diagonal of H, infinite where x is fixed
     margin    : mu
     """
     most = largest(excess)

@@ -127,7 +127,7 @@ class SiteBox:
         return found[::-1]
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box: each at the shortest difference of its place."""
+        """Values in some rows of the padded box, for the shortest difference at each place."""
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []

@@ -50,7 +50,7 @@ class Box(NamedTuple):
     loads: Array  # upper ends; the lower ends are 0
     compliance: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # that the solution is below them must still be proved; infinite where not
+    faces: Array  # the solution must still be proved to be below these; infinite where not
     fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:

@@ -134,7 +134,7 @@ class Asperities(Record):
         within        : [length] largest distance of asperities from the axis
         height_std    : [length] standard deviation of heights, which are normal random numbers
         tip_radius_cv : coefficient of variation of tip radii, which are lognormal random numbers
-            with the mean `tip_radius`
+            with the mean `tip_radius`. Both are cut at 6 standard deviations
         seed          : of the random numbers; required with height_std or tip_radius_cv
 
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
@@ -182,7 +182,7 @@ class Asperities(Record):
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
-    """[length] the largest random tip radius: random numbers are cut at CUT_DEVIATIONS."""
+    """[length] the largest random tip radius that `hexagonal` and `square` can produce."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
     return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
 

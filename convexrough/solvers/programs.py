@@ -28,8 +28,8 @@ Found = TypeVar("Found")
 class Reduction(ABC, Generic[Data, Raw, Found]):
     """A problem as a program; the fields are the data that the conversion back needs.
 
-    The class method `assemble(problem, ...)` of a subclass makes it. It raises an error that names
-    the asperities for which the program is not exact, or InputError if memory is too small.
+    The class method `assemble(problem, ...)` of a subclass creates it. It raises an error that
+    names the asperities for which the program is not exact, or InputError if memory is too small.
     """
 
     @abstractmethod

@@ -67,7 +67,7 @@ def compute(batch: Batch) -> BatchRows:
 
 
 def _row(asked: Asked, known: Measured | None, columns: tuple[Column, ...]) -> Row:
-    """The row of one scene; `known` has its numbers if they were measured with others."""
+    """The row of one scene; `known` has its numbers if it was measured together with others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.pressed(), asked.stages, wanted)

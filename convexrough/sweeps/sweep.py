@@ -142,7 +142,7 @@ def run(
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
-    """The parts that job k of n computes, as scenes; without `part`, all."""
+    """The parts that job k of n computes, each as a range of scenes; without `part`, all."""
     given: Any = (1, 1) if part is None else part
     if not isinstance(given, tuple) or len(given) != 2:
         raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")
