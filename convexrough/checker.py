@@ -341,10 +341,7 @@ class State(NamedTuple):
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The only solution in the box, under this load, or if None, under the approach in `place`.
-
-    place : the table of the file with radii near the solution and the approach
-    """
+    """The only solution in the box, under this load, or if None, under the approach in `place`."""
     radii, centre = table(place, "radii", "approach")
     a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets

@@ -89,7 +89,7 @@ def array(
     """A read-only copy of a vector. A number stands for `length` equal values.
 
     sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : name for messages of the thing that has one value
+    one  : what has one value each, for messages
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:

@@ -87,8 +87,8 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     """(...) [length] sum of both surfaces' displacements along x, relative to the distant bodies.
 
     It is the sum over asperities of Johnson's (3.91) for both bodies, the source paper's [A3] and
-    [A4]. Where the surfaces stick it is about the relative displacement of the bodies: the forces
-    of Ciavarella and Jaeger are exact only on average over directions.
+    [A4]. Where the surfaces stick it approximates the relative displacement of the bodies: the
+    forces of Ciavarella and Jaeger are exact only on average over directions.
     """
     asperities = _Sheared(state)
     material = state.contact.scene.material

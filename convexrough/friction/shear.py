@@ -274,9 +274,8 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
     `force_errors` are bounds on the differences between the given forces and the solution. An
     asperity gets the status that it has in the solution if its bound is small enough: for
-    "sliding", smaller than 1 % of the friction limit f P_i; for "partial", smaller than the f P_i
-    - |Q_i| of the solution. Otherwise its status is "undecided". The rest of the certificate is
-    that of the solution.
+    "sliding", below 1 % of the friction limit f P_i; for "partial", below the f P_i - |Q_i| of the
+    solution. Otherwise it is "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.

@@ -23,8 +23,7 @@ Single = NDArray[np.float32]
 #: Windows are so large that the relative variance of the mean of W^2 over a window is about this.
 SCATTER = 0.04
 
-#: Width of the Gaussian divided by the side of a window; with it the Gaussian and
-#: the window average over equally many sites.
+#: Width of a Gaussian that averages over as many sites as a window, divided by the window's side.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
 #: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.

@@ -47,8 +47,7 @@ class Shakedown(Table, Plottable):
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
         asperities that stick until they slide as a whole, with the scalar kernel or the full one;
         the load must be constant
-    factor  : the largest factor of the path at which, after some cycles, no asperity slides
-        as a whole
+    factor  : the largest factor at which, after some cycles, no asperity slides as a whole
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
     factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
         is not computed or the asperity does not touch at P0; for "vector" all are equal
@@ -57,8 +56,7 @@ class Shakedown(Table, Plottable):
         path scaled by `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
-    order   : for "exact" what is proved about order, as in `Cycle`: there are bounds only if it is
-        "proved"; None for other kinds
+    order   : for "exact" as `Cycle.order`; there are bounds only if it is "proved". None for others
     load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
 

@@ -229,8 +229,8 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
     """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
 
-    If none is: D0* is at most this at every asperity, as gaps are not negative, and at least the
-    approach -max d at which contact begins.
+    If none is: gaps >= 0, so D0* is at most this at each asperity; and at least -max d, where
+    contact begins.
     """
     if problem.load is None:
         return state.approach.radius
