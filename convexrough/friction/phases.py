@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
+from convexrough.errors import blamed_on
 from convexrough.friction.cycle import Cycle, steady
 from convexrough.friction.order import Order
 from convexrough.friction.shapes import elliptic_path
@@ -126,7 +127,8 @@ def phase_losses(
     pairs = list(product(sizes.tolist(), turns.tolist()))
     for k, (size, phase) in enumerate(pairs):
         LOGGER.info(f"ellipse {k + 1} of {len(pairs)}")
-        rough.append(settled(scene, size, phase))
+        with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
+            rough.append(settled(scene, size, phase))
         smooth.append(settled(alone, size, phase).loss if alone else np.nan)
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
     return PhaseLosses(

@@ -183,6 +183,15 @@ def test_bad_input() -> None:
         cr.phase_losses(
             scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[-3.1416, 90.0]
         )
+    with pytest.raises(cr.InputError, match=r"factors\[1\] = 3: loads\[\d+\]: found -"):
+        cr.phase_losses(
+            scene,
+            load=P[0],
+            load_amplitude=P[0] / 2,
+            force_amplitude=0.0,
+            phases=[0],
+            factors=[1, 3],
+        )
     with pytest.raises(cr.InputError, match="phases: found none"):
         cr.phase_losses(scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[])
     with pytest.raises(cr.InputError, match="chords"):
