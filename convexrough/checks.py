@@ -162,6 +162,12 @@ def _short(value: object) -> str:
     return f"type {type(value).__name__}" if "\n" in text else text[:60]
 
 
+def sequence(what: str, values: object, expected: str) -> None:
+    """Raise InputError for text, and for what cannot be iterated over."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise InputError(what, found=_short(values), expected=expected)
+
+
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
     """Raise InputError unless exactly one of two alternatives is given (the other is None)."""
     if (a is None) == (b is None):

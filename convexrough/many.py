@@ -6,7 +6,7 @@ in this way are pressed one by one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -177,9 +177,7 @@ def press_many(
     """
     checks.exactly_one("approach", approach, "load", load)
     by_load = load is not None
-    if not isinstance(scenes, Iterable):
-        found = f"type {type(scenes).__name__}"
-        raise InputError("scenes", found=found, expected="a list of scenes")
+    checks.sequence("scenes", scenes, "a list of scenes")
     scenes = tuple(scenes)
     for k, scene in enumerate(scenes):
         checks.instance(f"scenes[{k}]", scene, Scene)

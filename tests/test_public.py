@@ -83,6 +83,12 @@ def wrong(call: str) -> Any:
         ("cr.shear_vector(contact, force=1e-8, solver='conic')", "solver: found 'conic', expected"),
         ("cr.fields.pressure(scene, [[0, 0]])", "contact: found type Scene"),
         ("cr.press_many(scene, load=1.0)", "scenes: found type Scene, expected a list of scenes"),
+        (
+            "cr.sweep(scene, load=1.0, measure=['load'])",
+            "scenes: found type Scene, expected a list",
+        ),
+        ("cr.sweep([scene], load=1.0, measure='load')", "measure: found 'load', expected a list"),
+        ("cr.sweep([scene], load=1.0, measure=['load'], cycle=0.4)", "cycle: found 0.4, expected"),
         ("cr.read_scene(5)", "path: found 5, expected the name of a scene file"),
         ("contact.proof(sheared=[1e-8])", r"sheared\[0\]: found 1e-08, expected a shear state"),
     ],

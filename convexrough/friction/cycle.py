@@ -526,9 +526,7 @@ def loops(
     """
     if not isinstance(points, int) or points < 4:
         raise InputError("points", found=points, expected="a whole number, at least 4")
-    if not isinstance(cycles, Sequence):
-        expected = "a list of cycles; `Cycle.loop` is for one"
-        raise InputError("cycles", found=f"type {type(cycles).__name__}", expected=expected)
+    checks.sequence("cycles", cycles, "a list of cycles; `Cycle.loop` is for one")
     if not cycles:
         return []
     contact = cycles[0].contact

@@ -38,10 +38,12 @@ def _is_law(table: dict[Law, list[float]]) -> bool:
     if len(table) != 1 or not all(len(pair) == 2 for pair in table.values()):
         return False
     [(law, (first, second))] = table.items()
-    return first < second if law == "uniform" else second > 0 and (law == "normal" or first > 0)
+    if law == "lognormal":
+        return first > 0 and 0 < second <= 1
+    return first < second if law == "uniform" else second > 0
 
 
-_NAMES = 'a list of numbers of summary.json, such as ["load"]'
+_NAMES = 'a list of numbers of summary.json, none of them twice, such as ["load"]'
 _Names = Annotated[list[str], expected(_NAMES, _different)]
 _Seeds = Annotated[
     int | list[int],
@@ -52,7 +54,7 @@ _Laws = Annotated[
     dict[Law, list[float]],
     expected(
         "one of: uniform = [low, high] with low < high, normal = [mean, deviation > 0], "
-        "lognormal = [mean > 0, coefficient of variation > 0]",
+        "lognormal = [mean > 0, coefficient of variation from 0 to 1: not in per cent]",
         _is_law,
     ),
 ]

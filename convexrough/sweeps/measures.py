@@ -116,7 +116,8 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
     for name in measures:
         if not number(name):
             names = sorted({each.rpartition(".")[2] for each in rows} | {ONSET})
-            expected = f"a number of the stages of this file: {checks.nearest(name, names)}"
+            given = ", ".join(f"[{stage}]" for stage in stages)
+            expected = f"a number of the tables {given}: {checks.nearest(name, names)}"
             raise InputError("[sweep] measure", found=f'"{name}"', expected=expected)
         known = number(name)
         columns += [Column(f"{name}_{row}" if row else name, known, row) for row in rows[known]]

@@ -93,8 +93,8 @@ def sweep(
     if executor is not None:
         checks.instance("executor", executor, Executor)
         return run(plan, executor, **asked).table
-    if workers is not None and workers < 1:
-        raise InputError("workers", found=workers, expected="at least one process")
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise InputError("workers", found=repr(workers), expected="at least one process")
     with Processes(workers) as mine:
         return run(plan, mine, **asked).table
 
@@ -143,7 +143,10 @@ def run(
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     """The parts that job k of n computes, each as a range of scenes; without `part`, all."""
-    k, n = part or (1, 1)
+    given: Any = (1, 1) if part is None else part
+    if not isinstance(given, tuple) or len(given) != 2:
+        raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")
+    k, n = given
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
@@ -176,6 +179,7 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
     models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
     for model, key, values in models:
+        checks.sequence(model.name, values, "a list of fractions of f P")
         if len(values):
             table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)
             mistakes += wrong
@@ -193,6 +197,7 @@ def _of_scenes(
     load: ArrayLike | None,
     stages: Stages,
 ) -> Plan:
+    checks.sequence("scenes", what, "a list of scenes, or a sweep file")
     scenes = tuple(what)
     for i, scene in enumerate(scenes):
         checks.instance(f"scenes[{i}]", scene, Scene)
@@ -202,8 +207,9 @@ def _of_scenes(
     name, control = ("approach", approach) if load is None else ("load", load)
     assert control is not None  # exactly_one
     controls = checks.array(name, control, length=len(scenes), one="scene")
+    expected = 'a list of numbers of a summary, such as ["load"]'
+    checks.sequence("measure", measure, expected)
     if not measure:
-        expected = 'a list of numbers of a summary, such as ["load"]'
         raise InputError("measure", found=measure, expected=expected)
     content = hashlib.sha256()
     for scene in scenes:

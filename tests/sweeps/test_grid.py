@@ -140,7 +140,7 @@ WRONG = {
     ),
     "a negative mean": (
         sweeping(seeds=1, draw={"sphere.radius": {"lognormal": [-1, 1]}}),
-        "lognormal = [mean > 0, coefficient of variation > 0]",
+        "lognormal = [mean > 0, coefficient of variation from 0 to 1: not in per cent]",
     ),
     "one number": (
         sweeping(seeds=1, draw={"sphere.radius": {"normal": [1]}}),
@@ -148,11 +148,15 @@ WRONG = {
     ),
     "unknown measure": (
         tables(sweep={"measure": ["los"]}),
-        'measure: found "los", expected a number of the stages of this file: did you mean "loss"?',
+        'measure: found "los", expected a number of the tables [normal], [cycle]: did you mean '
+        '"loss"?',
     ),
     "no measure": (tables(sweep={"measure": []}), "measure: found [], expected a list of numbers"),
     "measure missing": (SMALL | {"sweep": {}}, "[sweep] measure: missing"),
-    "no cycle": (tables(cycle=None), 'measure: found "loss", expected a number of the stages'),
+    "no cycle": (
+        tables(cycle=None),
+        'measure: found "loss", expected a number of the tables [normal]',
+    ),
     "no friction": (
         {**tables(cycle=None, friction=None), "sweep": {"measure": ["onset"]}},
         "friction: found none, expected a coefficient",
@@ -192,7 +196,7 @@ def test_a_new_scene_takes_a_sweep(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(wrong)
     assert command("sweep", "a.toml").err.splitlines() == [
         "convexrough: error: a.toml: [sweep] measure: missing, expected a list of numbers of "
-        'summary.json, such as ["load"]',
+        'summary.json, none of them twice, such as ["load"]',
         "convexrough: error: a.toml: [sweep] seeds: nothing is random: expected height_std or "
         "tip_radius_cv in [asperities], or a table [sweep.draw]",
     ]
