@@ -1,4 +1,4 @@
-"""`gallery`: hard scenes with their answers, lines_of_cases or written for other solvers."""
+"""`gallery`: hard scenes with their answers, listed or written for other solvers."""
 
 from __future__ import annotations
 

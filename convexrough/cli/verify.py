@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def claim_options(command: Command) -> Command:
-    """Add the options for the questions of `verify` and for reading files."""
+    """Add the options of `verify`: what is checked, and how files are read."""
     called = "Header or number (from 1) of the column with load, x, y, ..."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),

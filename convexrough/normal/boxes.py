@@ -1,7 +1,7 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-In crowded contacts a box has touching asperities only (docs/theory/crowded.md). In comments, h is
-the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
+In crowded contacts a box may have touching asperities only: docs/theory/crowded.md. In comments, h
+is the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
 operator, and mu = 1 - `convexity_number` the margin of convexity.
 """
 

@@ -52,7 +52,7 @@ class Program(Record):
     objective   : minimum of the objective, in energy_unit; for bristles as OSQP finds it, or nan
     constant    : the energy is constant + objective, or constant - objective for the dual, in
         energy_unit; 0 for bristles and if the approach is prescribed
-    off         : estimated error of the loads of an exact solution, relative to the largest load
+    off         : estimated error of the program's own loads, relative to the largest load
 
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
     >>> program.what, len(program.asperities)

@@ -27,8 +27,8 @@ HEIGHTS = ("heights", "height", "z")
 #: Rms slopes outside this range suggest different units of heights and pixels.
 SLOPES = (1e-5, 10.0)
 
-#: Numbers that mark holes, if they differ from the median of all other heights by more than FAR
-#: times the range of these; and the size from which a number marks a hole always.
+#: Numbers that mark holes, and the size from which any number does, if they differ from the median
+#: of all other heights by more than FAR times the range of these.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference up to which two pixel sizes count as equal.
