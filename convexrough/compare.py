@@ -35,6 +35,7 @@ from convexrough.record import LINE, Record, Table, in_text
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
+from convexrough.solvers import named
 
 #: Largest number of asperities that a message names; it counts the others.
 MOST_NAMED = 5
@@ -130,15 +131,15 @@ def compare(
     *,
     approach: float | None = None,
     load: float | None = None,
-    solvers: Sequence[solvers.Solver] | None = None,
+    solvers: Sequence[solvers.Solver | str] | None = None,
     influence: Kind | None = None,
     log: bool = False,
 ) -> Comparison:
     """Compare the results of every solver for one normal contact.
 
     approach [length] or load [force] : the prescribed quantity, exactly one
-    solvers  : solver objects; default `every_solver()`. Newton's method is always first, as the
-        reference
+    solvers  : solvers or their names; default `every_solver()`. Newton's method is always first, as
+        the reference
     influence : compliance operator, as for `press`
     log : store the steps of each solver in its entry
 
@@ -146,7 +147,7 @@ def compare(
     their entries.
     """
     reference = _REFERENCE
-    others = every_solver() if solvers is None else solvers
+    others = every_solver() if solvers is None else [*map(named, solvers)]
     entries: list[Entry] = []
     for solver in (reference, *(each for each in others if each != reference)):
         LOGGER.info(solver.name)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact, mean_pressures
+from convexrough.contact import Contact, covered, mean_pressures
+from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
@@ -17,8 +18,9 @@ from convexrough.tabular.units import UnitNames
 #: Contacts with fewer touching asperities than this cause a warning.
 FEW = 5
 
-#: Scenes with fewer touching asperities than this are not taken to be parts of a larger array.
-ARRAY = 20
+#: Scenes with fewer asperities than this are not taken to be parts of a larger array; those on a
+#: lattice are from the second number on.
+ARRAY, ON_LATTICE = 20, 7
 
 #: `array_extent` below which an array is cut off: smooth pressure there is 0.7 of the peak.
 CUT_OFF = 0.7
@@ -39,8 +41,10 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
-        widths a and b of the contact of a smooth body at this load; None without such a contact
+        widths a and b of the contact of a smooth body at this load; None without such a contact,
+        and where the asperities are too few for an array (`is_array`)
     all_touch    : True if every asperity of the scene touches
+    axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
         None
@@ -68,6 +72,7 @@ def limits(
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
         "array_extent": array_extent(scene, float(loads.sum())),
         "all_touch": bool(touching.all()),
+        "axis_outside": axis_outside(scene),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(pressures.max()),
         "hardness": hardness,
@@ -115,7 +120,12 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"contact extends to {normal['extent']:.3g} of the sphere's radius from the axis: from "
             f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
         )
-    cut_off = normal["contact"] >= ARRAY and normal["array_extent"] is not None
+    if normal["axis_outside"]:
+        yield (
+            "the axis of the sphere, at x = 0 and y = 0, is at the edge of the asperities or "
+            "outside: shift their positions if these are measured from another point"
+        )
+    cut_off = normal["contact"] >= FEW and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
         yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["all_touch"]:
@@ -147,6 +157,15 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
 
 
+def cautions_about(scene: Scene, loads: Array) -> list[str]:
+    """The warnings of `cautions` for loads (n,) [force]."""
+    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+    if clear_of_cautions(scene, loads, radii):
+        return []
+    crowded = crowding(scene.contact_points, radii), covered(scene, radii)
+    return [*cautions(limits(scene, loads, radii, *crowded), scene.units)]
+
+
 def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
     """True if simple bounds show that there are no `cautions`, at a fraction of the cost."""
     tips, a, touching = scene.asperities.tip_radii, float(radii.max()), np.count_nonzero(loads)
@@ -158,12 +177,27 @@ def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
         and FEW <= touching < len(loads)
         and a < 0.99 * STEEP * float(tips.min())
         and all(far + a < 0.99 * STEEP * R for R, _ in scene.curved)
-        and (touching < ARRAY or (isinstance(scene.sphere_radius, float)
+        and (not is_array(scene) or (isinstance(scene.sphere_radius, float)
              and np.abs(scene.asperities.positions).max(axis=0).min() > 1.01 * CUT_OFF * smooth))
+        and not axis_outside(scene)
         and scene.material.hardness is None
         and (scene.friction or 0.0) <= HIGH_FRICTION
         and not any(unlikely_modulus(scene.material.contact_modulus, scene.units))
     )  # fmt: skip
+
+
+def is_array(scene: Scene) -> bool:
+    """True if the asperities may be a part of a larger array."""
+    return len(scene) >= (ARRAY if scene.lattice is None else ON_LATTICE)
+
+
+def axis_outside(scene: Scene) -> bool:
+    """True for an array of asperities that do not surround the axis of the sphere."""
+    if not is_array(scene):
+        return False
+    low, high = scene.asperities.positions.min(axis=0), scene.asperities.positions.max(axis=0)
+    outside = (low < high) & ((low >= 0) | (high <= 0))
+    return any(bool(outside[axes].any()) for _, axes in scene.curved)
 
 
 def at_the_rim(extent: float) -> str:
@@ -177,7 +211,7 @@ def at_the_rim(extent: float) -> str:
 
 def array_extent(scene: Scene, load: float) -> float | None:
     """`array_extent` of `limits_of`; for a row of asperities along x or y only its own ratio."""
-    smooth = smooth_reference(scene, load) if load > 0 else None
+    smooth = smooth_reference(scene, load) if load > 0 and is_array(scene) else None
     if smooth is None:
         return None
     axes = smooth.semi_axes if isinstance(smooth, SmoothEllipsoid) else smooth.contact_radius

@@ -18,7 +18,7 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate
 from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
-from convexrough.normal.claims import WITHIN, Claim
+from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict, verify
 from convexrough.verdict.report import describe_claim, reason
@@ -84,18 +84,19 @@ def assert_agree(
     scene: Scene | None = None,
     approach: float | None = None,
     load: float | None = None,
-    within: float | None = None,
+    within: float = WITHIN,
 ) -> None:
     """Check that two results of one problem are certified and do not contradict each other.
 
     first, second : contacts, or loads (n,) [force] in the order of the scene's asperities
     scene, approach or load : the problem, required for loads without a contact
-    within : also check that no two loads differ by more than this fraction of the largest. Without
-        it two inaccurate results agree as long as their bounds allow
+    within : largest difference of two loads of one asperity, as a fraction of the largest load
 
-    A contradiction is what `compare.contradictions` reports.
+    A contradiction is what `compare.contradictions` reports. The bounds of inaccurate results are
+    wide, so these contradict each other less than accurate ones.
     """
     __tracebackhide__ = True
+    within = tolerance("within", within)
     one = _asked(_answer, "first", first, scene, approach, load)
     other = _asked(_answer, "second", second, scene, approach, load)
     if len(one.loads) != len(other.loads):
@@ -105,20 +106,19 @@ def assert_agree(
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
         raise AssertionError("\n".join(found))
-    if within is not None:
-        apart = np.abs(one.loads - other.loads)
-        largest = max(float(one.loads.max()), float(other.loads.max()))
-        far = np.flatnonzero(apart > within * largest)
-        if len(far):
-            each = (
-                f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}"
-                for i in far[np.argsort(-apart[far])]
-            )
-            differ = f"loads differ by {apart.max() / largest:.2g} of the largest"
-            raise AssertionError(
-                f"{one.name} and {other.name}: {differ}, expected {within:g}: "
-                f"asperities {joined(each)}"
-            )
+    apart = np.abs(one.loads - other.loads)
+    largest = min(float(one.loads.max()), float(other.loads.max()))
+    far = np.flatnonzero(apart > within * largest)
+    if len(far):
+        each = (
+            f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}"
+            for i in far[np.argsort(-apart[far])]
+        )
+        part = apart.max() / largest if largest > 0 else np.inf
+        raise AssertionError(
+            f"{one.name} and {other.name}: loads differ by {part:.2g} of the largest, expected "
+            f"{within:g}: asperities {joined(each)}"
+        )
 
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:

@@ -1,6 +1,7 @@
 """What downstream tests call: it must pass what is right, and say what is wrong."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,9 @@ def test_two_that_agree(contact: cr.Contact, control: str) -> None:
     message = failure(assert_agree, first, second, within=1e-6)
     assert message.startswith("first (newton) and second (bristles): loads differ by ")
     assert "expected 1e-06: asperities " in message
+    for wrong in (1000 * first.loads, first.loads + first.loads.max(), first.loads[::-1]):
+        message = failure(assert_agree, first, wrong, scene=paper(), **prescribed)
+        assert "expected 0.01: asperities " in message, message
 
 
 def test_wrong_use(contact: cr.Contact) -> None:
@@ -114,6 +118,11 @@ def test_wrong_use(contact: cr.Contact) -> None:
     small, approach = scattered(1, 4, 0.3, 0.0)
     with pytest.raises(cr.InputError, match="second: found 4, expected as many"):
         assert_agree(contact, cr.press(small, approach=approach))
+    with pytest.raises(cr.InputError, match="within: found 5, expected a fraction"):
+        assert_agree(contact, contact, within=5)
+    rubbed = cr.press(replace(paper(), friction=0.5), approach=PAPER_APPROACH)
+    with pytest.raises(cr.InputError, match=r"sliding: found shape \(1,\) of int64, expected"):
+        assert_shear_certified(rubbed, np.zeros(61), force=0.0, sliding=[1])
     with pytest.raises(cr.InputError, match=r"loads\[0\]: found -1"):
         assert_certified(paper(), -1.0, approach=PAPER_APPROACH)
 

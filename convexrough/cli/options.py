@@ -20,7 +20,11 @@ solver_option = click.option(
     "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
     help="A solver of the package, or your package.Class; may be repeated.",
 )  # fmt: skip
-html_option = click.option("--html", is_flag=True, help="Write slider.html, an interactive page.")
+html_option = click.option(
+    "--html",
+    is_flag=True,
+    help="Write slider.html, an interactive page (for a sphere with friction).",
+)
 force_option = click.option(
     "--force", is_flag=True, help="Overwrite the results of an earlier run."
 )

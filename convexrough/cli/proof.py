@@ -36,5 +36,5 @@ def proved(work: Callable[[], Proof]) -> Proof | None:
         with progress("proving"):
             return work()
     except ProofError as error:
-        say_aside("warning", str(error))
+        say_aside("warning", f"proof.json is not written: {error}")
         return None

@@ -125,6 +125,7 @@ def verify(
     enough, and prescribed totals agree; 2 wrong input; 4 if the shear problem could not be solved;
     3 otherwise. With --explain it is 0 if the files can be read.
     """
+    from convexrough.plausibility import cautions_about
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages.normal import describe, judged_loads
@@ -170,6 +171,8 @@ def verify(
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
     echo(summary, lines, as_json)
+    for caution in cautions_about(file.scene, found.verdict.loads):
+        say_aside("warning", caution)
     for hint in found.verdict.hints():
         say_aside("hint", hint)
     if not found.holds:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
+from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
 from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.record import Record
@@ -103,7 +104,12 @@ def verify_shear(
     state = shear(contact, force=checks.finite("force", force))
     if sliding is None:
         sliding = claims_sliding(contact, given)
-    claimed = frozen(np.array(np.broadcast_to(sliding, given.shape), dtype=bool))
+    claimed = np.asarray(sliding)
+    if claimed.dtype != bool or claimed.shape not in ((), given.shape):
+        found = f"shape {claimed.shape} of {claimed.dtype}"
+        expected = f"{len(given)} values True or False, one per asperity"
+        raise InputError("sliding", found=found, expected=expected)
+    claimed = frozen(np.array(np.broadcast_to(claimed, given.shape)))
     return ShearVerdict(contact, given, float(force), claimed, within, against(state, given), state)
 
 

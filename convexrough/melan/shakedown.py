@@ -1,7 +1,8 @@
 """`shakedown`: the largest factor of a load path at which sliding dies out.
 
-Sliding dies out if, after some cycles, no asperity slides as a whole; slip at the edges of contacts
-goes on. docs/theory/shakedown.md derives the exact limit and the programs of Melan's theorem.
+Sliding dies out if, after some cycles, no asperity slides as a whole or opens; slip at the edges of
+contacts goes on. docs/theory/shakedown.md derives the exact limit and the programs of Melan's
+theorem.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ class Shakedown(Table, Plottable):
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
         asperities that stick until they slide as a whole, with the scalar kernel or the full one;
         the load must be constant
-    factor  : the largest factor at which, after some cycles, no asperity slides as a whole
+    factor  : the largest factor at which, after some cycles, no asperity that touches at P0 slides
+        as a whole or opens; `limited_by` says which of the two happens above it
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
     factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
         is not computed or the asperity does not touch at P0; for "vector" all are equal
@@ -92,6 +94,15 @@ class Shakedown(Table, Plottable):
         return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
 
     @property
+    def limited_by(self) -> Literal["sliding", "opening"]:
+        """What an asperity does above the factor; one that opens in every cycle need not slide."""
+        if not self.load_amplitudes.any():
+            return "sliding"
+        p, t = self.load_amplitudes, self.force_amplitudes / checks.friction(self.scene.friction)
+        fall, opens = _fall(p, t), float((-p).max())
+        return "opening" if fall <= opens * (1 + SAFETY) else "sliding"
+
+    @property
     def proved(self) -> bool:
         """True if bounds on the factor are proved."""
         return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
@@ -118,7 +129,7 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor of a closed path at which sliding dies out.
+    """The largest factor of a closed path at which sliding dies out and no asperity opens.
 
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
@@ -180,7 +191,7 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
     levels, scene = contact.cached(FrictionLevels), contact.scene
     f, P0 = checks.friction(scene.friction), float(levels.load)
     plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
-    fall = (plus + minus) / 2  # of L*, per factor
+    fall = _fall(p, t)
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
@@ -208,6 +219,11 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
         mechanism=frozen(gaps / (gaps.max() or 1.0)),
         order=order,
     )
+
+
+def _fall(p: Array, t: Array) -> float:
+    """The decrease of L* per factor, (r_+ + r_-) / 2."""
+    return float((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:

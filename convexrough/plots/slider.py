@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import LoadPath, history
 from convexrough.scene.base import sphere_radius
@@ -45,8 +46,10 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The slides of a contact. Raises InputError without friction or a sphere."""
+        """The slides of a contact. Raises InputError without friction, a sphere or a load."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
+        if contact.load == 0:
+            raise InputError("slider page", found="no asperity that touches", expected="a contact")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
         steady = cycles(contact, fractions * limit)

@@ -9,10 +9,8 @@ from typing import Any
 
 from convexrough.atomic import replacing
 from convexrough.errors import ConvexroughError, InputError
-from convexrough.normal.problem import NormalProblem
-from convexrough.programs.program import FORMS, WRITERS, stated
+from convexrough.programs.program import FORMS, WRITERS, solved, stated
 from convexrough.scene.scene import Scene
-from convexrough.solvers import Newton
 from convexrough.version import __version__
 
 #: File endings, with the contents and the programs that read them.
@@ -41,10 +39,9 @@ def write_programs(
     bristles       : number of bristles per asperity
 
     A program that would not be equivalent to the contact law is left out; the index says why.
-    Raises InputError, with all reasons, if no program remains, and FileError.
+    Raises InputError, with the last reason, if no program remains, and FileError.
     """
-    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
-    own = Newton().solve(problem).loads
+    problem, own = solved(scene, approach, load)
     about: dict[str, Any] = {}
     left_out: dict[str, str] = {}
     written: list[Path] = []
@@ -66,7 +63,9 @@ def write_programs(
             written.append(path)
             about[path.name] = program.about()
     if not written:
-        raise InputError("programs", found="; ".join(left_out.values()), expected="one at least")
+        last = [*left_out.values()][-1]
+        expected = "a scene with a convex program: a smaller approach or load, or sharper tips"
+        raise InputError("programs", found=last, expected=expected)
     index = {
         "schema": 1,
         "version": __version__,

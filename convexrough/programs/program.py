@@ -152,11 +152,16 @@ def program(
     checks.instance("scene", scene, Scene)
     if not isinstance(bristles, int) or bristles < 1:
         raise InputError("bristles", found=bristles, expected="a whole number, at least 1")
+    return stated(*solved(scene, approach, load), form, bristles)
+
+
+def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
+    """The problem of a scene with a matrix, and the loads of its solution in scaled units."""
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:
         expected = "an approach at which an asperity touches"
         raise InputError("approach", found=approach, expected=expected)
-    return stated(problem, Newton().solve(problem).loads, form, bristles)
+    return problem, Newton().solve(problem).loads
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
-from convexrough.plausibility import ARRAY, CUT_OFF, array_extent, at_the_rim
+from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
 from convexrough.plottable import Plottable
 from convexrough.record import Table, rows_of, singular
 from convexrough.run.values import FileTable
@@ -95,7 +95,7 @@ class Stage(FileTable):
                 "the friction limit at the largest load: check the units of the forces"
             )
         extent = array_extent(contact.scene, load)
-        if len(contact.scene) >= ARRAY and extent is not None and extent < CUT_OFF:
+        if extent is not None and extent < CUT_OFF:
             yield f"under the loads of {name} {at_the_rim(extent)}"
 
     def compute(self, contact: Contact) -> Result:

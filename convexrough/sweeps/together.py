@@ -10,13 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.contact import covered
-from convexrough.plausibility import cautions, clear_of_cautions, limits
+from convexrough.plausibility import cautions_about
 from convexrough.rows import PressedRows, in_rows
 from convexrough.run.stages import CycleStage
-from convexrough.scene.neighbours import crowding
-from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz, mindlin
+from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth_reference
 from convexrough.sweeps.measures import FAILURES, Column, Measured, Numbers, row_label
 from convexrough.sweeps.scenes import Asked
@@ -122,14 +119,10 @@ def _known(
                 label = row_label((low[k], high[k]))
                 known |= {(f"cycle.{name}", label): float(it[k]) for name, it in cycle.items()}
     return {
-        k: Measured(numbers[k], "", _cautions(asked[k].scene, contacts["asperity_loads"][k]))
+        k: Measured(
+            numbers[k],
+            "",
+            "; ".join(cautions_about(asked[k].scene, contacts["asperity_loads"][k])),
+        )
         for k in np.flatnonzero(good).tolist()
     }
-
-
-def _cautions(scene: Scene, loads: Array) -> str:
-    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
-    if clear_of_cautions(scene, loads, radii):
-        return ""
-    crowded = crowding(scene.contact_points, radii), covered(scene, radii)
-    return "; ".join(cautions(limits(scene, loads, radii, *crowded), scene.units))

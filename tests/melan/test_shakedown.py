@@ -89,6 +89,18 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
         slip = found.slips[asperity]
         assert np.ptp(drift) == pytest.approx(slip, abs=1e-12 * path.displacements.max())
         assert (slip > 0) == slides
+    assert limit.limited_by == "sliding"
+
+
+def test_an_asperity_that_only_opens_is_told() -> None:
+    """In phase and flatter than friction: above the limit a ring opens, and nothing slides."""
+    for part, what in ((0.2, "opening"), (0.05, "sliding")):
+        p, q = part * P * np.array([1.0, -1.0]), 0.05 * P * np.array([1.0, -1.0])
+        limit = cr.shakedown(PAPER, loads=P, load_amplitudes=p, force_amplitudes=q)
+        assert limit.limited_by == what
+        above = 1.01 * limit.factor
+        found = cr.steady(PAPER, loads=P + above * p, forces=above * q)
+        assert (found.loss > 0) == ((found.status == "sliding").any()) == (what == "sliding")
 
 
 @pytest.mark.sample(1)

@@ -17,6 +17,7 @@ from scipy import sparse
 
 import convexrough as cr
 from convexrough.programs import FORMS, program
+from convexrough.programs.folder import write_programs
 from convexrough.programs.program import WRITERS
 
 #: The source paper's, its inner 19 asperities.
@@ -138,6 +139,8 @@ def test_programs_that_are_not_made(tmp_path: Path) -> None:
         cr.program(SCENE, "dual", approach=PAPER_APPROACH).loads(np.zeros(50))
     with pytest.raises(cr.InputError, match="approach: found 0, expected an approach at which an"):
         cr.program(SCENE, approach=0)
+    with pytest.raises(cr.InputError, match="approach: found -1e-05, expected an approach at whi"):
+        write_programs(tmp_path, "scene", SCENE, approach=-1e-5)
     with pytest.raises(cr.InputError, match="bristles: found 0, expected a whole number"):
         cr.program(SCENE, "bristles", approach=PAPER_APPROACH, bristles=0)
     with pytest.raises(cr.InputError, match=r'form: .* a form of program; did you mean "cones"'):

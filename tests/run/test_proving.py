@@ -68,5 +68,5 @@ def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("load\n" + "1e-3\n" * 61)
     judged = command("verify", "first.toml", "loads.csv", "--proof")
     assert judged.status == 3
-    assert "warning: nothing is proved" in judged.err
+    assert "warning: proof.json is not written: nothing is proved" in judged.err
     assert not (tmp_path / "proof.json").exists()

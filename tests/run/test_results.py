@@ -102,6 +102,8 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
         in outcome.err
     )
     assert "of the tip radius: from 0.2 on, the paraboloid of the model" in outcome.err
+    claimed = command("verify", "a.toml", "a-results/asperities.csv")  # the same loads: also told
+    assert "of the tip radius: from 0.2 on, the paraboloid of the model" in claimed.err
 
 
 def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
@@ -117,8 +119,9 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
     ):
         text = scene_text(array).replace("radius = 1.0", f"radius = {radius}", 1)
         assert (said in warned(command, tmp_path, text).err) == warns, radius
-    few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", "0.004")
-    assert said not in warned(command, tmp_path, few).err
+    for within, warns in (("0.004", True), ("0.002", False)):  # 7 asperities, and one
+        few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", within)
+        assert (said in warned(command, tmp_path, few).err) == warns
 
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
@@ -137,3 +140,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
             if told
             else (not contact.warnings)
         )
+    corner = cr.Asperities(wide.positions + 0.0102, wide.tip_radii)
+    for base, outside in ((1.0, True), ((1.0, np.inf), True), (np.inf, False)):
+        warnings = cr.press(cr.Scene(base, corner, material), load=3.6e-7).warnings
+        assert any("axis of the sphere, at x = 0 and y = 0" in each for each in warnings) == outside

@@ -1,4 +1,4 @@
-"""[shakedown]: the largest factor of the amplitudes of a path for which sliding ends."""
+"""[shakedown]: the largest factor of the amplitudes of a path for which sliding dies out."""
 
 from __future__ import annotations
 
@@ -81,7 +81,10 @@ class ShakedownResult(Single):
 
     def summary(self) -> Summary:
         (found,) = self.found
-        return {"kind": found.kind, **self.known[0], "proved": found.proved, "order": found.order}
+        return {"kind": found.kind, **self.known[0], "limited_by": found.limited_by} | {
+            "proved": found.proved,
+            "order": found.order,
+        }
 
     def tables(self) -> dict[str, Columns]:
         """The tables of the residual state and the mechanism, by vertex and component."""
@@ -103,7 +106,11 @@ class ShakedownResult(Single):
 
     def lines(self) -> list[str]:
         _, *table = super().lines()
-        return [f"shakedown  ({self.stage.kind})", *table]
+        (found,) = self.found
+        above = "an asperity slides in every cycle"
+        if found.limited_by == "opening":
+            above = "an asperity opens in every cycle, and need not slide"
+        return [f"shakedown  ({self.stage.kind}), above the factor {above}", *table]
 
     def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
