@@ -32,8 +32,9 @@ def map_options(command: Command) -> Command:
     """Add the options for reading the file of a map."""
     for option in (
         click.option("--fill", is_flag=True, help="Fill holes in the map and report them."),
-        click.option("--detrend", type=click.Choice(["plane", "sphere", "none"]), default="plane",
-                     show_default=True, help="Form to remove before finding summits."),
+        click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
+                     default="plane", show_default=True,
+                     help="Form to remove before finding summits."),
         click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different."),
         click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ..."),
         click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file states none."),

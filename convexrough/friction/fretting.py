@@ -50,7 +50,8 @@ class Fretting(Table, Plottable):
         lowest load of the cycle; nan where "intermittent", as slip between touches is not known
     gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
         sticks, nan where "intermittent"
-    losses           : [force length] energy lost per cycle: `Cycle.asperity_losses`
+    losses, loss_errors : [force length] energy lost per cycle, and bounds on its errors:
+        `Cycle.asperity_losses`. At varying load these are less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
@@ -65,7 +66,7 @@ class Fretting(Table, Plottable):
     _along: ClassVar[Along] = {
         ("asperity",): (
             *("status", "slip_amplitudes", "gross_slip_amplitudes", "losses"),
-            *("mean_tractions", "largest_tractions"),
+            *("loss_errors", "mean_tractions", "largest_tractions"),
         )
     }
 
@@ -76,6 +77,7 @@ class Fretting(Table, Plottable):
     slip_amplitudes: Array
     gross_slip_amplitudes: Array
     losses: Array
+    loss_errors: Array
     mean_tractions: Array
     largest_tractions: Array
 
@@ -110,6 +112,7 @@ def fretting(cycle: Cycle) -> Fretting:
         slip_amplitudes=frozen(gross + in_part),
         gross_slip_amplitudes=frozen(gross),
         losses=cycle.asperity_losses,
+        loss_errors=cycle.asperity_loss_errors,
         mean_tractions=frozen(mean),
         largest_tractions=frozen(
             f * hertz.peak_pressure(largest, scene.material.contact_modulus, R)
@@ -137,8 +140,8 @@ def rim_gap(x: Array) -> Array:
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
     """The columns of fretting.csv, with a row for each touching asperity in each cycle."""
-    names = ("status", "losses", "slip_amplitudes", "gross_slip_amplitudes", "mean_tractions",
-             "largest_tractions")  # fmt: skip
+    names = ("status", "losses", "loss_errors", "slip_amplitudes", "gross_slip_amplitudes",
+             "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()
     for each in worn:
         here = np.flatnonzero(each.contact.loads)

@@ -1,4 +1,4 @@
-"""The best-fitting plane or sphere of a map, to be removed before summits are found."""
+"""The best-fitting plane, sphere or paraboloid of a map, to be removed before summits are found."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 
-Trend = Literal["plane", "sphere"]
-TRENDS: tuple[Trend, ...] = ("plane", "sphere")
+Trend = Literal["plane", "sphere", "paraboloid"]
+TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
 #: Largest number of Gauss-Newton steps to the best sphere, and the relative size of the last one.
 STEPS, ENOUGH = 50, 1e-12
@@ -19,32 +19,39 @@ STEPS, ENOUGH = 50, 1e-12
 
 @dataclass(frozen=True, repr=False)
 class Removed:
-    """A plane or sphere that was subtracted from a map.
+    """A form that was subtracted from a map.
 
-    kind      : "plane" or "sphere"
+    kind      : "plane", "sphere" or "paraboloid" (of a cylinder or an ellipsoid)
     height, slopes : [length] height, and slopes along x and y, at the middle of the map
-    curvature : [1/length] of the sphere, positive for a hill; 0 for a plane
+    curvature : [1/length] of the sphere, positive for a hill; of a paraboloid the mean; 0 for a
+        plane
+    curvatures : [1/length] of a paraboloid along its two axes, the larger first; else 0
     """
 
     kind: Trend
     height: float
     slopes: tuple[float, float]
     curvature: float = 0.0
+    curvatures: tuple[float, float] = (0.0, 0.0)
 
     @property
     def radius(self) -> float:
-        """[length] radius of the sphere, negative for a bowl; infinite for a plane."""
+        """[length] radius of the sphere, negative for a bowl; infinite for a plane. Of a
+        paraboloid, that of the mean curvature."""
         return 1.0 / self.curvature if self.curvature else float("inf")
 
     def __repr__(self) -> str:
         tilt = f"slopes {self.slopes[0]:.3g} and {self.slopes[1]:.3g}"
         if self.kind == "plane":
             return f"plane, {tilt}"
+        if self.kind == "paraboloid":
+            first, second = (1.0 / each if each else float("inf") for each in self.curvatures)
+            return f"paraboloid of radii {first:.6g} and {second:.6g}, {tilt} in the middle"
         return f"sphere of radius {self.radius:.6g}, {tilt} in the middle"
 
 
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
-    """The best least-squares plane or sphere, and its height at each pixel.
+    """The best least-squares form of this kind, and its height at each pixel.
 
     docs/theory/surfaces.md, "Removing the form". Lengths are over half the map's size.
 
@@ -59,6 +66,15 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     wanted = (heights - level) / size
     z, shape = np.zeros_like(wanted), np.zeros(4)
     terms = [np.ones_like(wanted), x + 0 * y, y + 0 * x]
+    if kind == "paraboloid":
+        terms += [each + 0 * z for each in (x * x / 2, x * y, y * y / 2)]
+        a, b, c, kx, kxy, ky = _least_squares(terms, wanted).tolist()
+        bent = -np.linalg.eigvalsh([[kx, kxy], [kxy, ky]]) / size
+        for k, each in zip((a, b, c, kx, kxy, ky), terms, strict=True):
+            z += k * each
+        both = (float(bent[0]), float(bent[1]))
+        removed = Removed(kind, level + size * a, (b, c), float(bent.mean()), both)
+        return removed, level + size * z
     for _ in range(1 if kind == "plane" else STEPS):
         factors = terms if kind == "plane" else [*terms, (x * x + y * y + z * z) / 2]
         step = _least_squares([each / (1 - shape[3] * z) for each in factors], wanted - z)

@@ -15,6 +15,10 @@ SIDES = ((0, 1), (1, 0))
 OUTLYING = 6.0
 
 
+#: Number of pixels in which frequent heights are looked for.
+SAMPLE = 2**17
+
+
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
 
@@ -42,6 +46,20 @@ def clipped(heights: Array) -> int:
     following = heights.max(where=heights < top, initial=heights.min())
     near = int(np.count_nonzero(heights >= min(top - 0.01 * np.ptp(heights), following))) - highest
     return highest if highest >= 10 and highest > near else 0
+
+
+def repeated(heights: Array) -> int:
+    """The number of pixels with the most frequent height, below the largest; 0 if not surprising.
+
+    It is surprising if it is in a sample 20 times as frequent as any other, and on 20 pixels.
+    """
+    sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
+    values, counts = np.unique(sample, return_counts=True)
+    most = int(np.argmax(counts))
+    others = np.delete(counts, most).max(initial=1)
+    if counts[most] < 20 * others or values[most] == heights.max():
+        return 0
+    return int(np.count_nonzero(heights == values[most]))
 
 
 def filled(heights: Array) -> Array:

@@ -49,7 +49,7 @@ def read(
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
     unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
         different unit in the file is an error. Heights in another known unit are converted
-    detrend : "plane" or "sphere" to subtract the best one, or None
+    detrend : "plane", "sphere" or "paraboloid" to subtract the best one, or None
     fill   : True to fill holes with a harmonic function; else holes are an error. Holes are nan,
         masked, BAD in text, and marks such as -9999 or 1e38 far from all heights
 
@@ -78,9 +78,11 @@ def read(
         name = length.name if length else ""
         surface = Surface(heights, size, name, filled=holes, source=str(path))
         slope = surface.rms_slope
-        if not upwards and not SLOPES[0] <= slope <= SLOPES[1]:
+        if not SLOPES[0] <= slope <= SLOPES[1]:
             likely = f"{SLOPES[0]:g} to {SLOPES[1]:g}"
-            expected = f"{likely}; if heights have another unit, give height_unit"
+            more = "if heights have another unit, give height_unit"
+            more = f"check height_unit, {upwards.name}, and unit" if upwards else more
+            expected = f"{likely}; {more}"
             raise InputError("heights", found=f"rms slope {slope:.3g}", expected=expected)
         return surface if detrend is None else surface.detrend(detrend)
 

@@ -27,6 +27,12 @@ MOST_ASPECT = 10.0
 #: Part of the variance above which a trend causes a warning, and fitted pixels along a side.
 MOST, FITTED = 0.5, 256
 
+#: Difference of the two curvatures of a paraboloid, over their mean, below which it is round.
+ROUND = 0.1
+
+#: Rms slope above which heights are warned of.
+STEEP = 1.0
+
 #: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
 
@@ -38,10 +44,12 @@ class Surface(Record, Plottable):
     heights : (ny, nx) [length] x grows with the column, y with the row; positive is taller
     pixel   : (dx, dy) [length], or one number for squares
     unit    : unit of all lengths, "" if unknown
-    removed : planes and spheres subtracted from the heights, in this order
+    removed : forms subtracted from the heights, in this order
     filled  : number of pixels that were holes
     clipped : number of pixels at the largest height, if the map seems to be cut off there, else 0;
         by default counted in the heights
+    repeated : number of pixels below it with one height, if these are surprisingly many, else 0; by
+        default counted in the heights
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, and for pixels with one side more
@@ -59,6 +67,7 @@ class Surface(Record, Plottable):
     filled: int
     source: str
     clipped: int
+    repeated: int
 
     def __init__(
         self,
@@ -69,6 +78,7 @@ class Surface(Record, Plottable):
         filled: int = 0,
         source: str = "",
         clipped: int | None = None,
+        repeated: int | None = None,
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
@@ -77,6 +87,8 @@ class Surface(Record, Plottable):
         object.__setattr__(self, "source", source)
         there = holes.clipped(self.heights) if clipped is None else clipped
         object.__setattr__(self, "clipped", there)
+        alike = holes.repeated(self.heights) if repeated is None else repeated
+        object.__setattr__(self, "repeated", alike)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -111,10 +123,10 @@ class Surface(Record, Plottable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of a plane or sphere that explains most of the variance, and of wrong pixels.
+        """Warnings of a form that explains most of the variance, and of wrong pixels.
 
-        The plane or sphere is fitted to at most 256 by 256 of the pixels. Spikes are single pixels
-        or pairs far from all others.
+        Forms are fitted to at most 256 by 256 of the pixels. Spikes are single pixels or pairs far
+        from all others.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
@@ -130,6 +142,8 @@ class Surface(Record, Plottable):
                 trend, there = fitted(few, pixel, kind)
             except InputError:  # no sphere spans the map
                 continue
+            if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
+                continue  # a sphere is simpler
             if (least := float(np.var(few - there))) < (1.0 - MOST) * left:
                 name = f"a {trend!r}".partition(" in the")[0]
                 part = f"{100 * (1.0 - least / np.var(few)):.3g} %"
@@ -144,6 +158,16 @@ class Surface(Record, Plottable):
                 f"the highest {self.clipped:,} pixels have exactly the same height: the map seems "
                 "to be cut off at the top, where asperities touch, and their tip radii are wrong"
             )
+        if self.repeated:
+            yield (
+                f"{self.repeated:,} pixels had exactly the same height before a trend was removed, "
+                "many more than any other height: if these are missing values, make them nan"
+            )
+        if self.rms_slope > STEEP:
+            yield (
+                f"rms slope {self.rms_slope:.3g}: surfaces steeper than {STEEP:g} are rare; check "
+                "the units of the heights and of the pixel"
+            )
         if len(places := holes.spikes(self.heights)):
             row, column = places[0]
             yield (
@@ -156,7 +180,7 @@ class Surface(Record, Plottable):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """The surface without its best-fitting plane or sphere, which is added to `removed`.
+        """The surface without its best-fitting plane, sphere or paraboloid; `removed` has it.
 
         Raises InputError if nothing is left.
 
@@ -165,7 +189,8 @@ class Surface(Record, Plottable):
         sphere
         """
         if kind not in TRENDS:
-            raise InputError("detrend", found=repr(kind), expected='"plane" or "sphere"')
+            expected = '"plane", "sphere" or "paraboloid"'
+            raise InputError("detrend", found=repr(kind), expected=expected)
         trend, there = fitted(self.heights, self.pixel, kind)
         left = self.heights - there
         if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):

@@ -96,7 +96,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         required=(name,),
         optional=("x", "y"),
         instead={"load": ("pressure", "area")},
-        text=("status",) if name == "force" else (),
+        text=("status",),
         unnamed=((name,), ("x", "y", name)),
         how=how,
     )
@@ -117,10 +117,16 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     owners = place.nearest(values) if summed else place.owners()
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
     if summed:
-        place.mistakes += _negative(forces, floor, lambda i, what: f"load of asperity {i}{what}")
+        place.mistakes += _negative(
+            forces, floor, how.sign, lambda i, what: f"load of asperity {i}{what}"
+        )
     else:
         said = f", column {name}"
-        place.mistakes += _negative(values, floor, lambda i, what: table.mistake(i, said + what))
+        place.mistakes += _negative(
+            values, floor, how.sign, lambda i, what: table.mistake(i, said + what)
+        )
+        if name == "load" and "status" in columns:
+            place.mistakes += _contradicted(columns["status"], values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = columns.get("status")
@@ -133,19 +139,33 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
 
 
-def _negative(loads: Array, floor: float, mistake: Callable[[int, str], str]) -> Iterator[str]:
+def _negative(
+    loads: Array, floor: float, sign: float, mistake: Callable[[int, str], str]
+) -> Iterator[str]:
     """A message for each load below -floor; `mistake` adds its place."""
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
     if largest <= floor:
-        yield "column load: no load is positive, expected compression to be: --sign -1"
+        advice = "without --sign -1" if sign < 0 else "--sign -1"
+        yield f"column load: no load is positive, expected compression to be: {advice}"
         return
     if least <= SMALL * largest:
         hint = f"; --floor {rounded_up(least)} counts noise as 0"
     for i in bad:
         found = f": found {float(loads[i])!r}, expected a number that is not negative{hint}"
         yield mistake(int(i), found)
+
+
+def _contradicted(
+    status: NDArray[np.str_], loads: Array, floor: float, table: ReadTable
+) -> Iterator[str]:
+    """A message for each row whose status is "contact" without a load, or "open" with one."""
+    said, touches = np.char.lower(np.char.strip(status)), loads > floor
+    for i in np.flatnonzero(np.where(touches, said == "open", said == "contact")):
+        right = "contact" if touches[i] else "open"
+        expected = f'expected "{right}", as the load is {float(loads[i])!r}'
+        yield table.mistake(int(i), f', column status: found "{said[i]}", {expected}')
 
 
 def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDArray[Any]:
@@ -286,6 +306,9 @@ class _Placing:
             spacing = float(nearest_distances(positions).min())
         given = self.manner.tolerance
         allowed = POSITION_TOLERANCE * spacing if given is None else given
+        if len(positions) > 1 and allowed > spacing / 2:
+            expected = f"at most {spacing / 2:.3g}, half the smallest distance of two asperities"
+            raise InputError("--tolerance", found=allowed, expected=expected)
         distances, owners = _nearest(positions, points)
         far = distances > allowed
         self.how = f"matched by position (largest distance {distances.max():.2g})"

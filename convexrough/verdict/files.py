@@ -12,6 +12,7 @@ from convexrough.errors import TableError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
 from convexrough.normal.claims import WITHIN, tolerance
 from convexrough.normal.problem import NormalProblem
+from convexrough.tabular.table import few
 from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_forces
 from convexrough.verdict.report import Verified
 from convexrough.verdict.verdict import verify_on
@@ -59,5 +60,13 @@ def _claimed_to_slide(path: Path, forces: Claimed, contact: Contact) -> NDArray[
         named = [repr(str(each)) for each in unknown[:10]]
         mistakes = [f"column status: found {each}, expected {valid}" for each in named]
         raise TableError(str(path), mistakes)
+    wrong = np.where(contact.status == "contact", said == "open", False)
+    wrong |= np.where(contact.status == "open", (said != "open") & (said != "undecided"), False)
+    if wrong.any():
+        mistakes = [
+            f'column status: found "{said[i]}" at asperity {i}, which is proved {contact.status[i]}'
+            for i in np.flatnonzero(wrong)
+        ]
+        raise TableError(str(path), few(mistakes))
     by_force = claims_sliding(contact, forces.values)
     return np.where(said == "undecided", by_force, said == "sliding")

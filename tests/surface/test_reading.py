@@ -118,6 +118,11 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
         (matrix(1e9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
         (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
+        (
+            matrix(HEIGHTS),
+            {"pixel": 1.0, "unit": "nm", "height_unit": "um"},
+            "rms slope .* check height_unit, µm, and unit",
+        ),
         (matrix(), {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),

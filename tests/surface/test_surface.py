@@ -28,7 +28,7 @@ def test_a_plane_is_removed_and_said() -> None:
     for term in (np.ones_like(x), x, y):  # a least-squares fit leaves nothing of its terms
         assert abs(np.vdot(left, term)) < 1e-9
     assert_allclose(plane.rms_height, NOISE.std(), rtol=1e-2)
-    with pytest.raises(cr.InputError, match="detrend: found 'cone', expected \"plane\" or"):
+    with pytest.raises(cr.InputError, match="detrend: found 'cone', expected \"plane\", "):
         plane.detrend("cone")  # type: ignore[arg-type]
 
 
@@ -78,13 +78,23 @@ def test_no_map(heights: object, message: str) -> None:
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
 
 
+def test_a_paraboloid_of_a_turned_cylinder() -> None:
+    x, y = grid()
+    across = 0.8 * x + 0.6 * y
+    surface = cr.surface.Surface(0.1 * x - across**2 / 500 + NOISE, (0.5, 0.7))
+    (removed,) = surface.detrend("paraboloid").removed
+    assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
+    assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
+
+
 def test_a_trend_that_explains_most_is_named() -> None:
     x, y = grid()
     ball, tilt = -(x**2 + y**2) / 400, 0.3 * x
     for trend, kind in (
         (tilt, "plane"),
         (ball, "sphere"),
-        (ball + tilt, "sphere"),
+        (ball + tilt / 10, "sphere"),
+        (-(x**2) / 300 + tilt, "paraboloid"),
         (-ball, "sphere"),
     ):
         surface = cr.surface.Surface(trend + NOISE, (0.5, 0.7))
@@ -145,10 +155,16 @@ def test_spikes_and_drop_outs_are_named() -> None:
     grooved = made.copy()
     grooved[40] -= 30.0
     grooved[60:70, 60:70] += 30.0
-    assert cr.surface.Surface(grooved, 1.0).warnings == ()
+    assert cr.surface.Surface(grooved, 10.0).warnings == ()
+    (steep,) = cr.surface.Surface(grooved, 1.0).warnings
+    assert steep.startswith("rms slope 4.05: surfaces steeper than 1 are rare")
+    missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
+    told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
+    assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
+    assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
     grooved[7, 9:11] = 0.0
     grooved[90, 0] = 80.0
-    (said,) = cr.surface.Surface(grooved, 1.0).warnings
+    (said,) = cr.surface.Surface(grooved, 10.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
     assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said
 

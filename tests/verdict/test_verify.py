@@ -130,6 +130,24 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     assert command("verify", "a.toml", below, "--floor", "1e-20").status == 0
 
 
+def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: cr.Contact) -> None:
+    """A file with statuses makes two claims about each asperity."""
+    said, shown = np.array(contact.status), 1 + np.arange(61)
+    for asperity, word in ((0, "open"), (60, "contact")):
+        wrong = said.copy()
+        wrong[asperity] = word
+        for statuses, status in ((said, 0), (wrong, 2)):
+            lines = [
+                f"{load!r},{each}"
+                for load, each in zip(contact.loads.tolist(), statuses, strict=True)
+            ]
+            Path("loads.csv").write_text("\n".join(["load,status", *lines]))
+            outcome = command("verify", "a.toml", "loads.csv")
+            assert outcome.status == status
+            told = f'row {1 + shown[asperity]}, column status: found "{word}", expected "'
+            assert (told in outcome.err) == (status == 2), outcome.err
+
+
 def shear_file(forces: Any) -> str:
     Path("forces.csv").write_text("\n".join(["force", *map(repr, np.asarray(forces).tolist())]))
     return "forces.csv"
@@ -142,6 +160,14 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     outcome = command(*asked, shear_file(state.forces))
     assert (outcome.status, outcome.err) == (0, "")
     assert "shear forces      statuses proved; shear forces correct to " in outcome.out
+    for asperity, word in ((0, "open"), (60, "sliding")):
+        wrong = np.array(state.status)
+        wrong[asperity] = word
+        lines = [f"{Q!r},{each}" for Q, each in zip(state.forces.tolist(), wrong, strict=True)]
+        Path("forces.csv").write_text("\n".join(["force,status", *lines]))
+        refused = command(*asked, "forces.csv")
+        assert refused.status == 2
+        assert f'column status: found "{word}" at asperity {asperity}, which is' in refused.err
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(spoiled), "--json")
@@ -164,6 +190,8 @@ def test_wrong_use(command: Any, contact: cr.Contact) -> None:
         (("--within", "0"), "--within: found 0.0, expected a positive number"),
         (("--within", "5"), "; 5 % is 0.05"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
+        (("--tolerance", "1"), "--tolerance: found 1.0, expected at most 0.00125, half the small"),
+        (("--sign", "-1"), "no load is positive, expected compression to be: without --sign -1"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
         (
