@@ -24,6 +24,9 @@ from convexrough.verdict.verdict import rounded_up
 #: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given.
 POSITION_TOLERANCE = 1e-2
 
+#: Number of steps in which a shift of all nodes is estimated.
+REFINEMENTS = 5
+
 #: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
 
@@ -160,9 +163,10 @@ def _negative(
 def _contradicted(
     status: NDArray[np.str_], loads: Array, floor: float, table: ReadTable
 ) -> Iterator[str]:
-    """A message for each row whose status is "contact" without a load, or "open" with one."""
+    """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
     said, touches = np.char.lower(np.char.strip(status)), loads > floor
-    for i in np.flatnonzero(np.where(touches, said == "open", said == "contact")):
+    wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
+    for i in np.flatnonzero(wrong):
         right = "contact" if touches[i] else "open"
         expected = f'expected "{right}", as the load is {float(loads[i])!r}'
         yield table.mistake(int(i), f', column status: found "{said[i]}", {expected}')
@@ -253,6 +257,10 @@ class _Placing:
 
         if len(loaded) and not fits(loaded):
             middle = np.average(loaded, axis=0, weights=pressed)
+            for _ in range(REFINEMENTS):  # the mean distance from the nearest asperities
+                places = self.scene.contact_points
+                near = places[_nearest(places, loaded - middle)[1]]
+                middle = np.average(loaded - near, axis=0, weights=pressed)
             moved = self._moved(loaded, fits) or (
                 f"all are shifted by about {_pair(middle)}, expected them from the axis of the "
                 "sphere" if fits(loaded - middle) else "")  # fmt: skip
