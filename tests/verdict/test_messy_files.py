@@ -260,7 +260,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                       for name, each in case.pixels().items()},
         "", "found them 10^3 times as far out", "--scale x=0.001 --scale y=0.001"),
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
-                       "all are shifted by about [0.0002"),
+                       "all are shifted by about [0.0001997, 8.8"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
                           "x and y are exchanged, or the array is turned: --column x=y --c"),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
