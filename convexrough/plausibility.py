@@ -128,7 +128,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     cut_off = normal["contact"] >= FEW and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
         yield at_the_rim(normal["array_extent"])
-    elif cut_off and normal["all_touch"]:
+    elif cut_off and normal["all_touch"] and normal["contact"] >= ARRAY:
         yield (
             "every asperity touches, also at the rim of the array: others beyond it would carry "
             "load, too; use a larger array"

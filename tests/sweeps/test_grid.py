@@ -187,7 +187,7 @@ def test_a_new_scene_takes_a_sweep(command: Any, tmp_path: Path) -> None:
     """It has stages that are not measured: one line names them."""
     command("new", "a.toml")
     text = (tmp_path / "a.toml").read_text()
-    over = '"asperities.within" = [0.003, 0.004]\n'
+    over = '"normal.approach" = [8e-6, 1e-5]\n'
     (tmp_path / "a.toml").write_text(f'{text}[sweep]\nmeasure = ["loss"]\n[sweep.over]\n{over}')
     status, out, err = command("sweep", "a.toml", "--workers", "1")
     assert (status, err) == (0, "")
