@@ -24,6 +24,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
 from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
+from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
@@ -212,6 +213,7 @@ def followed(
     by = (stepper or Stepper)(levels)
 
     def found(count: int) -> SteppedPath:
+        LOGGER.info(f"solving {count} general steps per segment, as order is not proved")
         return _found(levels, by, by.along(start, points, count))
 
     if steps is not None:

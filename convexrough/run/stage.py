@@ -175,6 +175,13 @@ class Result(Table, Plottable):
         """The reasons why this result is not certified, one line for each."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
             yield f"not certified: {unsure} statuses in {self.name} undecided"
+        orders = {getattr(each, "order", None) or "proved" for each in self.found}
+        if not orders <= {"proved", "proved for one step"}:
+            needs = f"which the proof of [{self.name}] needs"
+            yield f"not proved: that indentations increase with the load, {needs}"
+        elif orders != {"proved"} and "loss" in self.stage.numbers:
+            why = "it is proved for one step only that indentations increase with the load"
+            yield f"not proved: the losses of [{self.name}], as {why}"
 
     @property
     def certified(self) -> bool:

@@ -40,7 +40,8 @@ class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
     minimum_fraction : one for each maximum; default: the negatives of the maxima
-    loop_points : approximate number of points of a loop; default: fewer for more asperities
+    loop_points : approximate number of points of a loop; default: fewer for more asperities, and
+        where order fails
     loop_asperities : asperities whose loops are computed: indices or "all"; default: one at each of
         at most 12 distances from the axis
     """
@@ -121,6 +122,8 @@ class CycleResult(Result):
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
+        if any(each.order == "fails" for each in self.found):  # a general step for each point
+            affordable = LEAST_POINTS
         chosen: ArrayLike | None = None  # None means all
         if stage.loop_asperities is None:
             distances = contact.scene.asperities.distances

@@ -21,7 +21,6 @@ from convexrough.friction.shapes import elliptic_path
 from convexrough.run.stage import (
     STATUSES,
     Columns,
-    Result,
     Single,
     Stage,
     Steps,
@@ -148,10 +147,6 @@ class PathResult(Steps):
         places = {"point": np.repeat(np.arange(m), n), "x": np.tile(x, m), "y": np.tile(y, m)}
         return {**super().tables(), "path_asperities": places | each}
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
-        yield from unproved_order(self, self.found[0].order)
-
     def lines(self) -> list[str]:
         return [*super().lines(), f"{INCREASE}{self.found[0].order}"]
 
@@ -239,11 +234,6 @@ class SteadyResult(Single):
             tables["phase_losses"] = _by_phase(losses)
         return tables
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
-        for each in self.found:
-            yield from unproved_order(self, each.order)
-
     def lines(self) -> list[str]:
         said = [*super().lines(), f"{INCREASE}{self.found[0].order}"]
         for losses in self.found[1:]:
@@ -269,9 +259,3 @@ class SteadyResult(Single):
 def _by_phase(losses: PhaseLosses) -> Columns:
     names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
     return losses.columns(*names)
-
-
-def unproved_order(result: Result, order: str | None) -> Iterator[str]:
-    """A reason for doubt if the order of indentations, which the result needs, is not proved."""
-    if order is not None and not order.startswith("proved"):
-        yield f"not proved: the order of indentations that the proof of [{result.name}] needs"

@@ -12,7 +12,6 @@ from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.run.stage import Columns, Single, Stage, Summary
-from convexrough.run.stages.path import unproved_order
 from convexrough.run.values import Finite, Force, Mistake, Positive, expected
 
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
@@ -99,9 +98,8 @@ class ShakedownResult(Single):
         return {self.name: columns}
 
     def doubts(self) -> Iterator[str]:
-        (found,) = self.found
-        yield from unproved_order(self, found.order)
-        if not found.proved:
+        yield from super().doubts()
+        if not self.found[0].proved:
             yield "not proved: any bounds on the limit of [shakedown]"
 
     def lines(self) -> list[str]:
