@@ -76,6 +76,11 @@ class ShearVerdict(Claim, Record):
         """(n,) [force] the error bounds of the certificate."""
         return self.certificate.force_errors
 
+    @property
+    def obstacle(self) -> str:
+        fails = self.certificate.order == "fails"
+        return "it is not proved that indentations increase with the load" if fails else ""
+
     def nearby(self) -> tuple[Array, Array]:
         """The shear forces of the solution, and bounds on their errors."""
         return self.solution.forces, self.solution.certificate.force_errors

@@ -83,6 +83,11 @@ class Claim(ABC):
         return frozen(np.where(status == "undecided", self.solution.status, status))
 
     @property
+    def obstacle(self) -> str:
+        """The reason why nothing can be proved about these forces; "" if there is none."""
+        return ""
+
+    @property
     def decided_alone(self) -> bool:
         """True if all statuses are proved from the given forces alone."""
         return bool(self.certificate.holds)

@@ -102,7 +102,7 @@ def _proved(claim: Claim) -> str:
     if len(claim.wrongly_claimed):
         return f"{claim.proved} wrong"
     if len(claim.undecided):
-        return f"{claim.proved} not proved"
+        return f"{claim.proved} not proved{claim.obstacle and ': '}{claim.obstacle}"
     near = f"{claim.many} correct to {_size(claim)}"
     if not claim.near_enough:
         near = f"errors of up to {_size(claim)}, more than allowed"
@@ -133,7 +133,8 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
             lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]
     lines += labelled([("undecided", str(len(claim.undecided) or "none"))])
     lines += table(claim.undecided)
-    lines += [*labelled([(f"{claim.one} error", _off(claim))]), *table(claim.off)]
+    lines += labelled([(f"{claim.one} error", _off(claim))])
+    lines += table(claim.off) if math.isfinite(claim.error) else []
     lines += labelled([(f"total {claim.one}", _total(claim, scene.units.force))])
     if len(claim.suspects):
         lines += [*labelled([("suspects", "likeliest first")]), *table(claim.suspects)]
@@ -209,6 +210,8 @@ def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
 def _off(claim: Claim) -> str:
     beyond = f"; exceeded by {len(claim.off):,}" if len(claim.off) else ""
     allowed = f"{100 * claim.within:g} %" if claim.within > PERCENT else f"{claim.within:g}"
+    if math.isinf(claim.error):
+        return f"no bound is proved ({allowed} allowed)"
     return f"at most {_size(claim)} {claim.one} ({allowed} allowed{beyond})"
 
 

@@ -219,6 +219,12 @@ def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.M
     assert summary["shakedown"]["proved"] is False
     assert summary["shakedown"]["upper"] is None
     assert "not proved: any bounds on the limit of [shakedown]" in outcome.err
+    total = repr(summary["shear"][0]["force"])
+    claimed = ("verify", "scene.toml", "out/asperities.csv", "--shear", "out/shear.csv")
+    said = command(*claimed, "--shear-force", total)
+    assert said.status == 3
+    assert "statuses not proved: it is not proved that indentations increase" in said.out
+    assert "force error       no bound is proved (1 % allowed)" in said.out
 
 
 def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
