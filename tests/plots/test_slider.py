@@ -208,4 +208,4 @@ def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> No
     opened.page.keyboard.press("Home")
     assert opened.text("said") == "0 of 37 slide, 37 stick"
     said = opened.page.locator("#force").get_attribute("aria-valuetext")
-    assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick in part"
+    assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick"
