@@ -37,6 +37,10 @@ BY_CHANCE = 0.25
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
 
+#: Statuses in a column "contact" of flags, by the flag.
+FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
+         "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
+
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
@@ -99,7 +103,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         required=(name,),
         optional=("x", "y"),
         instead={"load": ("pressure", "area")},
-        text=("status",),
+        text=("status", "contact"),
         unnamed=((name,), ("x", "y", name)),
         how=how,
     )
@@ -128,8 +132,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         place.mistakes += _negative(
             values, floor, how.sign, lambda i, what: table.mistake(i, said + what)
         )
-        if name == "load" and "status" in columns:
-            place.mistakes += _contradicted(columns["status"], values, floor, table)
+        if name == "load":
+            place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = columns.get("status")
@@ -161,15 +165,18 @@ def _negative(
 
 
 def _contradicted(
-    status: NDArray[np.str_], loads: Array, floor: float, table: ReadTable
+    columns: dict[str, NDArray[Any]], loads: Array, floor: float, table: ReadTable
 ) -> Iterator[str]:
     """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
-    said, touches = np.char.lower(np.char.strip(status)), loads > floor
-    wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
-    for i in np.flatnonzero(wrong):
-        right = "contact" if touches[i] else "open"
-        expected = f'expected "{right}", as the load is {float(loads[i])!r}'
-        yield table.mistake(int(i), f', column status: found "{said[i]}", {expected}')
+    touches = loads > floor
+    for name in ("status", "contact"):
+        found = np.char.lower(np.char.strip(columns.get(name, np.full(len(loads), ""))))
+        said = found if name == "status" else np.array([FLAGS.get(each, "") for each in found])
+        wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
+        for i in np.flatnonzero(wrong):
+            right = (("open", "contact") if name == "status" else ("0", "1"))[int(touches[i])]
+            expected = f'expected "{right}", as the load is {float(loads[i])!r}'
+            yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
 
 
 def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDArray[Any]:
