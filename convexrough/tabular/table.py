@@ -32,7 +32,20 @@ KINDS = {
 POSITIVE = ("tip_radius", "area")
 
 #: Names of columns with row numbers.
-INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
+INDEX = (
+    "index",
+    "id",
+    "no",
+    "nr",
+    "#",
+    "i",
+    "number",
+    "node",
+    "label",
+    "node label",
+    "asperity",
+    "",
+)
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
@@ -89,7 +102,8 @@ class ReadTable(NamedTuple):
     columns : numbers, or text for the columns read as text
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
-    called  : headers of the columns that were read;  others : headers of the other columns
+    called  : headers of the columns that were read
+    others  : the other columns by header; None instead of numbers where some cell has none
     factors : factors other than 1 by which columns were multiplied
     indices : columns of whole numbers with a name in `INDEX`
     """
@@ -100,7 +114,7 @@ class ReadTable(NamedTuple):
     units: dict[str, str]
     style: str
     called: dict[str, str]
-    others: list[str]
+    others: dict[str, Array | None]
     factors: dict[str, float]
     indices: dict[str, NDArray[np.intp]]
 
@@ -196,7 +210,7 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        [names[i] for i in rest if names[i]],
+        {names[i]: source.numbers(source.columns[i]) for i in rest if names[i]},
         factors,
         {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
          if (whole := _whole(source, i)) is not None},

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import permutations
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +32,9 @@ REFINEMENTS = 5
 
 #: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
+
+#: At most this many unread columns are compared with the positions of asperities.
+MOST_UNREAD = 8
 
 #: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
 #: At random points the median is about 0.4.
@@ -208,7 +214,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
         yield f"not looked at: {', '.join(table.others)}"
 
 
-def _unused_positions(others: Sequence[str]) -> Iterator[str]:
+def _unused_positions(others: Iterable[str]) -> Iterator[str]:
     """A message if unread columns have names similar to x and y."""
     found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
     if len(found) == 2:
@@ -237,6 +243,8 @@ class _Placing:
                 if (numbered := self._numbered(name, index)) is not None:
                     found, by = numbered, f"column {name or 'without a name'}"
                     break
+            if not by and not self.mistakes and rows == count:
+                self.mistakes += self._unused_positions()
         known = by or self.mistakes
         if rows != count and not (rows < count and known and self.manner.missing_open):
             advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
@@ -245,6 +253,26 @@ class _Placing:
             expected = f"expected {count}, one per asperity of the scene{advice}"
             self.mistakes.insert(0, f"rows: found {rows}, {expected}")
         return found
+
+    def _unused_positions(self) -> Iterator[str]:
+        """A message if two unread columns are positions of the asperities in another order."""
+        numbers = {bare(name): it for name, it in self.table.others.items() if it is not None}
+        for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
+            for angle, what in ((other, "polar coordinates, in radians"),
+                                (np.radians(other), "polar coordinates, in degrees"),
+                                (None, "positions")):  # fmt: skip
+                points = np.column_stack(
+                    (one, other) if angle is None else (one * np.cos(angle), one * np.sin(angle))
+                )
+                distances, owners = _nearest(self.scene.asperities.positions, points)
+                if distances.max() > self._allowed or len(np.unique(owners)) < len(owners):
+                    continue
+                if (owners == np.arange(len(owners))).all():
+                    return
+                found = f"columns {a}, {b}: found {what} in another order than the scene's"
+                named = f"--column x={quote(a)} --column y={quote(b)}"
+                yield f"{found}, expected {'columns x and y' if angle is not None else named}"
+                return
 
     def nearest(self, values: Array) -> Indices:
         """The nearest asperity of each node or pixel; a loaded one must be near its asperity."""
@@ -313,17 +341,21 @@ class _Placing:
             self.mistakes.append(f"column {name}: found {wrong}")
         return None
 
-    def _matched(self, points: Array) -> Indices:
-        """The asperity at each point; no asperity may occur twice."""
-        positions = self.scene.asperities.positions
+    @cached_property
+    def _allowed(self) -> float:
+        """[length] largest distance of a position from its asperity."""
+        positions, given = self.scene.asperities.positions, self.manner.tolerance
         spacing = float(self.scene.asperities.tip_radii[0])
         if len(positions) > 1:
             spacing = float(nearest_distances(positions).min())
-        given = self.manner.tolerance
-        allowed = POSITION_TOLERANCE * spacing if given is None else given
-        if len(positions) > 1 and allowed > spacing / 2:
-            expected = f"at most {spacing / 2:.3g}, half the smallest distance of two asperities"
-            raise InputError("--tolerance", found=allowed, expected=expected)
+            if given is not None and given > spacing / 2:
+                half = f"at most {spacing / 2:.3g}, half the smallest distance of two asperities"
+                raise InputError("--tolerance", found=given, expected=half)
+        return POSITION_TOLERANCE * spacing if given is None else given
+
+    def _matched(self, points: Array) -> Indices:
+        """The asperity at each point; no asperity may occur twice."""
+        positions, allowed = self.scene.asperities.positions, self._allowed
         distances, owners = _nearest(positions, points)
         far = distances > allowed
         self.how = f"matched by position (largest distance {distances.max():.2g})"
