@@ -184,7 +184,7 @@ def read_table(
         if each not in how.columns
     ]
     mistakes += _lookalikes(source, places, [*missing, *optional])
-    if not source.rows and not mistakes:
+    if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
@@ -294,6 +294,12 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             what = row.wrong or f"found {len(row.cells)} cells, expected {expected}"
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
     whole = [row for row in table.rows if len(row.cells) == width]
+    counts = [len(row.cells) for row in table.rows]
+    pointless = not any("." in row.text for row in table.rows)
+    doubled = counts and width <= min(counts) and max(counts) == 2 * width
+    if table.style.separator == "," and doubled and pointless:
+        found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
+        mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
         header=table.header,
         columns=[[row.cells[i] for row in whole] for i in range(width)],
@@ -380,6 +386,10 @@ def _numbers(
         fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
         if (fine & (plain > 0) if name in POSITIVE else fine).all():
             return plain
+    if not any(map(str, cells)):
+        saved = "formulas are, until a spreadsheet program saves their values"
+        mistakes.append(f"column {name}: found only empty cells, expected numbers; {saved}")
+        return np.full(len(cells), np.nan)
     check = checks.positive if name in POSITIVE else checks.finite
     numbers = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):

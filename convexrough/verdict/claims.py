@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,9 @@ REFINEMENTS = 5
 
 #: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
+
+#: Relative difference up to which the last row is the sum of the others.
+TOTAL = 1e-4
 
 #: At most this many unread columns are compared with the positions of asperities.
 MOST_UNREAD = 8
@@ -126,7 +130,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     values = columns[name] if areas is None else columns["pressure"] * areas
     if name == "load":
         values = how.sign * values
-    place = _Placing(scene, table, how)
+    place = _Placing(scene, table, how, name if name in columns else "pressure")
     owners = place.nearest(values) if summed else place.owners()
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
     if summed:
@@ -225,8 +229,8 @@ def _unused_positions(others: Iterable[str]) -> Iterator[str]:
 class _Placing:
     """The asperity of each row of a table, how it was found, and mistakes."""
 
-    def __init__(self, scene: Scene, table: ReadTable, manner: Manner) -> None:
-        self.scene, self.table, self.manner = scene, table, manner
+    def __init__(self, scene: Scene, table: ReadTable, manner: Manner, name: str) -> None:
+        self.scene, self.table, self.manner, self.name = scene, table, manner, name
         self.mistakes: list[str] = []
         self.how = "in the scene's order"
         columns = table.columns
@@ -251,7 +255,10 @@ class _Placing:
             if rows < count and by:
                 advice = "; --missing-open takes the others for open"
             expected = f"expected {count}, one per asperity of the scene{advice}"
-            self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+            if rows == count + 1 and self._totals:
+                self.mistakes = [self._totals]
+            else:
+                self.mistakes.insert(0, f"rows: found {rows}, {expected}")
         return found
 
     def _unused_positions(self) -> Iterator[str]:
@@ -341,17 +348,31 @@ class _Placing:
             self.mistakes.append(f"column {name}: found {wrong}")
         return None
 
+    @property
+    def _totals(self) -> str:
+        """A message if the last row has the sum of the others; else ""."""
+        *others, last = self.table.columns[self.name].tolist()
+        if math.isclose(math.fsum(others), last, rel_tol=TOTAL):
+            found = "found the sum of the others"
+            return self.table.mistake(-1, f": {found}, expected only asperities: remove the row")
+        return ""
+
+    @cached_property
+    def _spacing(self) -> float:
+        """[length] the smallest distance of two asperities; the tip radius of a single one."""
+        positions = self.scene.asperities.positions
+        if len(positions) == 1:
+            return float(self.scene.asperities.tip_radii[0])
+        return float(nearest_distances(positions).min())
+
     @cached_property
     def _allowed(self) -> float:
         """[length] largest distance of a position from its asperity."""
-        positions, given = self.scene.asperities.positions, self.manner.tolerance
-        spacing = float(self.scene.asperities.tip_radii[0])
-        if len(positions) > 1:
-            spacing = float(nearest_distances(positions).min())
-            if given is not None and given > spacing / 2:
-                half = f"at most {spacing / 2:.3g}, half the smallest distance of two asperities"
-                raise InputError("--tolerance", found=given, expected=half)
-        return POSITION_TOLERANCE * spacing if given is None else given
+        given, half = self.manner.tolerance, self._spacing / 2
+        if given is not None and given > half and len(self.scene) > 1:
+            expected = f"at most {half:.3g}, half the smallest distance of two asperities"
+            raise InputError("--tolerance", found=given, expected=expected)
+        return POSITION_TOLERANCE * self._spacing if given is None else given
 
     def _matched(self, points: Array) -> Indices:
         """The asperity at each point; no asperity may occur twice."""
@@ -371,6 +392,11 @@ class _Placing:
         )
         if moved:
             self.mistakes.append(f"positions: {moved}")
+            return owners
+        if far.any() and distances.max() < self._spacing / 2 and len(points) == len(positions):
+            found = f"found them up to {distances.max():.3g} from the nearest asperities"
+            advice = f"if they are rounded: --tolerance {rounded_up(float(distances.max()))}"
+            self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
             return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
