@@ -65,6 +65,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return end.exit_code
         except click.ClickException as error:
             error.show()
+            if "unexpected extra argument" in error.message:
+                say_aside(
+                    "hint", "quote names that contain spaces, as in --column 'x=X coordinate'"
+                )
             return error.exit_code
         except (click.Abort, KeyboardInterrupt):
             say_aside("interrupted")

@@ -208,6 +208,7 @@ def test_wrong_use(command: Any, contact: cr.Contact) -> None:
         (("--sign", "-1"), "no load is positive, expected compression to be: without --sign -1"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
+        (("--column", "x=x", "coord"), "hint: quote names that contain spaces"),
         (
             ("--shear", loads, "--shear-force", "1", "--column", "force=load"),
             "--shear-force: force: found 1.0 (",
