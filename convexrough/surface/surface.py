@@ -30,8 +30,9 @@ MOST, FITTED = 0.5, 256
 #: Difference of the two curvatures of a paraboloid, over their mean, below which it is round.
 ROUND = 0.1
 
-#: Rms slope above which heights are warned of.
-STEEP = 1.0
+#: Rms slopes below and above which heights are warned of. Lapped steel has some 1e-2, polished
+#: wafers 1e-3 to 1e-4.
+FLAT, STEEP = 3e-4, 1.0
 
 #: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
@@ -163,10 +164,11 @@ class Surface(Record, Plottable):
                 f"{self.repeated:,} pixels had exactly the same height before a trend was removed, "
                 "many more than any other height: if these are missing values, make them nan"
             )
-        if self.rms_slope > STEEP:
+        if not FLAT <= self.rms_slope <= STEEP:
+            rare = f"steeper than {STEEP:g}" if self.rms_slope > STEEP else f"flatter than {FLAT:g}"
             yield (
-                f"rms slope {self.rms_slope:.3g}: surfaces steeper than {STEEP:g} are rare; check "
-                "the units of the heights and of the pixel"
+                f"rms slope {self.rms_slope:.3g}: surfaces {rare} are rare; check the units of the "
+                "heights and of the pixel"
             )
         if len(places := holes.spikes(self.heights)):
             row, column = places[0]

@@ -32,7 +32,20 @@ KINDS = {
 POSITIVE = ("tip_radius", "area")
 
 #: Names of columns with row numbers.
-INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
+INDEX = (
+    "index",
+    "id",
+    "no",
+    "nr",
+    "#",
+    "i",
+    "number",
+    "node",
+    "label",
+    "node label",
+    "asperity",
+    "",
+)
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
@@ -89,7 +102,8 @@ class ReadTable(NamedTuple):
     columns : numbers, or text for the columns read as text
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
-    called  : headers of the columns that were read;  others : headers of the other columns
+    called  : headers of the columns that were read
+    others  : the other columns by header; None instead of numbers where some cell has none
     factors : factors other than 1 by which columns were multiplied
     indices : columns of whole numbers with a name in `INDEX`
     """
@@ -100,7 +114,7 @@ class ReadTable(NamedTuple):
     units: dict[str, str]
     style: str
     called: dict[str, str]
-    others: list[str]
+    others: dict[str, Array | None]
     factors: dict[str, float]
     indices: dict[str, NDArray[np.intp]]
 
@@ -170,7 +184,7 @@ def read_table(
         if each not in how.columns
     ]
     mistakes += _lookalikes(source, places, [*missing, *optional])
-    if not source.rows and not mistakes:
+    if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
@@ -196,7 +210,7 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        [names[i] for i in rest if names[i]],
+        {names[i]: source.numbers(source.columns[i]) for i in rest if names[i]},
         factors,
         {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
          if (whole := _whole(source, i)) is not None},
@@ -280,6 +294,12 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             what = row.wrong or f"found {len(row.cells)} cells, expected {expected}"
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
     whole = [row for row in table.rows if len(row.cells) == width]
+    counts = [len(row.cells) for row in table.rows]
+    pointless = not any("." in row.text for row in table.rows)
+    doubled = counts and width <= min(counts) and max(counts) == 2 * width
+    if table.style.separator == "," and doubled and pointless:
+        found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
+        mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
         header=table.header,
         columns=[[row.cells[i] for row in whole] for i in range(width)],
@@ -366,6 +386,10 @@ def _numbers(
         fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
         if (fine & (plain > 0) if name in POSITIVE else fine).all():
             return plain
+    if not any(map(str, cells)):
+        saved = "formulas are, until a spreadsheet program saves their values"
+        mistakes.append(f"column {name}: found only empty cells, expected numbers; {saved}")
+        return np.full(len(cells), np.nan)
     check = checks.positive if name in POSITIVE else checks.finite
     numbers = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):

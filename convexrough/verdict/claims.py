@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import permutations
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,12 +34,22 @@ REFINEMENTS = 5
 #: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
 
+#: Relative difference up to which the last row is the sum of the others.
+TOTAL = 1e-4
+
+#: At most this many unread columns are compared with the positions of asperities.
+MOST_UNREAD = 8
+
 #: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
 #: At random points the median is about 0.4.
 BY_CHANCE = 0.25
 
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
+
+#: Statuses in a column "contact" of flags, by the flag.
+FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
+         "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
 
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
@@ -99,7 +113,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         required=(name,),
         optional=("x", "y"),
         instead={"load": ("pressure", "area")},
-        text=("status",),
+        text=("status", "contact"),
         unnamed=((name,), ("x", "y", name)),
         how=how,
     )
@@ -116,7 +130,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     values = columns[name] if areas is None else columns["pressure"] * areas
     if name == "load":
         values = how.sign * values
-    place = _Placing(scene, table, how)
+    place = _Placing(scene, table, how, name if name in columns else "pressure")
     owners = place.nearest(values) if summed else place.owners()
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
     if summed:
@@ -128,8 +142,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         place.mistakes += _negative(
             values, floor, how.sign, lambda i, what: table.mistake(i, said + what)
         )
-        if name == "load" and "status" in columns:
-            place.mistakes += _contradicted(columns["status"], values, floor, table)
+        if name == "load":
+            place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = columns.get("status")
@@ -161,15 +175,18 @@ def _negative(
 
 
 def _contradicted(
-    status: NDArray[np.str_], loads: Array, floor: float, table: ReadTable
+    columns: dict[str, NDArray[Any]], loads: Array, floor: float, table: ReadTable
 ) -> Iterator[str]:
     """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
-    said, touches = np.char.lower(np.char.strip(status)), loads > floor
-    wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
-    for i in np.flatnonzero(wrong):
-        right = "contact" if touches[i] else "open"
-        expected = f'expected "{right}", as the load is {float(loads[i])!r}'
-        yield table.mistake(int(i), f', column status: found "{said[i]}", {expected}')
+    touches = loads > floor
+    for name in ("status", "contact"):
+        found = np.char.lower(np.char.strip(columns.get(name, np.full(len(loads), ""))))
+        said = found if name == "status" else np.array([FLAGS.get(each, "") for each in found])
+        wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
+        for i in np.flatnonzero(wrong):
+            right = (("open", "contact") if name == "status" else ("0", "1"))[int(touches[i])]
+            expected = f'expected "{right}", as the load is {float(loads[i])!r}'
+            yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
 
 
 def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDArray[Any]:
@@ -201,7 +218,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
         yield f"not looked at: {', '.join(table.others)}"
 
 
-def _unused_positions(others: Sequence[str]) -> Iterator[str]:
+def _unused_positions(others: Iterable[str]) -> Iterator[str]:
     """A message if unread columns have names similar to x and y."""
     found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
     if len(found) == 2:
@@ -212,8 +229,8 @@ def _unused_positions(others: Sequence[str]) -> Iterator[str]:
 class _Placing:
     """The asperity of each row of a table, how it was found, and mistakes."""
 
-    def __init__(self, scene: Scene, table: ReadTable, manner: Manner) -> None:
-        self.scene, self.table, self.manner = scene, table, manner
+    def __init__(self, scene: Scene, table: ReadTable, manner: Manner, name: str) -> None:
+        self.scene, self.table, self.manner, self.name = scene, table, manner, name
         self.mistakes: list[str] = []
         self.how = "in the scene's order"
         columns = table.columns
@@ -230,14 +247,39 @@ class _Placing:
                 if (numbered := self._numbered(name, index)) is not None:
                     found, by = numbered, f"column {name or 'without a name'}"
                     break
+            if not by and not self.mistakes and rows == count:
+                self.mistakes += self._unused_positions()
         known = by or self.mistakes
         if rows != count and not (rows < count and known and self.manner.missing_open):
             advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
             if rows < count and by:
                 advice = "; --missing-open takes the others for open"
             expected = f"expected {count}, one per asperity of the scene{advice}"
-            self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+            if rows == count + 1 and self._totals:
+                self.mistakes = [self._totals]
+            else:
+                self.mistakes.insert(0, f"rows: found {rows}, {expected}")
         return found
+
+    def _unused_positions(self) -> Iterator[str]:
+        """A message if two unread columns are positions of the asperities in another order."""
+        numbers = {bare(name): it for name, it in self.table.others.items() if it is not None}
+        for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
+            for angle, what in ((other, "polar coordinates, in radians"),
+                                (np.radians(other), "polar coordinates, in degrees"),
+                                (None, "positions")):  # fmt: skip
+                points = np.column_stack(
+                    (one, other) if angle is None else (one * np.cos(angle), one * np.sin(angle))
+                )
+                distances, owners = _nearest(self.scene.asperities.positions, points)
+                if distances.max() > self._allowed or len(np.unique(owners)) < len(owners):
+                    continue
+                if (owners == np.arange(len(owners))).all():
+                    return
+                found = f"columns {a}, {b}: found {what} in another order than the scene's"
+                named = f"--column x={quote(a)} --column y={quote(b)}"
+                yield f"{found}, expected {'columns x and y' if angle is not None else named}"
+                return
 
     def nearest(self, values: Array) -> Indices:
         """The nearest asperity of each node or pixel; a loaded one must be near its asperity."""
@@ -306,17 +348,35 @@ class _Placing:
             self.mistakes.append(f"column {name}: found {wrong}")
         return None
 
+    @property
+    def _totals(self) -> str:
+        """A message if the last row has the sum of the others; else ""."""
+        *others, last = self.table.columns[self.name].tolist()
+        if math.isclose(math.fsum(others), last, rel_tol=TOTAL):
+            found = "found the sum of the others"
+            return self.table.mistake(-1, f": {found}, expected only asperities: remove the row")
+        return ""
+
+    @cached_property
+    def _spacing(self) -> float:
+        """[length] the smallest distance of two asperities; the tip radius of a single one."""
+        positions = self.scene.asperities.positions
+        if len(positions) == 1:
+            return float(self.scene.asperities.tip_radii[0])
+        return float(nearest_distances(positions).min())
+
+    @cached_property
+    def _allowed(self) -> float:
+        """[length] largest distance of a position from its asperity."""
+        given, half = self.manner.tolerance, self._spacing / 2
+        if given is not None and given > half and len(self.scene) > 1:
+            expected = f"at most {half:.3g}, half the smallest distance of two asperities"
+            raise InputError("--tolerance", found=given, expected=expected)
+        return POSITION_TOLERANCE * self._spacing if given is None else given
+
     def _matched(self, points: Array) -> Indices:
         """The asperity at each point; no asperity may occur twice."""
-        positions = self.scene.asperities.positions
-        spacing = float(self.scene.asperities.tip_radii[0])
-        if len(positions) > 1:
-            spacing = float(nearest_distances(positions).min())
-        given = self.manner.tolerance
-        allowed = POSITION_TOLERANCE * spacing if given is None else given
-        if len(positions) > 1 and allowed > spacing / 2:
-            expected = f"at most {spacing / 2:.3g}, half the smallest distance of two asperities"
-            raise InputError("--tolerance", found=allowed, expected=expected)
+        positions, allowed = self.scene.asperities.positions, self._allowed
         distances, owners = _nearest(positions, points)
         far = distances > allowed
         self.how = f"matched by position (largest distance {distances.max():.2g})"
@@ -332,6 +392,11 @@ class _Placing:
         )
         if moved:
             self.mistakes.append(f"positions: {moved}")
+            return owners
+        if far.any() and distances.max() < self._spacing / 2 and len(points) == len(positions):
+            found = f"found them up to {distances.max():.3g} from the nearest asperities"
+            advice = f"if they are rounded: --tolerance {rounded_up(float(distances.max()))}"
+            self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
             return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"

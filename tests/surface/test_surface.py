@@ -158,6 +158,8 @@ def test_spikes_and_drop_outs_are_named() -> None:
     assert cr.surface.Surface(grooved, 10.0).warnings == ()
     (steep,) = cr.surface.Surface(grooved, 1.0).warnings
     assert steep.startswith("rms slope 4.05: surfaces steeper than 1 are rare")
+    (flat,) = cr.surface.Surface(1e-3 * made, 1.0).warnings
+    assert flat.startswith("rms slope 9.95e-05: surfaces flatter than 0.0003 are rare")
     missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
     told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
     assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]

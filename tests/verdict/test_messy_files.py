@@ -263,6 +263,27 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                        "all are shifted by about [0.0001997, 8.8"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
                           "x and y are exchanged, or the array is turned: --column x=y --c"),
+    "places under other names": (lambda case: case.table("COORD1 COORD2 load"), "",
+                                 "COORD1, COORD2: found positions in another order than the sc",
+                                 "expected --column x=COORD1 --column y=COORD2"),
+    "polar places": (
+        lambda case: {"r": np.hypot(*PLACES[case.order].T),
+                      "phi": np.degrees(np.arctan2(*PLACES[case.order].T[::-1])),
+                      "load": case.loads[case.order]},
+        "", "r, phi: found polar coordinates, in degrees in", "expected columns x and y"),
+    "decimal commas between commas": (
+        lambda case: lines(case.table(), ",", ","), "", "rows: found up to 6 parts between commas",
+        "write decimal points, or semicolons"),
+    "rounded places": (
+        lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
+        "if they are rounded: --tolerance "),
+    "formulas without values": (
+        lambda case: [[["x", "y", "load"], *([x, y, f"={load}*1"]
+                                             for x, y, load in matrix(case.table()))]],
+        "a.xlsx", "column load: found only empty cells", "formulas are, until a spreadsheet"),
+    "totals without a name": (
+        lambda case: lines(case.table()) + f"0,0,{case.loads.sum()}\n", "",
+        "row 14: found the sum of the others"),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",
@@ -318,7 +339,7 @@ def test_refused_with_the_cause(tmp_path: Path, command: Any, case: Case, name: 
     make, file, *causes = REFUSED[name]
     outcome = command("verify", "scene.toml", put(tmp_path, make(case), file or "loads.csv"))
     assert (outcome.status, outcome.out) == (2, "")
-    assert all(cause in outcome.err for cause in causes)
+    assert all(cause in outcome.err for cause in causes), outcome.err
     assert len(outcome.err.splitlines()) <= (1 if name in MOVED else 11)
 
 

@@ -132,8 +132,13 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
 
 def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: cr.Contact) -> None:
     """A file with statuses makes two claims about each asperity."""
-    said, shown = np.array(contact.status), 1 + np.arange(61)
-    for asperity, word in ((0, "open"), (60, "contact")):
+    texts, shown = np.array(contact.status), 1 + np.arange(61)
+    flags = np.where(texts == "open", "0", "1")
+    for said, column, asperity, word in (
+        *((texts, "status", asperity, word) for asperity, word in ((0, "open"), (60, "contact"))),
+        (flags, "Contact", 0, "0"),
+        (np.where(flags == "1", "TRUE", "FALSE"), "contact", 60, "TRUE"),
+    ):
         wrong = said.copy()
         wrong[asperity] = word
         for statuses, status in ((said, 0), (wrong, 2)):
@@ -141,10 +146,11 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
                 f"{load!r},{each}"
                 for load, each in zip(contact.loads.tolist(), statuses, strict=True)
             ]
-            Path("loads.csv").write_text("\n".join(["load,status", *lines]))
+            Path("loads.csv").write_text("\n".join([f"load,{column}", *lines]))
             outcome = command("verify", "a.toml", "loads.csv")
             assert outcome.status == status
-            told = f'row {1 + shown[asperity]}, column status: found "{word}", expected "'
+            place = f"row {1 + shown[asperity]}, column {column.lower()}"
+            told = f'{place}: found "{word.lower()}", expected "'
             assert (told in outcome.err) == (status == 2), outcome.err
 
 
