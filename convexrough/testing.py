@@ -20,7 +20,7 @@ from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.scene.scene import Scene
-from convexrough.verdict import Verdict, verify
+from convexrough.verdict import verify
 from convexrough.verdict.report import describe_claim, reason
 
 P = ParamSpec("P")
@@ -158,6 +158,6 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
 def _check(claim: Claim, scene: Scene) -> None:
     __tracebackhide__ = True
     if not claim.holds:
-        hints = claim.hints() if isinstance(claim, Verdict) else ()
-        lines = [reason(claim), *describe_claim(claim, scene), *(f"hint: {h}" for h in hints)]
+        hints = (f"hint: {each}" for each in claim.hints())
+        lines = [reason(claim), *describe_claim(claim, scene), *hints]
         raise AssertionError("\n".join(lines))

@@ -173,8 +173,9 @@ def verify(
     echo(summary, lines, as_json)
     for caution in cautions_about(file.scene, found.verdict.loads):
         say_aside("warning", caution)
-    for hint in found.verdict.hints():
-        say_aside("hint", hint)
+    for claim in found.claims:
+        for hint in claim.hints():
+            say_aside("hint", hint)
     if not found.holds:
         reasons = filter(None, map(report.reason, found.claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")

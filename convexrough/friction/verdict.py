@@ -56,6 +56,10 @@ class ShearVerdict(Claim, Record):
         return self.forces
 
     @property
+    def unit(self) -> str:
+        return self.contact.scene.units.force or "N"
+
+    @property
     def largest(self) -> float:
         """[force] the largest size of a claimed force, or the largest limit f P_i if all are 0."""
         limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())

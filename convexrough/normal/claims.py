@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -20,6 +21,12 @@ WITHIN = 0.01
 
 #: Smallest error of a suspect, as a fraction of the largest error.
 SUSPICIOUS = 1e-3
+
+#: Prefixes of the units of forces that are too large by these powers of ten.
+PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
+
+#: Largest part of an error that remains after a factor, of which `hints` then tells.
+REMAINING = 0.1
 
 
 def tolerance(name: str, within: float) -> float:
@@ -59,6 +66,11 @@ class Claim(ABC):
     @abstractmethod
     def values(self) -> Array:
         """(n,) [force] the given forces."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """The name of the unit of forces."""
 
     @property
     @abstractmethod
@@ -106,6 +118,25 @@ class Claim(ABC):
         """True if all claimed statuses are proved, all forces accurate, and the total agrees."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
+
+    def hints(self) -> Iterator[str]:
+        """Lines that suggest where wrong forces may come from."""
+        if self.holds or (nearby := self.nearby()) is None:
+            return
+        values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
+        factor = float(values @ true) / (float(true @ true) or 1.0)
+        left, apart = (float(np.abs(values - each * true).max()) for each in (factor, 1.0))
+        if left > REMAINING * apart or factor == 0 or abs(factor - 1) <= self.within:
+            return
+        size, exact = f"are {abs(factor):.4g} times those of the solution", math.log10(abs(factor))
+        if abs(abs(factor) - 1) <= self.within:
+            size = ""
+        elif abs(exact - (power := round(exact))) < math.log10(1 + WITHIN):
+            prefix = PREFIXES.get(power)
+            example = f", as {prefix}{self.unit} for {self.unit}" if prefix else ""
+            size = f"are 10^{power} times what they should be: another unit{example}?"
+        sign = "have the other sign" if factor < 0 else ""
+        yield f"the {self.many} {' and '.join(filter(None, (sign, size)))}"
 
     @property
     def wrongly_claimed(self) -> Indices:

@@ -35,9 +35,6 @@ NOISE = 1e-6
 #: the error.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: Prefixes of the units of loads that are too large by these powers of ten.
-PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Claim, Table, Plottable):
@@ -95,6 +92,10 @@ class Verdict(Claim, Table, Plottable):
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
 
     @property
+    def unit(self) -> str:
+        return self.scene.units.force or "N"
+
+    @property
     def errors_alone(self) -> Array:
         """(n,) [force] bounds from the certificate of the loads, plus the loads that count as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
@@ -114,13 +115,7 @@ class Verdict(Claim, Table, Plottable):
                 f"{noise / self.largest:.1g} of the largest: --floor {rounded_up(noise)} counts "
                 "them as open"
             )
-        expected = self.total_prescribed
-        if expected is None and self.solution is not None:
-            expected = self.solution.load
-        if expected and (power := power_of_ten(self.total_given / expected)):
-            prefix, unit = PREFIXES.get(power), self.scene.units.force or "N"
-            example = f", as {prefix}{unit} for {unit}" if prefix else ""
-            yield f"the loads are 10^{power} times what they should be: another unit{example}?"
+        yield from super().hints()
         if self.solution is not None and (moved := self._moved(self.solution.loads)):
             yield f"the loads are right with {moved}"
 
@@ -150,14 +145,6 @@ def rounded_up(value: float) -> str:
     """The value as text, rounded up to one digit."""
     power = 10.0 ** math.floor(math.log10(value))
     return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
-
-
-def power_of_ten(ratio: float) -> int:
-    """The power of ten that the ratio equals to 1 %; 0 if none."""
-    if not (ratio > 0 and math.isfinite(ratio)):
-        return 0
-    exact = math.log10(ratio)
-    return round(exact) if abs(exact - round(exact)) < 0.005 else 0
 
 
 def verify(

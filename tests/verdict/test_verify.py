@@ -110,6 +110,8 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
     assert outcome.status == 3
     hint = "hint: the loads are 10^3 times what they should be: another unit, as mN for N?"
     assert hint in outcome.err
+    elsewhere = command("verify", scene, claim(contact, factor=1.0989))  # E* without 1 - nu^2
+    assert "hint: the loads are 1.099 times those of the solution\n" in elsewhere.err
     if scene == "b.toml":
         assert ": ratio 1000\n" in outcome.out
         assert "the total load is not the prescribed one" in outcome.err
@@ -174,6 +176,12 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
         refused = command(*asked, "forces.csv")
         assert refused.status == 2
         assert f'column status: found "{word}" at asperity {asperity}, which is' in refused.err
+    for factor, said in ((-1, "have the other sign"), (-1e3, "have the other sign and are 10^3"),
+                         (1e-6, "are 10^-6 times what they should be: another unit, as MN for N?"),
+                         (1.25, "are 1.25 times those of the solution")):  # fmt: skip
+        outcome = command(*asked, shear_file(factor * state.forces))
+        assert outcome.status == 3
+        assert f"hint: the shear forces {said}" in outcome.err
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(spoiled), "--json")
