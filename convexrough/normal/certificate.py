@@ -25,7 +25,7 @@ from convexrough.normal.boxes import Scope, lowest_approach_bound
 from convexrough.normal.other_solutions import NO_OTHERS, OtherSolutions
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import Trial, completed, refined, refines, trial
+from convexrough.normal.refine import Trial, completed, refined, refines, scaled, trial
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -53,7 +53,7 @@ class Certificate(Table):
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
     duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
-        prescribed, the loads are first scaled to it
+        prescribed, the loads are first scaled to it, without those of asperities that cannot touch
     fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
         unless contacts are crowded. Uniqueness nearby is proved only among solutions with these
         asperities open
@@ -163,7 +163,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     if problem.load is not None and not given.any():
         expected = "a positive load on an asperity that can touch: the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
-    pair, missing = completed(problem, Pair.exact(given))
+    pair, missing = completed(problem, scaled(problem, Pair.exact(given)))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
     start = trial(problem, pair, missing, product)
     found = proved(problem, start)
@@ -239,7 +239,11 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
     asperities fixed open add at most e'q, and removing them changes the residuals by A q.
     """
     box = found.box
-    excess = np.where(box.fixed_open & (start.loads.high == 0), 0.0, start.excess)
+    violations = start.excess
+    if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
+        violations = violations + 2 * ROUNDOFF * (start.local + start.product.upper)
+        moved = moved + ROUNDOFF * start.loads.high
+    excess = np.where(box.fixed_open & (start.loads.high == 0), 0.0, violations)
     q = np.where(box.fixed_open, start.loads.high * (1 + SAFETY), 0.0)
     if q.any():
         displacement = problem.influence.apply(q)

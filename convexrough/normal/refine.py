@@ -187,17 +187,24 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
     return following
 
 
+def scaled(problem: Problem, loads: Pair) -> Pair:
+    """The loads scaled to the prescribed total, if there is one and any load is positive."""
+    if problem.load is None or not loads.high.any():
+        return loads
+    power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
+    loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
+    return loads * (problem.total.mid / sums(loads))
+
+
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads scaled to the prescribed total, and the rounding by which they miss it."""
+    """The loads changed to have the prescribed total, and the rounding by which they miss it."""
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.total
     total = problem.total.mid
     if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
-        power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
-        loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-        loads = loads * (total / sums(loads))
+        loads = scaled(problem, loads)
     missing = total - sums(loads)
     which = np.argmax(loads.high, axis=-1, keepdims=True)
     most = Pair(*(np.take_along_axis(part, which, -1) for part in loads)) + missing

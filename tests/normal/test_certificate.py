@@ -313,6 +313,29 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
     assert gap <= 1.01 * excess + certify_on(problem, contact.loads).duality_gap
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-9, 1e-3])
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> None:
+    """Of pressed loads, and with an error of the largest; both are scaled to a prescribed load."""
+    scene = paper("closest")
+    load = cr.press(scene, approach=PAPER_APPROACH).load
+    prescribed = {"approach": PAPER_APPROACH} if control == "approach" else {"load": load}
+    contact, exact = cr.press(scene, **prescribed), reference(scene, **prescribed)
+    wrong, certificate = contact.loads.copy(), contact.certificate
+    if off:
+        wrong[np.argmax(wrong)] *= 1 + off
+        certificate = cr.certify(scene, wrong, **prescribed)
+    with ctx.workdps(80):
+        loads = [arb(load) for load in wrong.tolist()]
+        if control == "load":
+            loads = [arb(load) * each / sum(loads) for each in loads]
+        above = multiprecision.energy(scene, loads, arb(PAPER_APPROACH))
+        above -= multiprecision.energy(scene, exact.loads, arb(PAPER_APPROACH))
+        assert 0 < above <= arb(certificate.duality_gap)
+    if off >= 1e-9:
+        assert certificate.duality_gap <= 3 * float(above)
+
+
 def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
     """As `assert_honest`, without the rounding of a difference."""
     with ctx.workprec(4096):
