@@ -137,7 +137,7 @@ def load_path(
     forces: ArrayLike,
     start: Contact | None = None,
     influence: Kind | None = None,
-    steps: int | None = None,
+    general_steps: int | None = None,
 ) -> LoadPath:
     """The friction states along a path of load and shear force with straight segments.
 
@@ -145,8 +145,8 @@ def load_path(
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : compliance operator; None for the cheapest that is exact
-    steps     : number of general steps per segment (docs/theory/without-order.md); their results
-        are not proved. None uses the memory curve, or as many general steps as needed if an
+    general_steps : number of them per segment (docs/theory/without-order.md); their results are
+        not proved. None uses the memory curve, or as many general steps as needed if an
         indentation falls as the load rises
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
@@ -157,7 +157,7 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, steps)
+    return walk(scene, loads, forces, start, influence, general_steps)
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
@@ -184,14 +184,15 @@ def walk(
     forces: ArrayLike,
     start: Contact | None = None,
     influence: Kind | None = None,
-    steps: int | None = None,
+    general_steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """The result of `load_path`, with a choice of the solver of general steps."""
     checks.instance("scene", scene, Scene)
     points = points_of(scene, loads, forces)
-    if steps is not None and (not isinstance(steps, int) or steps < 1):
-        raise InputError("steps", found=steps, expected="a whole number, at least 1")
+    if general_steps is not None and (not isinstance(general_steps, int) or general_steps < 1):
+        expected = "a whole number, at least 1"
+        raise InputError("general_steps", found=general_steps, expected=expected)
     curve = MemoryCurve()
     if start is not None:
         checks.instance("start", start, Contact)
@@ -203,7 +204,7 @@ def walk(
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     levels = contact.cached(FrictionLevels)
     return _path(
-        contact, np.array(forces, dtype=float), Walk(levels, curve, points, steps, stepper)
+        contact, np.array(forces, dtype=float), Walk(levels, curve, points, general_steps, stepper)
     )
 
 

@@ -123,9 +123,9 @@ def compare_paths(
     """
     given, entries, path = (scene, loads, forces, start, influence), list[PathEntry](), None
     ways: dict[Way, Callable[[], LoadPath]] = {
-        "general step": lambda: walk(*given, steps=1),
+        "general step": lambda: walk(*given, general_steps=1),
         "memory curve": lambda: walk(*given),
-        "conic step": lambda: walk(*given, steps=1, stepper=ConicStepper),
+        "conic step": lambda: walk(*given, general_steps=1, stepper=ConicStepper),
     }
     for way, found in ways.items():
         LOGGER.info(way)

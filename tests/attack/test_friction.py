@@ -234,7 +234,7 @@ def test_general_steps_next_to_gross_sliding() -> None:
     true = cr.load_path(scene, loads=loads, forces=forces)
     assert true.order == "proved"
     for steps in (1, 4):
-        path = cr.load_path(scene, loads=loads, forces=forces, steps=steps)
+        path = cr.load_path(scene, loads=loads, forces=forces, general_steps=steps)
         assert path.asperity_forces == pytest.approx(true.asperity_forces, abs=1e-11)
         assert path.displacements == pytest.approx(true.displacements, rel=1e-9)
 
@@ -245,7 +245,7 @@ def test_general_steps_where_many_begin_to_slide() -> None:
     asperities = cr.Asperities(points, [7.6, 0.1, 6.0, 0.6, 0.3, 1.2], heights)
     scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
     forces = 0.5 * np.array([1.5, -1.5, 1.75 * (1 - 1e-9)])
-    path = cr.load_path(scene, loads=[2.0, 2.0, 1.75], forces=forces, steps=4)
+    path = cr.load_path(scene, loads=[2.0, 2.0, 1.75], forces=forces, general_steps=4)
     assert path.order == "fails"
     assert path.asperity_forces.sum(axis=1) == pytest.approx(forces, rel=1e-12)
     assert (abs(path.asperity_forces) <= 0.5 * path.asperity_loads * (1 + 1e-12)).all()
@@ -257,7 +257,7 @@ def test_general_steps_as_near_to_gross_sliding_as_rounding_allows() -> None:
     asperities = cr.Asperities(points, [0.1, 5.2, 0.1, 2.9, 0.2], heights)
     scene = cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
     contact, forces = cr.press(scene, load=2.0), np.array([1.0, -1.0]) * (1 - 3e-15)
-    path = cr.load_path(scene, loads=[2.0, 2.0], forces=forces, steps=1, start=contact)
+    path = cr.load_path(scene, loads=[2.0, 2.0], forces=forces, general_steps=1, start=contact)
     assert path.asperity_forces.sum(axis=1) == pytest.approx(forces, rel=1e-15)
     assert path.displacements[1] == pytest.approx(-path.displacements[0], rel=1e-6)
 

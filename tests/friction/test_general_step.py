@@ -49,7 +49,7 @@ def test_random_paths(sampled: tuple[cr.Scene, float], seed: int) -> None:
     path = cr.load_path(scene, loads=P, forces=Q)
     if path.order == "fails":
         return
-    agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
+    agree(path, cr.load_path(scene, loads=P, forces=Q, general_steps=1), 1e-12)
 
 
 @pytest.mark.sample(1)
@@ -82,7 +82,7 @@ def test_where_order_fails() -> None:
     assert path.order == "fails"
     assert np.isinf(path.displacement_errors).all()
     assert set(path.status.ravel()) == {"undecided"}
-    fine = cr.load_path(scene, loads=P, forces=Q, steps=32)
+    fine = cr.load_path(scene, loads=P, forces=Q, general_steps=32)
     X = np.abs(path.displacements).max()
     assert_allclose(path.displacements, fine.displacements, atol=2e-3 * X)
     bristles = Bristles(scene, largest, count=200)
@@ -96,7 +96,7 @@ def test_where_order_fails() -> None:
 
 def test_bad_input() -> None:
     with pytest.raises(cr.InputError, match="steps"):
-        cr.load_path(PAPER, loads=[LARGEST["paper"]], forces=[0.0], steps=0)
+        cr.load_path(PAPER, loads=[LARGEST["paper"]], forces=[0.0], general_steps=0)
 
 
 @cache
