@@ -71,6 +71,7 @@ class Cycle(Table, Plottable):
         due to normal loads up to L* is the same in every cycle
     balance_defect   : relative difference between `loss` and a second formula for it, the error of
         the trapezoid rule (docs/theory/losses.md); a check of rounding; nan if P varies
+        or order fails
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
         Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
     smooth_normalised : loss / W0 of the smooth sphere; nan if P varies. Both are nan if no asperity
@@ -471,7 +472,7 @@ def _cycle(
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     if closed.general is not None:
         first, both = closed.general.losses[[closed.once, -1]]
-        loss = both - first
+        loss, defect = both - first, np.nan
         amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
     everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
