@@ -95,8 +95,8 @@ class Claim(ABC):
         return frozen(np.where(status == "undecided", self.solution.status, status))
 
     @property
-    def obstacle(self) -> str:
-        """The reason why nothing can be proved about these forces; "" if there is none."""
+    def basis(self) -> str:
+        """What is proved of the assumption on which the proof of these forces rests; "" if none."""
         return ""
 
     @property

@@ -175,13 +175,17 @@ class Result(Table, Plottable):
         """The reasons why this result is not certified, one line for each."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
             yield f"not certified: {unsure} statuses in {self.name} undecided"
-        orders = {getattr(each, "order", None) or "proved" for each in self.found}
-        if not orders <= {"proved", "proved for one step"}:
+        if not self.orders <= {"proved", "proved for one step"}:
             needs = f"which the proof of [{self.name}] needs"
             yield f"not proved: that indentations increase with the load, {needs}"
-        elif orders != {"proved"} and "loss" in self.stage.numbers:
+        elif "proved for one step" in self.orders and "loss" in self.stage.numbers:
             why = "it is proved for one step only that indentations increase with the load"
             yield f"not proved: the losses of [{self.name}], as {why}"
+
+    @property
+    def orders(self) -> set[str]:
+        """What is proved about order, which results with friction need (docs/theory/states.md)."""
+        return {each.order for each in self.found if getattr(each, "order", None)}
 
     @property
     def certified(self) -> bool:
@@ -207,8 +211,12 @@ class Result(Table, Plottable):
         printed = self.headings()
         said = [titled(self.title or self.name, printed, self.units)]
         said += [many] if len(cut) < len(self.known) else []
-        rows = [[row[key] for key in printed] for row in cut]
-        return [*said, *aligned([list(printed.values()), *rows], digits=self.digits)]
+        said += aligned(
+            [list(printed.values()), *([row[key] for key in printed] for row in cut)],
+            digits=self.digits,
+        )
+        proved = ", ".join(sorted(self.orders))
+        return [*said, *([f"indentations increase with the load: {proved}"] if proved else [])]
 
     def headings(self) -> Mapping[str, str]:
         """The headings of the printed columns, by key."""
@@ -263,7 +271,8 @@ class Steps(Result):
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""
-        return {key: [row[key] for row in self.known] for key in self.known[0]}
+        lists = {key: [row[key] for row in self.known] for key in self.known[0]}
+        return lists | {"order": self.found[0].order}
 
 
 class Single(Result):

@@ -102,7 +102,7 @@ def _proved(claim: Claim) -> str:
     if len(claim.wrongly_claimed):
         return f"{claim.proved} wrong"
     if len(claim.undecided):
-        return f"{claim.proved} not proved{claim.obstacle and ': '}{claim.obstacle}"
+        return f"{claim.proved} not proved"
     near = f"{claim.many} correct to {_size(claim)}"
     if not claim.near_enough:
         near = f"errors of up to {_size(claim)}, more than allowed"
@@ -128,6 +128,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
         ("result" if claim.one == "load" else claim.many, _proved(claim)),
         ("wrong statuses", str(len(claim.wrongly_claimed) or "none")),
     ])  # fmt: skip
+    lines[1:1] = [claim.basis] if claim.basis else []
     for what, which in claim.wrong.items():
         if len(which):
             lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]

@@ -42,8 +42,6 @@ from convexrough.tabular.columns import aligned
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
-INCREASE = "indentations increase with the load: "
-
 
 class Ellipse(FileTable):
     """An elliptic path in chords: normal load P + A cos t, shear force Q + B sin(t + phase).
@@ -132,7 +130,7 @@ class PathResult(Steps):
 
     def summary(self) -> Summary:
         (path,) = self.found
-        return super().summary() | {"order": path.order, "presses": path.presses}
+        return super().summary() | {"presses": path.presses}
 
     def tables(self) -> dict[str, Columns]:
         """The tables of the points and of the asperities at each point."""
@@ -146,9 +144,6 @@ class PathResult(Steps):
         }
         places = {"point": np.repeat(np.arange(m), n), "x": np.tile(x, m), "y": np.tile(y, m)}
         return {**super().tables(), "path_asperities": places | each}
-
-    def lines(self) -> list[str]:
-        return [*super().lines(), f"{INCREASE}{self.found[0].order}"]
 
 
 class SteadyStage(_Points):
@@ -235,7 +230,7 @@ class SteadyResult(Single):
         return tables
 
     def lines(self) -> list[str]:
-        said = [*super().lines(), f"{INCREASE}{self.found[0].order}"]
+        said = super().lines()
         for losses in self.found[1:]:
             columns = _by_phase(losses)
             printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
