@@ -68,7 +68,22 @@ def read_grid(path: Path) -> HeightGrid:
             if len(body) == SAMPLE and _style(body) is None:
                 break
     style = _style(body)
-    return _from_list(path) if style is None else _said(comments, _numbers(path, body, style))
+    if style is None:
+        _refuse_titles(path, body)
+        return _from_list(path)
+    return _said(comments, _numbers(path, body, style))
+
+
+def _refuse_titles(path: Path, body: Sequence[tuple[int, str]]) -> None:
+    """Raise InputError for a line of text above a matrix with another number of cells."""
+    if _style(body[1:]) is None:
+        return
+    style = sniff([line for _, line in body[1:SAMPLE]], STYLES)
+    count, cells = (len(stripped(style.split(body[k][1]))) for k in (1, 0))
+    if count > 3 > cells:
+        expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
+        where = f"{path}: row {body[0][0]}"
+        raise InputError("text", found=repr(body[0][1][:60]), expected=expected, where=where)
 
 
 def _style(body: Sequence[tuple[int, str]]) -> Style | None:
@@ -166,6 +181,6 @@ def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
     number = np.rint(lines)
     if np.abs(lines - number).max() > OFF_GRID:
         worst = float(values[np.argmax(np.abs(lines - number))])
-        expected = f"coordinates {step:g} apart"
+        expected = f"coordinates {step:g} apart, on a regular grid, in columns x, y and height"
         raise InputError(name, found=f"{worst:g}", expected=expected, where=str(path))
     return number.astype(np.intp), step

@@ -80,7 +80,7 @@ def read(
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
             likely = f"{SLOPES[0]:g} to {SLOPES[1]:g}"
-            more = "if heights have another unit, give height_unit"
+            more = "if heights have another unit, give height_unit, or --height-unit"
             more = f"check height_unit, {upwards.name}, and unit" if upwards else more
             expected = f"{likely}; {more}"
             raise InputError("heights", found=f"rms slope {slope:.3g}", expected=expected)

@@ -112,6 +112,11 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
 @pytest.mark.parametrize(
     ("content", "options", "message"),
     [
+        (
+            "Height [nm]\n" + matrix(),
+            {"pixel": 1.0},
+            r"row 1: text: found 'Height \[nm\]', expected a co",
+        ),
         (matrix(), {}, "pixel: found none, expected its size, which the file does not state"),
         (matrix(HOLED), {"pixel": 1.0}, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
         (matrix(np.full((7, 9), np.nan)), {"pixel": 1.0, "fill": True}, "expected some heights"),
