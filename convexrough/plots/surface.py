@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.arrays import Array, Number
@@ -168,13 +169,17 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
     axes = figure.subplots()
     image = draw_surface(axes, surface)
-    named = [(SUMMIT, f"summits ({len(summits):,})")]
-    positions = summits.positions
+    positions, handles, shown = summits.positions, [], f"{len(summits):,}"
     if contact is not None and contact.loads.any():
         edge = _draw_contacts(axes, contact)
-        named.append((UNSURE, f"contacts ({np.count_nonzero(contact.loads):,})"))
-        inside = np.abs(positions).max(axis=1) <= edge
-        positions = positions[inside]
+        contacts = f"contacts ({np.count_nonzero(contact.loads):,})"
+        handles = [disc_handle(UNSURE, contacts)]
+        if Scale(contact).axes:
+            line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="contact if smooth")
+            handles.append(line)
+        positions = positions[np.abs(positions).max(axis=1) <= edge]
+        if len(positions) < len(summits):
+            shown = f"{len(positions):,} of {shown}"
         width, height = (min(edge, side / 2) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
         _label_places(axes, surface)
@@ -182,7 +187,8 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     scale = bar(axes, image, "", above=True)
     highest = float(np.abs(surface.heights).max())
     scale.ax.set_title(_count(scale.ax.yaxis, "$z$", surface.unit, highest), fontsize=TICK)
-    legend_outside(figure, [disc_handle(*each) for each in named], "lower center", 2)
+    handles.insert(0, disc_handle(SUMMIT, f"summits ({shown})"))
+    legend_outside(figure, handles, "lower center", 3)
     return figure
 
 

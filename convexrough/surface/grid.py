@@ -116,17 +116,28 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
         rows.append(values)
     heights = np.array(rows)
     if min(heights.shape) > 2:
-        _refuse_numbers(path, "row 1", heights[0, 1:])
-        _refuse_numbers(path, "column 1", heights[1:, 0])
+        _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
+        _refuse_numbers(path, "column 1", heights[1:, 0], heights[1:, 1])
     return heights
 
 
-def _refuse_numbers(path: Path, place: str, line: Array) -> None:
-    """Raise InputError for numbers of rows or columns, here without the first."""
-    if line[0] in (0, 1, 2) and (np.diff(line) == 1).all():
+def _refuse_numbers(path: Path, place: str, line: Array, beside: Array) -> None:
+    """Raise InputError for coordinates or numbers of rows or columns, here without the first."""
+    if _even(line) and not _even(beside):
         said = ", ".join(f"{each:g}" for each in line[:3])
-        expected = "heights: pandas leaves numbers out with header=False, index=False"
+        expected = (
+            "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
+            "header=False, index=False"
+        )
         raise InputError(place, found=f"numbers {said}, ...", expected=expected, where=str(path))
+
+
+def _even(line: Array) -> bool:
+    """True for numbers at equal distances, up to rounding to six digits."""
+    steps, size = np.diff(line), float(np.abs(line).max())
+    return bool(
+        len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
+    )
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:

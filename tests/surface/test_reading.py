@@ -159,6 +159,11 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         ("1 2 3 4\n", {"pixel": 1.0}, "shape"),
         ("0 1 2 3 4 5 6 7 8\n" + matrix(), {"pixel": 1.0}, "row 1: found numbers 1, 2, 3, ..."),
         (
+            "0 .2 .4 .6 .8 1 1.2 1.4 1.6\n" + matrix(),
+            {"pixel": 0.2},
+            "row 1: found numbers 0.2, 0.4, 0.6, ..., expected heights alone: leave coordinates",
+        ),
+        (
             "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
             {"pixel": 1.0},
             "column 1: found numbers 1, 2, 3, ...",
