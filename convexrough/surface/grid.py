@@ -121,9 +121,9 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
     return heights
 
 
-def _refuse_numbers(path: Path, place: str, line: Array, beside: Array) -> None:
+def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
     """Raise InputError for coordinates or numbers of rows or columns, here without the first."""
-    if _even(line) and not _even(beside):
+    if _even(line) and not _even(second):
         said = ", ".join(f"{each:g}" for each in line[:3])
         expected = (
             "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
