@@ -120,7 +120,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     columns, mistakes = table.columns, list[str]()
     given = [each for each in ("x", "y") if each in columns]
     if len(given) == 1:
-        mistakes.append(f"columns: found only {given[0]}, expected x and y")
+        unused = _unused(table)
+        mistakes.append(f"columns: found only {given[0]}, expected x and y{unused}")
     summed = how.nodes or name not in columns
     if summed and not given:
         mistakes.append("columns: found neither x nor y, expected both, of nodes or pixels")
@@ -152,6 +153,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if areas is not None and "area" not in columns:
         place.how += f", each of area {areas:.5g}"
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
+    if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
+        units.append(f"column {name}, not pressure")
     note = ", ".join(filter(None, [table.style, *units, place.how]))
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
 
@@ -218,6 +221,11 @@ def _explained(table: ReadTable) -> Iterator[str]:
         yield f"not looked at: {', '.join(table.others)}"
 
 
+def _unused(table: ReadTable) -> str:
+    """The end of a message, with the names of columns that are not read."""
+    return f"; not used: {', '.join(table.others)}" if table.others else ""
+
+
 def _unused_positions(others: Iterable[str]) -> Iterator[str]:
     """A message if unread columns have names similar to x and y."""
     found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
@@ -251,7 +259,11 @@ class _Placing:
                 self.mistakes += self._unused_positions()
         known = by or self.mistakes
         if rows != count and not (rows < count and known and self.manner.missing_open):
-            advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
+            advice = "" if by else _unused(self.table)
+            if rows > count and (
+                self.points is None or len(np.unique(self.points, axis=0)) > count
+            ):
+                advice += "; --nodes adds up rows at their nearest asperity"
             if rows < count and by:
                 advice = "; --missing-open takes the others for open"
             expected = f"expected {count}, one per asperity of the scene{advice}"
@@ -265,8 +277,8 @@ class _Placing:
         """A message if two unread columns are positions of the asperities in another order."""
         numbers = {bare(name): it for name, it in self.table.others.items() if it is not None}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
-            for angle, what in ((other, "polar coordinates, in radians"),
-                                (np.radians(other), "polar coordinates, in degrees"),
+            for angle, what in ((other, "polar coordinates (in radians)"),
+                                (np.radians(other), "polar coordinates (in degrees)"),
                                 (None, "positions")):  # fmt: skip
                 points = np.column_stack(
                     (one, other) if angle is None else (one * np.cos(angle), one * np.sin(angle))
@@ -314,11 +326,21 @@ class _Placing:
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             )
             self._refuse(i, found, f"less than to its neighbour, {apart[owners[i]]:.3g}")
+        if self.name == "pressure":
+            self._refuse_repeated(self.points @ [1, 1j], values != 0, "each node or pixel once")
         self.how = f"{len(owners):,} nodes summed at their nearest asperities"
         return owners
 
     def _refuse(self, row: Any, found: str, expected: str) -> None:
         self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
+
+    def _refuse_repeated(
+        self, places: NDArray[Any], chosen: NDArray[np.bool_], expected: str
+    ) -> None:
+        """Add a mistake for each row, of those chosen, with the place of an earlier one."""
+        _, first, back = np.unique(places, return_index=True, return_inverse=True)
+        for i in np.flatnonzero((first[back] != np.arange(len(places))) & chosen):
+            self._refuse(i, f"the same position as in {self.table.rows[first[back[i]]]}", expected)
 
     def _numbered(self, name: str, index: NDArray[np.intp]) -> Indices | None:
         """The indices of asperities in a column that counts from 0 or 1; else None."""
@@ -401,10 +423,7 @@ class _Placing:
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
-        _, first, back = np.unique(owners, return_index=True, return_inverse=True)
-        for i in np.flatnonzero((first[back] != np.arange(len(owners))) & ~far):
-            found = f"the same position as in {self.table.rows[first[back[i]]]}"
-            self._refuse(i, found, "each asperity once")
+        self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
     def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:
