@@ -124,6 +124,10 @@ class Claim(ABC):
         if self.holds or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
+        sorted_apart = np.abs(np.sort(values) - np.sort(true)).max()
+        if sorted_apart <= self.within < np.abs(values - true).max():
+            yield f"the {self.many} are those of the solution, in another order of the asperities"
+            return
         factor = float(values @ true) / (float(true @ true) or 1.0)
         left, apart = (float(np.abs(values - each * true).max()) for each in (factor, 1.0))
         if left > REMAINING * apart or factor == 0 or abs(factor - 1) <= self.within:

@@ -29,7 +29,7 @@ KINDS = {
 }
 
 #: Columns of positive numbers.
-POSITIVE = ("tip_radius", "area")
+POSITIVE = ("tip_radius",)
 
 #: Names of columns with row numbers.
 INDEX = (

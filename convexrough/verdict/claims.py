@@ -37,6 +37,9 @@ MOST_TRIED = 1000
 #: Relative difference up to which the last row is the sum of the others.
 TOTAL = 1e-4
 
+#: Part of loaded nodes that may be far from all asperities, if not all positions are wrong.
+FEW_FAR = 0.1
+
 #: At most this many unread columns are compared with the positions of asperities.
 MOST_UNREAD = 8
 
@@ -128,6 +131,14 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if mistakes:
         raise TableError(str(path), mistakes)
     areas = None if name in columns else _areas(path, columns)
+    if areas is not None and "area" in columns:
+        wrong = (areas < 0) | ((areas == 0) & (columns["pressure"] != 0))
+        mistakes = [
+            table.mistake(int(i), f", column area: found {areas[i]:g}, expected a positive number")
+            for i in np.flatnonzero(wrong)
+        ]
+        if mistakes:
+            raise TableError(str(path), few(mistakes))
     values = columns[name] if areas is None else columns["pressure"] * areas
     if name == "load":
         values = how.sign * values
@@ -136,12 +147,12 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
     if summed:
         place.mistakes += _negative(
-            forces, floor, how.sign, lambda i, what: f"load of asperity {i}{what}"
+            forces, floor, how.sign, place.name, lambda i, what: f"load of asperity {i}{what}"
         )
     else:
         said = f", column {name}"
         place.mistakes += _negative(
-            values, floor, how.sign, lambda i, what: table.mistake(i, said + what)
+            values, floor, how.sign, name, lambda i, what: table.mistake(i, said + what)
         )
         if name == "load":
             place.mistakes += _contradicted(columns, values, floor, table)
@@ -160,15 +171,15 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
 
 
 def _negative(
-    loads: Array, floor: float, sign: float, mistake: Callable[[int, str], str]
+    loads: Array, floor: float, sign: float, name: str, mistake: Callable[[int, str], str]
 ) -> Iterator[str]:
-    """A message for each load below -floor; `mistake` adds its place."""
+    """A message for each load below -floor, from a column; `mistake` adds its place."""
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
     if largest <= floor:
         advice = "without --sign -1" if sign < 0 else "--sign -1"
-        yield f"column load: no load is positive, expected compression to be: {advice}"
+        yield f"column {name}: no {name} is positive, expected compression to be: {advice}"
         return
     if least <= SMALL * largest:
         hint = f"; --floor {rounded_up(least)} counts noise as 0"
@@ -309,7 +320,9 @@ class _Placing:
             parts = near / apart[their]
             return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
 
-        if len(loaded) and not fits(loaded):
+        closer = np.setdiff1d(np.flatnonzero(values), far)
+        most = self.points[closer] if len(far) <= FEW_FAR * len(loaded) else loaded
+        if len(loaded) and not fits(most):
             middle = np.average(loaded, axis=0, weights=pressed)
             for _ in range(REFINEMENTS):  # the mean distance from the nearest asperities
                 places = self.scene.contact_points
@@ -428,8 +441,14 @@ class _Placing:
 
     def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:
         """A sentence on the exchange, sign or unit of x and y that makes all fit; else ""."""
-        x, y = (bare(self.table.called[name]) for name in ("x", "y"))
+        x, y = (self._called(name) for name in ("x", "y"))
         exchange = f"--column x={y} --column y={x}"
+        held = {name: self.table.columns[name] for name in ("x", "y", self.name)}
+        for a, b, c in permutations(held):
+            if {a, b} != {"x", "y"} and fits(np.column_stack((held[a], held[b]))):
+                pairs = zip(held, (a, b, c), strict=True)
+                named = " ".join(f"--column {one}={self._called(other)}" for one, other in pairs)
+                return f"the header names the columns in another order: {named}"
         if fits(points[:, ::-1]):
             return f"x and y are exchanged, or the array is turned: {exchange}"
         for signs, names in (([-1, 1], "x"), ([1, -1], "y"), ([-1, -1], "xy")):
@@ -441,6 +460,9 @@ class _Placing:
             if fits(points * 10.0**-power):
                 return _too_far_out(power)
         return ""
+
+    def _called(self, name: str) -> str:
+        return quote(bare(self.table.called[name]))
 
     def _shifted(self, points: Array, allowed: float, fits: Callable[[Array], bool]) -> str:
         """A sentence on the shift that makes all points fit; else ""."""

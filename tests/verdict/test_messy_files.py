@@ -217,6 +217,8 @@ READ: dict[str, tuple[Any, ...]] = {
         lambda case: "Project: plate\nDate;1 May 2026\n\n" + german(case.table()),),
     "pixels of a map": (Case.pixels, "a.csv", "--within 1e-9"),
     "nodes with areas": (tributary,),
+    "areas of 0 without pressure": (
+        lambda case: {name: [*each, 0.0] for name, each in tributary(case).items()},),
     "nodal forces": (patches, "a.csv", "--nodes"),
     "another unit, scaled": (
         lambda case: case.table("x y load\xa0[mN]",
@@ -284,6 +286,17 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "totals without a name": (
         lambda case: lines(case.table()) + f"0,0,{case.loads.sum()}\n", "",
         "row 14: found the sum of the others"),
+    "a header in another order": (
+        lambda case: lines(case.table()).replace("x,y,load", "load,x,y"), "",
+        "the header names the columns in another order: --column x=load --column y=x --column lo"),
+    "areas of 0 under pressure": (
+        lambda case: {name: [*each, each[0] * 0.0 if "area" in name else each[0]]
+                      for name, each in tributary(case).items()},
+        "", "column area: found 0, expected a positive number"),
+    "one node far away": (
+        lambda case: case.pixels() | {name: [*each, more] for (name, each), more in
+                                      zip(case.pixels().items(), (0.01, 0.0, 1.0), strict=True)},
+        "", "row 14643: found a load at [0.01, 0.0]"),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",

@@ -112,6 +112,9 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
     assert hint + (", or of the modulus?" if scene == "a.toml" else "?") in outcome.err
     elsewhere = command("verify", scene, claim(contact, factor=1.0989))  # E* without 1 - nu^2
     assert "hint: the loads are 1.099 times those of the solution\n" in elsewhere.err
+    turned = dict(enumerate(np.roll(contact.loads, 5).tolist()))
+    elsewhere = command("verify", scene, claim(contact, turned))
+    assert "hint: the loads are those of the solution, in another order" in elsewhere.err
     if scene == "b.toml":
         assert ": ratio 1000\n" in outcome.out
         assert "the total load is not the prescribed one" in outcome.err
