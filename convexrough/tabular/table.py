@@ -284,7 +284,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             lines=[""] * count,
             style="",
             number=_as_number,
-            numbers=lambda cells: None,
+            numbers=_as_numbers,
             mistakes=[],
         )
     table = read_text_table(path, known)
@@ -421,6 +421,11 @@ def _numbers(
 
 def _as_number(cell: Any) -> float | None:
     return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else None
+
+
+def _as_numbers(cells: Sequence[Any]) -> Array | None:
+    kinds = {type(cell) for cell in cells}
+    return np.array(cells, dtype=np.float64) if kinds <= {int, float} else None
 
 
 def _shown(mistake: str, line: str) -> str:
