@@ -167,13 +167,13 @@ def table(value: Any, *keys: str) -> list[Any]:
     return [value[key] for key in keys]
 
 
-def as_list(values: Any, n: int | None = None) -> list[Any]:
+def as_list(values: Any, what: str, n: int | None = None) -> list[Any]:
     if not isinstance(values, list) or (n is not None and len(values) != n):
-        raise Unreadable("expected a list" + (f" of {n}" if n is not None else ""))
+        raise Unreadable(f"{what}: expected a list" + (f" of {n}" if n is not None else ""))
     return values
 
 
-def number(text: Any) -> Fraction:
+def number(text: Any, what: str) -> Fraction:
     """The float64 number that `float.hex` wrote as this text; reading it rounds nothing."""
     try:
         value = float.fromhex(text)
@@ -181,16 +181,16 @@ def number(text: Any) -> Fraction:
             return Fraction(value)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise Unreadable(f"{str(text)[:40]!r} is not a finite float64 in hexadecimal")
+    raise Unreadable(f"{what}: {str(text)[:40]!r} is not a finite float64 in hexadecimal")
 
 
-def numbers(values: Any, n: int | None = None) -> list[Fraction]:
-    return [number(text) for text in as_list(values, n)]
+def numbers(values: Any, what: str, n: int | None = None) -> list[Fraction]:
+    return [number(text, f"{what} [{i}]") for i, text in enumerate(as_list(values, what, n))]
 
 
-def added(texts: Any) -> Fraction:
+def added(texts: Any, what: str) -> Fraction:
     """The sum of float64 numbers, which represents one number with more digits."""
-    return sum(numbers(texts), Fraction(0))
+    return sum(numbers(texts, what), Fraction(0))
 
 
 def digest(scene: Any, prescribed: Any) -> str:
@@ -214,8 +214,8 @@ class Scene(NamedTuple):
 
 def curvatures(value: Any) -> list[Fraction]:
     """Curvatures of the base along x and y, from one radius or two; 0 for "inf"."""
-    radii = as_list(value, 2) if isinstance(value, list) else [value, value]
-    found = [Fraction(0) if text == "inf" else number(text) for text in radii]
+    radii = as_list(value, "sphere_radius", 2) if isinstance(value, list) else [value, value]
+    found = [Fraction(0) if text == "inf" else number(text, "sphere_radius") for text in radii]
     if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
         raise Refused("a radius of the sphere is not positive")
     return [1 / radius if radius else radius for radius in found]
@@ -227,9 +227,11 @@ SEVERAL = ("x", "y", "heights", "tip_radii")
 
 def read_scene(given: Any) -> Scene:
     base, E, nu, f, geometry, *values = table(given, *SINGLE, *SEVERAL)
-    bends, modulus, ratio = curvatures(base), number(E), number(nu)
-    friction = Fraction(0) if f is None else number(f)
-    x, y, heights, tips = (numbers(value, len(as_list(values[0]))) for value in values)
+    bends, modulus = curvatures(base), number(E, "contact_modulus")
+    ratio = number(nu, "poisson_ratio")
+    friction = Fraction(0) if f is None else number(f, "friction")
+    n = len(as_list(values[0], "x"))
+    x, y, heights, tips = (numbers(*each, n) for each in zip(values, SEVERAL, strict=True))
     if not 0 < len(x) <= MOST_ASPERITIES:
         raise Refused(f"{len(x)} asperities; from 1 to {MOST_ASPERITIES} can be checked in minutes")
     if min(modulus, *tips) <= 0 or friction < 0 or not 0 <= ratio <= Fraction(1, 2):
@@ -280,15 +282,15 @@ class Box(NamedTuple):
 
 def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
     """The box, after the proof that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
-    b, theta, shells = numbers(given[0], len(scene.points)), number(given[1]), given[2]
+    b, theta = numbers(given[0], "box", len(scene.points)), number(given[1], "convexity_number")
     able = [i for i in range(len(b)) if b[i] > 0]
     if min(b) < 0 or not 0 < theta < 1:
         raise Refused("the box is negative, or the convexity number not between 0 and 1")
     radii = [b[i] / theta for i in able]
-    if shells is None:
+    if given[2] is None:
         prove_definite(scene, radii, able, tell)
     else:
-        prove_by_shells(scene, numbers(shells, len(b)), radii, able, tell)
+        prove_by_shells(scene, numbers(given[2], "shells", len(b)), radii, able, tell)
     return Box(b, able, theta)
 
 
@@ -343,8 +345,9 @@ class State(NamedTuple):
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
     """The only solution in the box, under this load, or if None, under the approach in `place`."""
     radii, centre = table(place, "radii", "approach")
-    a = [added(radius) for radius in as_list(radii, len(scene.points))]
-    approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
+    n = len(scene.points)
+    a = [added(radius, f"radii [{i}]") for i, radius in enumerate(as_list(radii, "radii", n))]
+    approach, b, R, d = added(centre, "approach"), box.radii, scene.radii, scene.offsets
     everyone = range(len(a))
     if min(a) < 0 or any(a[i] > b[i] for i in everyone):
         raise Refused("a contact radius is negative, or outside the box")
@@ -504,9 +507,9 @@ def prove_shear(
     """What is proved about a friction state, which is the difference of two solutions (12)."""
     force, place = table(entry, "force", "held")
     f, unit = scene.friction, scene.friction * scene.modulus
-    if number(force) <= 0 or f <= 0:
+    if number(force, "force") <= 0 or f <= 0:
         raise Refused("a shear force or the coefficient of friction is not positive")
-    fall = number(force) / unit
+    fall = number(force, "force") / unit
     if (pressed.total - fall).low <= 0:
         raise Refused("a shear force is not proved to be below what friction can carry")
     held = prove_state(scene, box, place, pressed.total - fall, tell)
@@ -546,14 +549,15 @@ def prove(document: Any, tell: Tell) -> dict[str, Any]:
     scene, load, top = read_scene(given), None, None
     *convexity, ceiling = table(argument, "box", "convexity_number", "shells", "ceiling")
     if isinstance(prescribed, dict) and "load" in prescribed:
-        load, top = Interval(number(*table(prescribed, "load")) / scene.modulus), number(ceiling)
+        (total,) = table(prescribed, "load")
+        load, top = Interval(number(total, "load") / scene.modulus), number(ceiling, "ceiling")
     elif [*table(prescribed, "approach")] != table(pressed, "radii", "approach")[1]:
         raise Refused("the approach is not the one prescribed")
     elif ceiling is not None:
         raise Unreadable("the ceiling must be null if the approach is prescribed")
     box = read_box(scene, convexity, tell)
     state = prove_state(scene, box, pressed, load, tell)
-    ordered = ordered_fall(scene, box, state, tell) if as_list(sheared) else Fraction(0)
+    ordered = ordered_fall(scene, box, state, tell) if as_list(sheared, "sheared") else Fraction(0)
     return {
         "scope": scope(scene, box, state, top),
         "approach": state.approach,
@@ -579,13 +583,13 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
         for key, claim in zip(proved, table(claimed, *proved), strict=True):
             hold(f"{what} {key}", claim, proved[key])
     elif isinstance(proved, list):
-        for i, claim in enumerate(as_list(claimed, len(proved))):
+        for i, claim in enumerate(as_list(claimed, what, len(proved))):
             hold(f"{what} [{i}]", claim, proved[i])
     elif not isinstance(proved, Interval):
         if claimed not in (proved, WEAKER.get(proved, proved and "undecided")):
             raise Refused(f"{what}: claimed {str(claimed)[:20]!r}, proved {proved!r}")
     else:
-        low, high = numbers(claimed, 2)
+        low, high = numbers(claimed, what, 2)
         if not low <= proved.low <= proved.high <= high:
             raise Refused(f"{what}: not proved to be within the claimed bounds")
 
@@ -593,7 +597,7 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
 def sentence(document: Any) -> str:
     """The claims in sentences: one about the contact, and one for each shear force."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
-    bounds = [numbers(pair, 2) for pair in claims["loads"]]
+    bounds = [numbers(pair, "claims loads", 2) for pair in claims["loads"]]
     largest = max(high for _, high in bounds) or Fraction(1)
     widest = min(max(high - low for low, high in bounds) / largest, Fraction(1))
     known = Context(1, ROUND_CEILING).create_decimal(float(widest))

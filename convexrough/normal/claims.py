@@ -134,7 +134,8 @@ class Claim(ABC):
         elif abs(exact - (power := round(exact))) < math.log10(1 + WITHIN):
             prefix = PREFIXES.get(power)
             example = f", as {prefix}{self.unit} for {self.unit}" if prefix else ""
-            size = f"are 10^{power} times what they should be: another unit{example}?"
+            modulus = ", or of the modulus" if self.total_prescribed is None else ""
+            size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
         sign = "have the other sign" if factor < 0 else ""
         yield f"the {self.many} {' and '.join(filter(None, (sign, size)))}"
 

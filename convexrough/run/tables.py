@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike
 from convexrough.errors import FileError, InputError, blamed_on
 from convexrough.scene.asperities import Asperities
 from convexrough.tabular.arrays import reading
-from convexrough.tabular.table import AS_IT_IS, Reading, read_table
+from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
+from convexrough.tabular.text import bare
 from convexrough.tabular.units import parsed
+
+#: Columns of numbers, of results, that are ignored in a table of asperities.
+RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
 
 
 def read_text(path: Path, most: int) -> str:
@@ -22,6 +26,11 @@ def read_text(path: Path, most: int) -> str:
         if len(contents) > most:
             raise FileError(f"{path}: more than {most / 2**20:g} MiB")
         return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
+
+
+def unknown(column: str) -> bool:
+    """True for the header of a column that cannot be told from one of heights."""
+    return bare(column).lower() not in (*INDEX, *RESULTS)
 
 
 def read_summits(
@@ -35,10 +44,15 @@ def read_summits(
         path,
         required=("x", "y"),
         optional=("height", "tip_radius"),
-        also={"height": ("z", "h", "heights")},
+        also={"height": ("z", "h", "heights"), "tip_radius": ("radius",)},
         how=how,
     )
     columns = table.columns
+    unread = [it for it, numbers in table.others.items() if numbers is not None and unknown(it)]
+    if "height" not in columns and unread:
+        named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
+        raise InputError("columns", found=f"{', '.join(unread)}, but no height",
+                         expected=f"a column height; {named}", where=str(path))  # fmt: skip
     if (said := table.units.get("x", "")) and parsed(said) and not how.units.length:
         expected = f'[units] length in the scene file, as "{said}"'
         raise InputError("column x", found=f"{said}, and a scene without units", expected=expected,

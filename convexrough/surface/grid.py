@@ -28,7 +28,7 @@ HEIGHTS = ("z", "h")
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
-_LENGTH = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S*)")
+_LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 #: Largest accepted distance of a coordinate from the grid, in pixels.
 OFF_GRID = 0.05
@@ -121,9 +121,9 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
     return heights
 
 
-def _refuse_numbers(path: Path, place: str, line: Array, beside: Array) -> None:
+def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
     """Raise InputError for coordinates or numbers of rows or columns, here without the first."""
-    if _even(line) and not _even(beside):
+    if _even(line) and not _even(second):
         said = ", ".join(f"{each:g}" for each in line[:3])
         expected = (
             "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
@@ -147,13 +147,17 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
         said[found[1].lower().rstrip("s")] = found[2]
     sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
-    if sizes[0] is None or sizes[1] is None:
+    if sizes == [None, None]:
         return HeightGrid(heights, height_unit=value_unit)
+    if None in sizes:
+        only = "only a width" if sizes[0] else "only a height"
+        raise InputError("comments", found=only, expected="a width and a height, or neither")
     (width, unit_x), (height, unit_y) = (size.groups() for size in sizes if size)
     if unit_x != unit_y:
         raise InputError("units", found=f"{unit_x} and {unit_y}", expected="one along x and y")
     rows, columns = heights.shape
-    return HeightGrid(heights, (float(width) / columns, float(height) / rows), unit_x, value_unit)
+    across, upwards = (float(each.replace(",", ".")) for each in (width, height))
+    return HeightGrid(heights, (across / columns, upwards / rows), unit_x, value_unit)
 
 
 def _from_list(path: Path) -> HeightGrid:

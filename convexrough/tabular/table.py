@@ -50,6 +50,9 @@ INDEX = (
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
+#: First cells of a row of totals, in lower case.
+TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma")
+
 #: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
@@ -281,19 +284,18 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             lines=[""] * count,
             style="",
             number=_as_number,
-            numbers=lambda cells: None,
+            numbers=_as_numbers,
             mistakes=[],
         )
     table = read_text_table(path, known)
     named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
     width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
-    mistakes = []
+    mistakes, whole = [], []
     for row in table.rows:
-        if row.wrong or len(row.cells) != width:
-            expected = f"{width}, as in {'the header' if table.header else 'most rows'}"
-            what = row.wrong or f"found {len(row.cells)} cells, expected {expected}"
+        if what := row.wrong or _misfit(row.cells, width, table.header):
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
-    whole = [row for row in table.rows if len(row.cells) == width]
+        else:
+            whole.append(row)
     counts = [len(row.cells) for row in table.rows]
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
@@ -310,6 +312,16 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
         numbers=table.style.numbers,
         mistakes=mistakes,
     )
+
+
+def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
+    """The reason why cells are no row of the table; "" if they are one."""
+    if len(cells) != width:
+        expected = f"{width}, as in {'the header' if header else 'most rows'}"
+        return f"found {len(cells)} cells, expected {expected}"
+    if cells[0].rstrip(" :=").lower() in TOTALS:
+        return "found a row of totals, expected none: remove it"
+    return ""
 
 
 def _upright(source: _Source) -> _Source:
@@ -409,6 +421,11 @@ def _numbers(
 
 def _as_number(cell: Any) -> float | None:
     return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else None
+
+
+def _as_numbers(cells: Sequence[Any]) -> Array | None:
+    kinds = {type(cell) for cell in cells}
+    return np.array(cells, dtype=np.float64) if kinds <= {int, float} else None
 
 
 def _shown(mistake: str, line: str) -> str:

@@ -47,7 +47,8 @@ BY_CHANCE = 0.25
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
 
-#: Statuses in a column "contact" of flags, by the flag.
+#: What a word in a column "status" or "contact" claims, and what a flag in "contact" does.
+WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
 
@@ -120,7 +121,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     columns, mistakes = table.columns, list[str]()
     given = [each for each in ("x", "y") if each in columns]
     if len(given) == 1:
-        mistakes.append(f"columns: found only {given[0]}, expected x and y")
+        unused = _unused(table)
+        mistakes.append(f"columns: found only {given[0]}, expected x and y{unused}")
     summed = how.nodes or name not in columns
     if summed and not given:
         mistakes.append("columns: found neither x nor y, expected both, of nodes or pixels")
@@ -152,6 +154,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if areas is not None and "area" not in columns:
         place.how += f", each of area {areas:.5g}"
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
+    if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
+        units.append(f"column {name}, not pressure")
     note = ", ".join(filter(None, [table.style, *units, place.how]))
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
 
@@ -179,12 +183,11 @@ def _contradicted(
 ) -> Iterator[str]:
     """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
     touches = loads > floor
-    for name in ("status", "contact"):
+    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
         found = np.char.lower(np.char.strip(columns.get(name, np.full(len(loads), ""))))
-        said = found if name == "status" else np.array([FLAGS.get(each, "") for each in found])
-        wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
-        for i in np.flatnonzero(wrong):
-            right = (("open", "contact") if name == "status" else ("0", "1"))[int(touches[i])]
+        said = np.array([known.get(each, "") for each in found])
+        for i in np.flatnonzero(said == np.where(touches, "open", "contact")):
+            right = (("0", "1") if found[i] in FLAGS else ("open", "contact"))[int(touches[i])]
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
             yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
 
@@ -216,6 +219,11 @@ def _explained(table: ReadTable) -> Iterator[str]:
         yield f"{name}: column {bare(called)}{unit}{times}"
     if table.others:
         yield f"not looked at: {', '.join(table.others)}"
+
+
+def _unused(table: ReadTable) -> str:
+    """The end of a message, with the names of columns that are not read."""
+    return f"; not used: {', '.join(table.others)}" if table.others else ""
 
 
 def _unused_positions(others: Iterable[str]) -> Iterator[str]:
@@ -251,7 +259,11 @@ class _Placing:
                 self.mistakes += self._unused_positions()
         known = by or self.mistakes
         if rows != count and not (rows < count and known and self.manner.missing_open):
-            advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
+            advice = "" if by else _unused(self.table)
+            if rows > count and (
+                self.points is None or len(np.unique(self.points, axis=0)) > count
+            ):
+                advice += "; --nodes adds up rows at their nearest asperity"
             if rows < count and by:
                 advice = "; --missing-open takes the others for open"
             expected = f"expected {count}, one per asperity of the scene{advice}"
@@ -265,8 +277,8 @@ class _Placing:
         """A message if two unread columns are positions of the asperities in another order."""
         numbers = {bare(name): it for name, it in self.table.others.items() if it is not None}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
-            for angle, what in ((other, "polar coordinates, in radians"),
-                                (np.radians(other), "polar coordinates, in degrees"),
+            for angle, what in ((other, "polar coordinates (in radians)"),
+                                (np.radians(other), "polar coordinates (in degrees)"),
                                 (None, "positions")):  # fmt: skip
                 points = np.column_stack(
                     (one, other) if angle is None else (one * np.cos(angle), one * np.sin(angle))
@@ -314,11 +326,21 @@ class _Placing:
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             )
             self._refuse(i, found, f"less than to its neighbour, {apart[owners[i]]:.3g}")
+        if self.name == "pressure":
+            self._refuse_repeated(self.points @ [1, 1j], values != 0, "each node or pixel once")
         self.how = f"{len(owners):,} nodes summed at their nearest asperities"
         return owners
 
     def _refuse(self, row: Any, found: str, expected: str) -> None:
         self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
+
+    def _refuse_repeated(
+        self, places: NDArray[Any], chosen: NDArray[np.bool_], expected: str
+    ) -> None:
+        """Add a mistake for each row, of those chosen, with the place of an earlier one."""
+        _, first, back = np.unique(places, return_index=True, return_inverse=True)
+        for i in np.flatnonzero((first[back] != np.arange(len(places))) & chosen):
+            self._refuse(i, f"the same position as in {self.table.rows[first[back[i]]]}", expected)
 
     def _numbered(self, name: str, index: NDArray[np.intp]) -> Indices | None:
         """The indices of asperities in a column that counts from 0 or 1; else None."""
@@ -378,10 +400,10 @@ class _Placing:
         """The asperity at each point; no asperity may occur twice."""
         positions, allowed = self.scene.asperities.positions, self._allowed
         distances, owners = _nearest(positions, points)
-        far = distances > allowed
+        far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
         self.how = f"matched by position (largest distance {distances.max():.2g})"
         doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
-        doubtful |= len(np.unique(owners)) < len(owners)
+        doubtful |= not alone
 
         def fits(points: Array) -> bool:
             distances, owners = _nearest(positions, points)
@@ -393,18 +415,16 @@ class _Placing:
         if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
-        if far.any() and distances.max() < self._spacing / 2 and len(points) == len(positions):
-            found = f"found them up to {distances.max():.3g} from the nearest asperities"
-            advice = f"if they are rounded: --tolerance {rounded_up(float(distances.max()))}"
+        most = float(distances.max())
+        if far.any() and alone and float(rounded_up(most)) <= self._spacing / 2:
+            found = f"found them up to {most:.3g} from the nearest asperities"
+            advice = f"if they are rounded: --tolerance {rounded_up(most)}"
             self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
             return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
-        _, first, back = np.unique(owners, return_index=True, return_inverse=True)
-        for i in np.flatnonzero((first[back] != np.arange(len(owners))) & ~far):
-            found = f"the same position as in {self.table.rows[first[back[i]]]}"
-            self._refuse(i, found, "each asperity once")
+        self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
     def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:

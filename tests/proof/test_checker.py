@@ -220,12 +220,35 @@ def test_numbers_are_written_one_way_and_nothing_is_left_unread(few: Any) -> Non
     ):
         changed = deepcopy(few)
         changed["pressed"]["radii"][0] = [text]
-        with pytest.raises(checker.Unreadable, match="not a finite float64"):
+        with pytest.raises(checker.Unreadable, match=r"radii \[0\] \[0\]: .* not a finite float64"):
             checker.check(changed, lambda line: None)
     for where in (few, few["claims"], few["argument"], few["pressed"]):
         changed = deepcopy(where) | {"note": "believe me"}
         with pytest.raises(checker.Unreadable, match="expected a table"):
             checker.table(changed, *where)
+
+
+@pytest.mark.parametrize(
+    ("place", "what"),
+    [
+        (("scene", "tip_radii"), "tip_radii"),
+        (("scene", "contact_modulus"), "contact_modulus"),
+        (("argument", "box"), "box"),
+        (("argument", "convexity_number"), "convexity_number"),
+        (("argument", "shells"), "shells"),
+        (("pressed", "radii"), "radii"),
+        (("sheared",), "sheared"),
+        (("claims", "gaps"), "claims gaps"),
+    ],
+)
+def test_what_is_damaged_is_named(few: Any, place: tuple[str, ...], what: str) -> None:
+    changed = deepcopy(few)
+    *outer, key = place
+    damaged = changed[outer[0]] if outer else changed
+    damaged[key] = "0x1.8"
+    changed["sha256"] = checker.digest(changed["scene"], changed["prescribed"])
+    with pytest.raises(checker.Unreadable, match=f"^{what}: "):
+        checker.check(changed, lambda line: None)
 
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:

@@ -270,13 +270,16 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: {"r": np.hypot(*PLACES[case.order].T),
                       "phi": np.degrees(np.arctan2(*PLACES[case.order].T[::-1])),
                       "load": case.loads[case.order]},
-        "", "r, phi: found polar coordinates, in degrees in", "expected columns x and y"),
+        "", "r, phi: found polar coordinates (in degrees) in", "expected columns x and y"),
     "decimal commas between commas": (
         lambda case: lines(case.table(), ",", ","), "", "rows: found up to 6 parts between commas",
         "write decimal points, or semicolons"),
     "rounded places": (
         lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
         "if they are rounded: --tolerance "),
+    "rounded places of loaded nodes": (
+        lambda case: touching(case, case.table(x=np.round(PLACES[case.order, 0], 5))), "",
+        "rows: found 7, expected 12", "if they are rounded: --tolerance "),
     "formulas without values": (
         lambda case: [[["x", "y", "load"], *([x, y, f"={load}*1"]
                                              for x, y, load in matrix(case.table()))]],
@@ -311,8 +314,19 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                                "expected a column 'load'; --column load=Fz names another"),
     "another name below titles": (lambda case: ansys(case).replace("load", "FZ"), "a.lis",
                                   "found NODE, x, y, FZ, expected a column 'load'"),
-    "a row of totals": (lambda case: lines(case.table()) + f"Sum,,{case.loads.sum()}\n", "",
-                        "column x: found 'Sum'"),
+    "a row of totals": (lambda case: lines(case.table()) + f"Sum:,,{case.loads.sum()}\n", "",
+                        "row 14: found a row of totals, expected none: remove it: Sum:,,"),
+    "a row twice": (lambda case: (text := lines(case.table())) + text.splitlines()[3] + "\n", "",
+                    "rows: found 13, expected 12, one per asperity of the scene\n",
+                    "row 14: found the same position as in row 4, expected each asperity once"),
+    "pixels twice": (
+        lambda case: {name: np.tile(each, 2) for name, each in case.pixels().items()}, "",
+        "found the same position as in row ", "expected each node or pixel once"),
+    "x under another name": (lambda case: case.table("X1 y load"), "",
+                             "columns: found only y, expected x and y; not used: X1"),
+    "loaded nodes under other names": (
+        lambda case: touching(case, case.table("X1 X2 load")), "",
+        "expected 12, one per asperity of the scene; not used: X1, X2"),
 }  # fmt: skip
 
 
@@ -528,6 +542,13 @@ def test_explain_reads_and_judges_nothing(tmp_path: Path, command: Any, case: Ca
     assert "certificate" not in outcome.out
     shown = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
     assert json.loads(shown.out)["read"] == outcome.out.removesuffix("\n").split("\n")
+
+
+def test_loads_beside_pressures(tmp_path: Path, command: Any, case: Case) -> None:
+    name = put(tmp_path, case.table(**{"pressure [Pa]": np.ones(COUNT)}))
+    outcome = command("verify", "scene.toml", name)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "loads.csv: separated by commas, column load, not pressure, matched" in outcome.out
 
 
 def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:

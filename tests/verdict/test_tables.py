@@ -270,6 +270,11 @@ def test_summits(tmp_path: Path) -> None:
         ('x,y\n0,"1\n', 'row 2: unexpected end of data: 0,"1'),
         ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
         ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
+        ("x,y,height,radius\n0,0,0,1\n", "tip radii: found both"),
+        (
+            "x,y,elevation,load,id\n0,0,1,2,3\n",
+            "columns: found elevation, but no height, expected a",
+        ),
         ("x,y\n0,0\n", "tip radii: found neither"),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
         ("0,0\n1,1\n", "found no header and 2 columns, expected a column 'x'"),
