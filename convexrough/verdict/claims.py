@@ -50,7 +50,8 @@ BY_CHANCE = 0.25
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
 
-#: Statuses in a column "contact" of flags, by the flag.
+#: What a word in a column "status" or "contact" claims, and what a flag in "contact" does.
+WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
 
@@ -193,12 +194,11 @@ def _contradicted(
 ) -> Iterator[str]:
     """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
     touches = loads > floor
-    for name in ("status", "contact"):
+    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
         found = np.char.lower(np.char.strip(columns.get(name, np.full(len(loads), ""))))
-        said = found if name == "status" else np.array([FLAGS.get(each, "") for each in found])
-        wrong = np.where(touches, said == "open", np.isin(said, ("contact", "closed")))
-        for i in np.flatnonzero(wrong):
-            right = (("open", "contact") if name == "status" else ("0", "1"))[int(touches[i])]
+        said = np.array([known.get(each, "") for each in found])
+        for i in np.flatnonzero(said == np.where(touches, "open", "contact")):
+            right = (("0", "1") if found[i] in FLAGS else ("open", "contact"))[int(touches[i])]
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
             yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
 
@@ -413,10 +413,10 @@ class _Placing:
         """The asperity at each point; no asperity may occur twice."""
         positions, allowed = self.scene.asperities.positions, self._allowed
         distances, owners = _nearest(positions, points)
-        far = distances > allowed
+        far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
         self.how = f"matched by position (largest distance {distances.max():.2g})"
         doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
-        doubtful |= len(np.unique(owners)) < len(owners)
+        doubtful |= not alone
 
         def fits(points: Array) -> bool:
             distances, owners = _nearest(positions, points)
@@ -428,9 +428,10 @@ class _Placing:
         if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
-        if far.any() and distances.max() < self._spacing / 2 and len(points) == len(positions):
-            found = f"found them up to {distances.max():.3g} from the nearest asperities"
-            advice = f"if they are rounded: --tolerance {rounded_up(float(distances.max()))}"
+        most = float(distances.max())
+        if far.any() and alone and float(rounded_up(most)) <= self._spacing / 2:
+            found = f"found them up to {most:.3g} from the nearest asperities"
+            advice = f"if they are rounded: --tolerance {rounded_up(most)}"
             self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
             return owners
         for i in np.flatnonzero(far):

@@ -279,6 +279,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "rounded places": (
         lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
         "if they are rounded: --tolerance "),
+    "rounded places of loaded nodes": (
+        lambda case: touching(case, case.table(x=np.round(PLACES[case.order, 0], 5))), "",
+        "rows: found 7, expected 12", "if they are rounded: --tolerance "),
     "formulas without values": (
         lambda case: [[["x", "y", "load"], *([x, y, f"={load}*1"]
                                              for x, y, load in matrix(case.table()))]],

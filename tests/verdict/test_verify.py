@@ -142,6 +142,7 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
     for said, column, asperity, word in (
         *((texts, "status", asperity, word) for asperity, word in ((0, "open"), (60, "contact"))),
         (flags, "Contact", 0, "0"),
+        (np.where(texts == "open", "open", "closed"), "contact", 0, "open"),
         (np.where(flags == "1", "TRUE", "FALSE"), "contact", 60, "TRUE"),
     ):
         wrong = said.copy()
