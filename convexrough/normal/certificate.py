@@ -208,6 +208,7 @@ def certificate_of(
         errors[screened.which] += coupled + screened.coupling.rounding(moved).of(coupled)
     errors *= 1 + SAFETY
     statuses = 2 * (indentation < -errors)
+    statuses[screened.which[screened.below]] = 2
     statuses[problem.candidates[found.touching]] = 1
     statuses[problem.candidates[found.open]] = 2
     others = NO_OTHERS
@@ -259,9 +260,10 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch."""
+    """The asperities that cannot touch: D_i <= 0 in every solution, rounding included."""
 
     which: Indices  # in the scene
+    below: NDArray[np.bool_]  # D_i < 0: every term of a D_i = 0 is 0
     coupling: Coupling | None  # from asperities that can touch; None if all can
     indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
@@ -273,13 +275,14 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
     left[problem.candidates] = False
     others = left.nonzero()[0]
     if len(others) == 0:
-        return _Screened(others, None, np.zeros(0), np.zeros(0))
+        return _Screened(others, others > 0, None, np.zeros(0), np.zeros(0))
     coupling = problem.influence.onto(scene.contact_points[others])
     product, offsets = coupling.apply(loads), scene.offsets[others] / length
+    below = (offsets != 0) | (problem.approach_bound != 0)
     approach = float(start.approach.value)
     rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
     rounding += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
-    return _Screened(others, coupling, approach + offsets - product, rounding)
+    return _Screened(others, below, coupling, approach + offsets - product, rounding)
 
 
 def _screened_energy(

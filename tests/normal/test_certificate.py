@@ -264,6 +264,22 @@ def test_judging_loads_of_screened_asperities(kind: Kind) -> None:
     assert certificate.load_errors[outermost] == 1e-9
 
 
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_screened_asperities_are_open_whatever_the_loads(control: str) -> None:
+    """With the whole load on one asperity, gaps are known to within more than themselves."""
+    scene = paper()
+    load = cr.press(scene, approach=3e-5).load
+    prescribed = {"approach": 3e-5} if control == "approach" else {"load": load}
+    candidates = NormalProblem.assemble(scene, **prescribed).candidates
+    screened = np.setdiff1d(np.arange(61), candidates)
+    wrong = np.zeros(61)
+    wrong[candidates[-1]] = load
+    certificate = cr.certify(scene, wrong, **prescribed)
+    assert certificate.scope == "global"
+    assert (certificate.gap_errors[screened] > certificate.gaps[screened]).all()
+    assert (certificate.status[screened] == "open").all()
+
+
 @pytest.mark.parametrize(
     ("loads", "message"),
     [
