@@ -50,8 +50,9 @@ INDEX = (
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
-#: First cells of a row of totals, in lower case.
-TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma")
+#: First words of rows below a table that are not part of it, in lower case.
+TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
+          "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
 
 #: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
@@ -319,8 +320,8 @@ def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
     if len(cells) != width:
         expected = f"{width}, as in {'the header' if header else 'most rows'}"
         return f"found {len(cells)} cells, expected {expected}"
-    if cells[0].rstrip(" :=").lower() in TOTALS:
-        return "found a row of totals, expected none: remove it"
+    if (name := next(filter(None, cells), "")).rstrip(" :=").lower() in TOTALS:
+        return f'found a row of "{name}", expected none: remove it'
     return ""
 
 

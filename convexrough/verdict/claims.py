@@ -122,13 +122,13 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         how=how,
     )
     columns, mistakes = table.columns, list[str]()
-    given = [each for each in ("x", "y") if each in columns]
+    given, unused = [each for each in ("x", "y") if each in columns], _unused(table)
     if len(given) == 1:
-        unused = _unused(table)
         mistakes.append(f"columns: found only {given[0]}, expected x and y{unused}")
     summed = how.nodes or name not in columns
     if summed and not given:
-        mistakes.append("columns: found neither x nor y, expected both, of nodes or pixels")
+        expected = f"both, of nodes or pixels{unused}"
+        mistakes.append(f"columns: found neither x nor y, expected {expected}")
     if mistakes:
         raise TableError(str(path), mistakes)
     areas = None if name in columns else _areas(path, columns)

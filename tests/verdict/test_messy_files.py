@@ -328,7 +328,13 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "another name below titles": (lambda case: ansys(case).replace("load", "FZ"), "a.lis",
                                   "found NODE, x, y, FZ, expected a column 'load'"),
     "a row of totals": (lambda case: lines(case.table()) + f"Sum:,,{case.loads.sum()}\n", "",
-                        "row 14: found a row of totals, expected none: remove it: Sum:,,"),
+                        'row 14: found a row of "Sum:", expected none: remove it: Sum:,,'),
+    "numbered rows, and their mean": (
+        lambda case: lines({"no": range(COUNT), **case.table()}) + ",Mean,,0.1\n", "",
+        'row 14: found a row of "Mean", expected none: remove it'),
+    "pixels under other names": (
+        lambda case: case.pixels("X1 X2 pressure"), "",
+        "found neither x nor y, expected both, of nodes or pixels; not used: X1, X2"),
     "a row twice": (lambda case: (text := lines(case.table())) + text.splitlines()[3] + "\n", "",
                     "rows: found 13, expected 12, one per asperity of the scene\n",
                     "row 14: found the same position as in row 4, expected each asperity once"),
