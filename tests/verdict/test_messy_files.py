@@ -548,6 +548,16 @@ def test_what_is_unlikely_is_told(
     assert all(each in outcome.err for each in said)
 
 
+def test_an_unlikely_modulus_is_told_before_loads_are_blamed(
+    tmp_path: Path, command: Any, case: Case
+) -> None:
+    write_scene(tmp_path, "youngs_modulus = 210e3")
+    outcome = command("verify", "scene.toml", put(tmp_path, case.table()))
+    assert outcome.status == 3
+    blamed = "10^6 times what they should be: another unit, as µN for N, or of the modulus?"
+    assert 0 < outcome.err.index("softer than rubber") < outcome.err.index(blamed)
+
+
 # What else is read, and said
 
 
