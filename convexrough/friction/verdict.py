@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -74,6 +74,17 @@ class ShearVerdict(Claim, Record):
     def wrongly_sticking(self) -> Indices:
         """(m,) indices of asperities not claimed to slide, but proved to slide."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "sliding")))
+
+    def hints(self) -> Iterator[str]:
+        yield from super().hints()
+        limits = checks.friction(self.contact.scene.friction) * self.contact.loads
+        close = np.abs(self.forces) >= (1.0 - WITHIN) * limits
+        if count := int(close[self.wrongly_sticking].sum()):
+            yield (
+                f"{count:,} of the shear forces, on asperities proved to slide, are less than "
+                f"{100 * WITHIN:g} % below f P, but not within {100 * CLAIMS_SLIDING:g} %: without "
+                "a column status they claim to stick"
+            )
 
     @property
     def errors_alone(self) -> Array:

@@ -125,23 +125,30 @@ class Claim(ABC):
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
         sorted_apart = np.abs(np.sort(values) - np.sort(true)).max()
-        if sorted_apart <= self.within < np.abs(values - true).max():
+        if sorted_apart <= WITHIN < np.abs(values - true).max():
             yield f"the {self.many} are those of the solution, in another order of the asperities"
             return
         factor = float(values @ true) / (float(true @ true) or 1.0)
-        left, apart = (float(np.abs(values - each * true).max()) for each in (factor, 1.0))
-        if left > REMAINING * apart or factor == 0 or abs(factor - 1) <= self.within:
-            return
-        size, exact = f"are {abs(factor):.4g} times those of the solution", math.log10(abs(factor))
-        if abs(abs(factor) - 1) <= self.within:
+        left, apart, most = (
+            float(np.abs(each).max()) for each in (values - factor * true, values - true, values)
+        )
+        if left > REMAINING * min(apart, most):  # the forces differ by more than a factor
+            factor = self.total_given / (self.total_prescribed or math.inf)
+            if not _power_of_ten(factor):
+                return
+        if factor and abs(factor - 1) > WITHIN:
+            yield f"the {self.many} {self._wrong_by(factor)}"
+
+    def _wrong_by(self, factor: float) -> str:
+        size = f"are {abs(factor):.4g} times those of the solution"
+        if abs(abs(factor) - 1) <= WITHIN:
             size = ""
-        elif abs(exact - (power := round(exact))) < math.log10(1 + WITHIN):
+        elif power := _power_of_ten(abs(factor)):
             prefix = PREFIXES.get(power)
             example = f", as {prefix}{self.unit} for {self.unit}" if prefix else ""
             modulus = ", or of the modulus" if self.total_prescribed is None else ""
             size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
-        sign = "have the other sign" if factor < 0 else ""
-        yield f"the {self.many} {' and '.join(filter(None, (sign, size)))}"
+        return " and ".join(filter(None, ("have the other sign" if factor < 0 else "", size)))
 
     @property
     def wrongly_claimed(self) -> Indices:
@@ -209,3 +216,11 @@ class Claim(ABC):
         stand_out = apart > least
         stand_out[wrong] = True
         return frozen(order[stand_out[order]])
+
+
+def _power_of_ten(factor: float) -> int:
+    """The power of ten that a factor equals to 1 %; 0 if none."""
+    if not (0 < factor < math.inf):
+        return 0
+    exact = math.log10(factor)
+    return round(exact) if abs(exact - round(exact)) < math.log10(1 + WITHIN) else 0

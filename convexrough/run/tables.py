@@ -48,7 +48,7 @@ def read_summits(
         how=how,
     )
     columns = table.columns
-    unread = [it for it, numbers in table.others.items() if numbers is not None and unknown(it)]
+    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
     if "height" not in columns and unread:
         named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
         raise InputError("columns", found=f"{', '.join(unread)}, but no height",

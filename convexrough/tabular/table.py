@@ -107,7 +107,7 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the other columns by header; None instead of numbers where some cell has none
+    others  : the other columns by header; text where some cell is no number
     factors : factors other than 1 by which columns were multiplied
     indices : columns of whole numbers with a name in `INDEX`
     """
@@ -118,7 +118,7 @@ class ReadTable(NamedTuple):
     units: dict[str, str]
     style: str
     called: dict[str, str]
-    others: dict[str, Array | None]
+    others: dict[str, NDArray[Any]]
     factors: dict[str, float]
     indices: dict[str, NDArray[np.intp]]
 
@@ -214,7 +214,7 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        {names[i]: source.numbers(source.columns[i]) for i in rest if names[i]},
+        {names[i]: _numbers_or_text(source, i) for i in rest if names[i]},
         factors,
         {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
          if (whole := _whole(source, i)) is not None},
@@ -264,6 +264,12 @@ def _factors(
         if there and there[0] in factors and name not in units and name not in how.scales:
             mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
     return factors, mistakes
+
+
+def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
+    cells = source.columns[place]
+    numbers = source.numbers(cells)
+    return np.array([str(cell) for cell in cells]) if numbers is None else numbers
 
 
 def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:

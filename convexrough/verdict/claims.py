@@ -55,6 +55,9 @@ WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
 
+#: Words that are statuses of shear in a column of any name.
+OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
+
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
@@ -125,6 +128,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     given, unused = [each for each in ("x", "y") if each in columns], _unused(table)
     if len(given) == 1:
         mistakes.append(f"columns: found only {given[0]}, expected x and y{unused}")
+    mistakes += _unread_statuses(table)
     summed = how.nodes or name not in columns
     if summed and not given:
         expected = f"both, of nodes or pixels{unused}"
@@ -237,6 +241,17 @@ def _unused(table: ReadTable) -> str:
     return f"; not used: {', '.join(table.others)}" if table.others else ""
 
 
+def _unread_statuses(table: ReadTable) -> Iterator[str]:
+    """A message for each column of statuses, or of flags of slip, that is not read."""
+    for header, cells in table.others.items() if "status" not in table.columns else ():
+        name, said = bare(header), {str(cell).strip().lower() for cell in cells.tolist()}
+        words = {*WORDS, *OF_SHEAR}
+        if said & words and said <= {*words, ""}:
+            yield f"column {name}: found statuses, expected them in a column called status"
+        elif re.fullmatch("(?i)(stick|slip|slid).*", name) and said <= FLAGS.keys():
+            yield f"column {name}: found flags, expected a column status with words such as sliding"
+
+
 def _unused_positions(others: Iterable[str]) -> Iterator[str]:
     """A message if unread columns have names similar to x and y."""
     found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
@@ -262,7 +277,7 @@ class _Placing:
         if self.points is None:
             by = ""
             self.mistakes += _unused_positions(self.table.others)
-            for name, index in self.table.indices.items():
+            for name, index in {**self.table.indices, **self._permutations()}.items():
                 if (numbered := self._numbered(name, index)) is not None:
                     found, by = numbered, f"column {name or 'without a name'}"
                     break
@@ -284,9 +299,19 @@ class _Placing:
                 self.mistakes.insert(0, f"rows: found {rows}, {expected}")
         return found
 
+    def _permutations(self) -> dict[str, Indices]:
+        """Unread columns that number all asperities, from 0 or from 1, in another order."""
+        count, found = np.arange(len(self.scene)), dict[str, Indices]()
+        for name, cells in self.table.others.items():
+            if cells.dtype.kind == "f" and len(cells) == len(count) and (np.diff(cells) < 0).any():
+                first = float(cells.min())
+                if first in (0.0, 1.0) and (np.sort(cells) == count + first).all():
+                    found[name] = cells.astype(np.intp)
+        return found
+
     def _unused_positions(self) -> Iterator[str]:
         """A message if two unread columns are positions of the asperities in another order."""
-        numbers = {bare(name): it for name, it in self.table.others.items() if it is not None}
+        numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
             for angle, what in ((other, "polar coordinates (in radians)"),
                                 (np.radians(other), "polar coordinates (in degrees)"),

@@ -200,6 +200,7 @@ READ: dict[str, tuple[Any, ...]] = {
     "workbook's second sheet": (lambda case: [[["notes"]], rows(case.table())], "a.xlsx"),
     "index from 0": (shuffled,),
     "numbers of nodes": (lambda case: lines(shuffled(case, 1, "Node"), "\t"),),
+    "a permutation of any name": (lambda case: shuffled(case, 1, "Element Nr."),),
     "index in arrays": (lambda case: shuffled(case, 1, "id"), "a.npz"),
     "loaded nodes by place": (
         lambda case: touching(case, case.table()), "a.csv", "--missing-open"),

@@ -115,6 +115,8 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
     turned = dict(enumerate(np.roll(contact.loads, 5).tolist()))
     elsewhere = command("verify", scene, claim(contact, turned))
     assert "hint: the loads are those of the solution, in another order" in elsewhere.err
+    outcome_of_any = command("verify", scene, claim(contact, factor=1e3), "--within", "1")
+    assert hint in outcome_of_any.err
     if scene == "b.toml":
         assert ": ratio 1000\n" in outcome.out
         assert "the total load is not the prescribed one" in outcome.err
@@ -180,6 +182,17 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
         refused = command(*asked, "forces.csv")
         assert refused.status == 2
         assert f'column status: found "{word}" at asperity {asperity}, which is' in refused.err
+    words = [f"{Q!r},{each}" for Q, each in zip(state.forces.tolist(), state.status, strict=True)]
+    for header, cells, expected in (
+        ("state", words, "column state: found statuses, expected them in a column called st"),
+        ("slip", [f"{Q!r},0" for Q in state.forces.tolist()], "column slip: found flags, expected"),
+    ):
+        Path("forces.csv").write_text("\n".join([f"force,{header}", *cells]))
+        refused = command(*asked, "forces.csv")
+        assert refused.status == 2
+        assert expected in refused.err
+    rounded = command(*asked, shear_file(0.998 * state.forces))
+    assert "below f P, but not within 0.01 %: without a column status" in rounded.err
     for factor, said in ((-1, "have the other sign"), (-1e3, "have the other sign and are 10^3"),
                          (1e-6, "are 10^-6 times what they should be: another unit, as MN for N?"),
                          (1.25, "are 1.25 times those of the solution")):  # fmt: skip
