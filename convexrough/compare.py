@@ -40,6 +40,9 @@ from convexrough.solvers import named
 #: Largest number of asperities that a message names; it counts the others.
 MOST_NAMED = 5
 
+#: Loads above this fraction of the largest count as contact in a comparison of solvers.
+CARRIES = 1e-6
+
 #: Solvers that CVXPY can call if the packages with these names are installed.
 THROUGH_CVXPY = ("SCS", "QOCO")
 
@@ -53,8 +56,10 @@ class Entry(Record):
     contact : the certified solution, or None
     disagreement : max |load - reference| over the largest load of the reference; nan where either
         has no solution
-    different_statuses : number of asperities whose status differs from that in the reference; None
-        where either has no solution
+    different_statuses : number of asperities whose proved status differs from that in the
+        reference; None where either has no solution
+    different_contacts : number of asperities with a load above 1e-6 of the largest in one of the
+        two and below 1e-7 of it in the other; None as above
     steps : for each iteration its solver, step, objective and residual, if `compare` was called
         with `log`; OSQP and the solvers of CVXPY do not report theirs
     memory : [bytes] largest increase of the resident memory of the process, without memory that the
@@ -67,6 +72,7 @@ class Entry(Record):
     contact: Contact | None = None
     disagreement: float = np.nan
     different_statuses: int | None = None
+    different_contacts: int | None = None
     memory: int | None = None
     steps: tuple[Mapping[str, Any], ...] = ()
 
@@ -196,7 +202,7 @@ def solver_named(name: str) -> solvers.Solver:
     expected = "package.Class, importable from here, of a solver that needs no arguments"
     try:
         made = getattr(import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
+    except (ImportError, AttributeError, TypeError, ValueError, SystemExit) as error:
         raise InputError("solver", found=f"{name} ({error})", expected=expected) from error
     return solvers.named(made)
 
@@ -216,7 +222,7 @@ def _enter(
         if solver == _REFERENCE:
             raise
         return Entry(solver.name, "refused", str(error))
-    except Exception as error:  # a user's solver may raise anything
+    except (Exception, SystemExit) as error:  # a user's solver may raise anything
         if type(solver).__module__.startswith("convexrough."):
             raise
         file = getattr(sys.modules[type(solver).__module__], "__file__", None)
@@ -234,6 +240,7 @@ def _enter(
         contact=contact,
         disagreement=_relative(contact.loads - reference.loads, reference.loads),
         different_statuses=int(np.sum(contact.status != reference.status)),
+        different_contacts=_different_contacts(contact.loads, reference.loads),
         memory=risen,
     )
 
@@ -243,11 +250,16 @@ def _relative(difference: Array, loads: Array) -> float:
     return largest / float(loads.max()) if largest > 0 else 0.0
 
 
+def _different_contacts(loads: Array, reference: Array) -> int:
+    pair = np.sort([np.abs(loads), reference], axis=0) / (float(reference.max()) or 1.0)
+    return int(((pair[0] < CARRIES / 10) & (pair[1] > CARRIES)).sum())
+
+
 def _load_code_of(solver: solvers.Solver) -> None:
     """Make a solver import what it needs, so that measured times contain no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception):  # `_enter` handles the same error later
+    with suppress(Exception, SystemExit):  # `_enter` handles the same error later
         press(small, approach=1e-2, solver=solver)
 
 

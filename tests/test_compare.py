@@ -77,7 +77,7 @@ def test_all_agree(name: str, control: str) -> None:
     for entry in comparison.entries:
         assert (entry.outcome, entry.message) == ("answered", "")
         assert entry.disagreement <= limits[entry.solver], entry.solver
-        assert entry.different_statuses == 0
+        assert entry.different_statuses == entry.different_contacts == 0
         assert entry.contact is not None
         assert entry.contact.certificate.holds
         assert entry.contact.certificate.duality_gap >= 0
@@ -288,6 +288,20 @@ class Zero:
         found = Newton().solve(problem)
         return replace(found, loads=0 * found.loads, refine=False, trial=None)
 
+@dataclass(frozen=True)
+class Spurious:
+    name: str = "spurious"
+    def solve(self, problem, start=None):
+        from dataclasses import replace
+        import numpy as np
+        found = Newton().solve(problem)
+        loads = np.where(found.loads > 0, found.loads, 1e-4 * found.loads.max())
+        return replace(found, loads=loads, refine=False, trial=None)
+
+class Exit:
+    name = "exit"
+    def solve(self, problem, start=None):
+        raise SystemExit(0)
 class NoSolver: ...
 class NoName:
     def solve(self, problem, start=None): ...
@@ -318,7 +332,14 @@ def test_a_solver_of_ones_own_by_its_name(
     assert wrong.status == 3
     assert "zero disagrees: its loads differ from those of newton by 1 of the largest" in wrong.err
     wide = command("compare", "scene.toml", "--solver", "desk_solvers.Zero", "--within", "2")
-    assert (wide.status, wide.err) == (0, "")
+    assert wide.status == 0
+    assert "zero: 37 contacts differ from those of newton: they have a load above 1e-06" in wide.err
+    spurious = command("compare", "scene.toml", "--solver", "desk_solvers.Spurious")
+    assert spurious.status == 0  # the loads are right to 1e-4, the claimed contacts are not
+    assert "spurious: 24 contacts differ from those of newton" in spurious.err
+    assert "same; 24 contacts differ" in spurious.out
+    left = command("compare", "scene.toml", "--solver", "desk_solvers.Exit")
+    assert (left.status, "exit: failed" in left.err) == (4, True)
     for name, said in (
         ("desk_solvers.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),

@@ -188,7 +188,6 @@ def walk(
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """The result of `load_path`, with a choice of the solver of general steps."""
-    checks.instance("scene", scene, Scene)
     points = points_of(scene, loads, forces)
     if general_steps is not None and (not isinstance(general_steps, int) or general_steps < 1):
         expected = "a whole number, at least 1"
@@ -220,6 +219,7 @@ def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None)
 
 def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
     """The checked points (P, T = Q / f), as exact fractions."""
+    checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     P = checks.array("loads", loads, sign="not negative")
     Q = checks.array("forces", forces)

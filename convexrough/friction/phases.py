@@ -102,6 +102,7 @@ def phase_losses(
     >>> bool(losses.losses[1] < 1e-9 * losses.losses[0])  # P, Q in phase, |dQ| <= f |dP|: no slip
     True
     """
+    checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     for what, values in (("phases", turns), ("factors", sizes)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -190,12 +190,11 @@ def shear(
     return _state(contact, levels, height, force, displacement)
 
 
-def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
+def one_force(what: str, value: Any, limit: float) -> float:
     """The shear force as a number, after a check that it does not exceed the friction limit."""
-    given = checks.bearable(what, np.asarray(value), limit)
-    if given.ndim:
-        raise InputError(what, found=f"shape {given.shape}", expected="one number")
-    return float(given)
+    if shape := np.shape(value):
+        raise InputError(what, found=f"shape {shape}", expected="one number")
+    return float(checks.bearable(what, np.asarray(checks.finite(what, value)), limit))
 
 
 def _state(

@@ -150,6 +150,7 @@ def shakedown(
     >>> f"{limit.factor / 10:.4f}"
     '0.3517'
     """
+    checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     P0 = checks.positive("loads", loads)
     if kind not in ("exact", "elastic", "vector"):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from convexrough.compare import Comparison, Entry
+from convexrough.compare import CARRIES, Comparison, Entry
 from convexrough.run.stage import Summary, unit_of
 from convexrough.run.stages.normal import COUNTS
 from convexrough.run.summary import headed
@@ -28,7 +28,8 @@ def comparison_summary(comparison: Comparison, within: float) -> Summary:
 
 
 def _entry(entry: Entry) -> Summary:
-    said = ("solver", "outcome", "message", "disagreement", "different_statuses", "memory")
+    said = ("solver", "outcome", "message", "disagreement", "different_statuses",
+            "different_contacts", "memory")  # fmt: skip
     row: Summary = {name: getattr(entry, name) for name in said}
     if (contact := entry.contact) is not None:
         proof = contact.certificate
@@ -64,6 +65,8 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         f"disagreement       largest difference from {first['solver']}, over its largest load",
         "load error         bound on the error of any load, over the solver's own largest load",
         f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
+        "statuses           those proved from the solver's loads; contacts that differ are loaded",
+        f"                   by one of the two solvers only, above {CARRIES:g} of the largest load",
         "MB                 increase of the memory of the process during the solution",
         "",
         *aligned([HEADING, *rows], left=1),
@@ -81,6 +84,7 @@ def _cells(row: Summary) -> list[str]:
     different, undecided = row["different_statuses"], row["undecided"]
     said = {None: "-", 0: "same"}.get(different, f"{different} differ")
     statuses = f"{said}, {undecided} undecided" if undecided else said
+    statuses += f"; {wrong} contacts differ" if (wrong := row["different_contacts"]) else ""
     return [row["solver"], _two(row["disagreement"]), bound(relative), _two(row["duality_gap"]),
             row["scope"], statuses, str(row["iterations"]), _two(row["seconds"]),
             "-" if memory is None else f"{memory / 1e6:.1f}"]  # fmt: skip
@@ -95,6 +99,12 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
             f"{solver} disagrees: its loads differ from those of {rows[0]['solver']} by "
             f"{apart:.2g} of the largest load; at most {within:g} is allowed (--within)"
         )
+    for row in rows:
+        if count := row["different_contacts"]:
+            yield (
+                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: they "
+                f"have a load above {CARRIES:g} of the largest in one of the two only"
+            )
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
