@@ -105,7 +105,7 @@ def test_gross_sliding_is_refused() -> None:
     for force in (1.01 * limit, -1.01 * limit):
         with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding"):
             cr.shear(contact, force=force)
-    with pytest.raises(cr.InputError, match="found nan, expected at most f P"):
+    with pytest.raises(cr.InputError, match="found nan, expected a finite number"):
         cr.shear(contact, force=float("nan"))
     frictionless = cr.press(paper(), approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match="coefficient of friction"):
