@@ -27,7 +27,7 @@ from convexrough.errors import FileError, blamed_on
     type=click.FloatRange(0, min_open=True),
     default=1e-3,
     show_default=True,
-    help="Largest difference allowed, over the largest load.",
+    help="Largest difference allowed, as a fraction of the largest load.",
 )
 @click.option("--log", metavar="FILE", type=PATH, help="Write each iteration to a CSV file.")
 @json_option
@@ -40,8 +40,8 @@ def compare(
     solvers are compared with Newton's method.
 
     The exit status is 3 if a result is not certified, if a load differs from Newton's by more than
-    --within, if a solver refuses the scene, or if two certified results contradict each other,
-    which would be a mistake in the mathematics or the code.
+    --within, if a solver does not support the scene, or if two certified results contradict each
+    other, which would be a mistake in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -18,7 +18,8 @@ proof_option = click.option(
 FORMATS = ("png", "svg", "pdf")
 solver_option = click.option(
     "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
-    help="A solver of the package, or your package.Class; may be repeated.",
+    help="A solver of the package, or the import path of your class, such as mine.Solver; may be "
+    "repeated.",
 )  # fmt: skip
 html_option = click.option(
     "--html",

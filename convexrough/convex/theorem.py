@@ -21,7 +21,10 @@ from convexrough.roundoff import SAFETY
 
 
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
-    """(n,) violations e for residuals F - beta; `inside` is False on a lower face of K."""
+    """(n,) violations e for residuals F - beta.
+
+    inside : (n,) False where x is on a lower face of K; on an upper face True gives a larger e
+    """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
 
@@ -30,7 +33,7 @@ def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations.
 
     excess    : (n,) e
-        h         : (n,) the diagonal of H, infinite where x is fixed
+    h         : (n,) the diagonal of H, infinite where x is fixed
     margin    : mu
     """
     most = largest(excess)

@@ -45,14 +45,15 @@ class Program(Record):
     what        : description of the form
     data        : the arrays of the program, a ConeProgram or a QuadraticProgram
     asperities  : (m,) indices of the asperities in the program; the others carry no load, or less
-        than 1e-12 of the largest bound
+        than 1e-12 of the largest upper bound on a load
     count       : number of asperities of the scene
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
     objective   : minimum of the objective, in energy_unit; for bristles as OSQP finds it, or nan
     constant    : the energy is constant + objective, or constant - objective for the dual, in
         energy_unit; 0 for bristles and if the approach is prescribed
-    off         : estimated error of the program's own loads, relative to the largest load
+    load_error_estimate : estimated error of the loads that minimise the objective exactly, as a
+        fraction of the largest load
 
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
     >>> program.what, len(program.asperities)
@@ -68,13 +69,13 @@ class Program(Record):
     energy_unit: float
     objective: float
     constant: float
-    off: float
+    load_error_estimate: float
 
     def loads(self, values: ArrayLike) -> Array:
         """(n,) [force] loads of all asperities of the scene, from a solver's solution.
 
-        values : the solution x, also with the bound on the objective that a file in CBF adds; of
-            the dual, the multipliers of its equations, in their order and with either sign
+        values : the solution x, with or without the last variable that a file in CBF adds. For
+            the dual, the multipliers of the equations in the order of the file, of either sign
         """
         m, data = len(self.asperities), self.data
         given = checks.numbers("values", values).ravel()
@@ -123,7 +124,7 @@ class Program(Record):
             "asperities": self.asperities.tolist(),
             "objective": self.objective,
             "constant": self.constant,
-            "off": self.off,
+            "load_error_estimate": self.load_error_estimate,
         }
 
 
@@ -194,7 +195,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
             asperities=frozen(np.array(problem.candidates)),
             constant=0.0,
             objective=objective,
-            off=_bristle_error(rows, own),
+            load_error_estimate=_bristle_error(rows, own),
         )
     boxes = _boxes(problem, own)
     cones = LiftedProgram.assemble(problem, boxes).apply()
@@ -206,7 +207,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
         data=cones.dual() if dual else cones,
         asperities=frozen(problem.candidates[boxes.members]),
         objective=-least if dual else least,
-        off=0.0,
+        load_error_estimate=0.0,
     )
 
 

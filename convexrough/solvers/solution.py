@@ -16,7 +16,7 @@ from convexrough.record import Record
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Record):
-    """Loads of the candidates and the approach, in scaled units.
+    """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
     residual : residual of the contact law, as `problem.residual`; with a trial, an upper bound on
         the residual of the loads of the trial
@@ -41,7 +41,7 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution with the residual that the problem computes; infinite if it is undefined."""
+        """A solution with the residual of the problem, which is infinite if it is undefined."""
         if np.shape(loads) != (len(problem),):
             raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)
@@ -50,7 +50,10 @@ class Solution(Record):
 
 
 class Solver(Protocol):
-    """The interface of solvers: frozen settings. SolverError replaces inaccurate answers."""
+    """The interface of solvers: immutable objects, which hold their settings.
+
+    A solver that does not reach its tolerance raises SolverError.
+    """
 
     @property
     def name(self) -> str: ...

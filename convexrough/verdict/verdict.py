@@ -40,12 +40,13 @@ SAME_PLACE, CORRECTED = 1e-9, 1e-3
 class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
-    loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
+    loads       : (n,) [force] as given
+    floor       : [force] a load up to this size claims that the asperity is open
     within      : largest error allowed, as a fraction of the largest load
-    total_prescribed : [force] None under a prescribed approach
+    total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
-    solution    : the solution that Newton's method finds from them, with its own certificate; None
-        where it is not needed or not found
+    solution    : the solution that Newton's method finds from the given loads, with its own
+        certificate; None where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone
@@ -97,7 +98,7 @@ class Verdict(Claim, Table, Plottable):
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] bounds from the certificate of the loads, plus the loads that count as 0."""
+        """(n,) [force] error bounds of the certificate, plus the size of each load that counts as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         return frozen(self.certificate.load_errors + ignored)
 
@@ -161,8 +162,8 @@ def verify(
 
     loads : (n,) [force] in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed, as a fraction of the largest load, and of the total; 1 checks
-        hardly more than the contact set
+    within : largest error allowed, as a fraction of the largest load, and of the total as
+        a fraction of the total; with 1, little but the contact set is checked
     floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
         asperity is open
     influence : compliance operator; None for the cheapest

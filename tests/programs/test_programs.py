@@ -112,13 +112,15 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
     npz = by_qpsolvers if form == "bristles" else by_scs
     x, z, objective = {**READERS, "npz": npz}[ending](tmp_path / f"scene.{ending}")
     loads = made.loads(z if form == "dual" else x)
-    near = 1e-4 + made.off
+    near = 1e-4 + made.load_error_estimate
     assert np.abs(loads - CONTACT.loads).max() < near * CONTACT.loads.max()
     if form == "bristles":  # another energy than that of the contact: its own
         assert objective == pytest.approx(made.objective, rel=1e-6)
     else:
         assert made.energy(made.objective) == pytest.approx(energy(control), rel=1e-12)
-    assert made.energy(objective) == pytest.approx(energy(control), rel=1e-6 + made.off)
+    assert made.energy(objective) == pytest.approx(
+        energy(control), rel=1e-6 + made.load_error_estimate
+    )
 
 
 def test_what_is_said_of_a_program() -> None:
