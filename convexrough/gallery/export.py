@@ -23,8 +23,8 @@ answers to 50 digits, and why a program was left out.
 
 - `.cones.json`: `clarabel.load_from_file`; the contact law itself, no approximation
 - `.cbf`: the same with a linear objective, for readers of the Conic Benchmark Format
-- `.bristles.npz`: `qpsolvers.Problem.load`; the error of its loads is about `load_error_estimate` of
-  the largest
+- `.bristles.npz`: `qpsolvers.Problem.load`; the error of its loads is about `load_error_estimate`
+  of the largest
 
 condition: of the Hessian at the answer, scaled to a diagonal of 1. spread: smallest over largest
 load. proved: how far the proof reaches that the answer is the only one.

@@ -98,7 +98,7 @@ class Verdict(Claim, Table, Plottable):
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] error bounds of the certificate, plus the size of each load that counts as 0."""
+        """(n,) [force] error bounds of the certificate, plus the sizes of loads that count as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         return frozen(self.certificate.load_errors + ignored)
 
