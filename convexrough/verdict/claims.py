@@ -245,8 +245,8 @@ def _unread_statuses(table: ReadTable) -> Iterator[str]:
     """A message for each column of statuses, or of flags of slip, that is not read."""
     for header, cells in table.others.items() if "status" not in table.columns else ():
         name, said = bare(header), {str(cell).strip().lower() for cell in cells.tolist()}
-        words = {*WORDS, *OF_SHEAR}
-        if said & words and said <= {*words, ""}:
+        known = {*WORDS, *OF_SHEAR}
+        if said & known and said <= {*known, ""}:
             yield f"column {name}: found statuses, expected them in a column called status"
         elif re.fullmatch("(?i)(stick|slip|slid).*", name) and said <= FLAGS.keys():
             yield f"column {name}: found flags, expected a column status with words such as sliding"
