@@ -8,6 +8,7 @@ import pytest
 from scenes import PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
+from convexrough.friction.verdict import verify_shear
 
 KINDS = ("dropped", "added", "scaled", "swapped")
 
@@ -185,12 +186,15 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
     asperities = cr.Asperities.square(
         spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-6, seed=3
     )
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit")
+    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
     contact = cr.press(scene, approach=PAPER_APPROACH)
     points = asperities.positions
     partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved(points)]
     verdict = cr.verify(scene, contact.loads[partners], approach=PAPER_APPROACH)
     assert not verdict.holds
     assert f"the loads are right with {said}" in list(verdict.hints())
+    state = cr.shear(contact, force=0.1 * contact.load)
+    sheared = verify_shear(contact, state.forces[partners], force=0.1 * contact.load)
+    assert f"the shear forces are right with {said}" in list(sheared.hints())
     unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
     assert not any("the loads are right" in hint for hint in unlike.hints())

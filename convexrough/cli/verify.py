@@ -136,6 +136,8 @@ def verify(
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
+    if explain and (out or junit or proof):
+        raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
     alone = [Path("proof.json")] if proof and out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
@@ -148,7 +150,11 @@ def verify(
         if explain:
             read = [read_loads(loads, file.scene, manner)]
             read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-            lines = [line for each in read for line in (each.note, *each.explained, "")]
+            lines = [
+                line
+                for path, each in zip((loads, shear), read, strict=False)
+                for line in (f"{path}:", *each.explained, "")
+            ]
             lines += report.describe_scene(file.scene)
             echo({"read": lines}, lines, as_json)
             return DONE

@@ -17,6 +17,7 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
 from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.record import Record
+from convexrough.scene.scene import Scene
 
 #: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
 CLAIMS_SLIDING = 1e-4
@@ -56,8 +57,8 @@ class ShearVerdict(Claim, Record):
         return self.forces
 
     @property
-    def unit(self) -> str:
-        return self.contact.scene.units.force or "N"
+    def of(self) -> Scene:
+        return self.contact.scene
 
     @property
     def largest(self) -> float:

@@ -15,6 +15,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.roundoff import SAFETY
+from convexrough.scene.scene import Scene
 
 #: Largest error of forces and totals by default, as a fraction of the largest force or the total.
 WITHIN = 0.01
@@ -24,6 +25,10 @@ SUSPICIOUS = 1e-3
 
 #: Prefixes of the units of forces that are too large by these powers of ten.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
+
+#: For `_moved`: distance over the size of the array that counts as 0, and largest remaining part of
+#: the error.
+SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
 #: Largest part of an error that remains after a factor, of which `hints` then tells.
 REMAINING = 0.1
@@ -69,8 +74,8 @@ class Claim(ABC):
 
     @property
     @abstractmethod
-    def unit(self) -> str:
-        """The name of the unit of forces."""
+    def of(self) -> Scene:
+        """The scene that the claim is about."""
 
     @property
     @abstractmethod
@@ -124,6 +129,9 @@ class Claim(ABC):
         if self.holds or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
+        if moved := self._moved(values, true):
+            yield f"the {self.many} are right with {moved}"
+            return
         sorted_apart = np.abs(np.sort(values) - np.sort(true)).max()
         if sorted_apart <= WITHIN < np.abs(values - true).max():
             yield f"the {self.many} are those of the solution, in another order of the asperities"
@@ -139,13 +147,34 @@ class Claim(ABC):
         if factor and abs(factor - 1) > WITHIN:
             yield f"the {self.many} {self._wrong_by(factor)}"
 
+    def _moved(self, values: Array, true: Array) -> str:
+        """A symmetry of the array (exchanged axes or signs) that corrects forces; "" if none."""
+        from scipy.spatial import cKDTree  # takes 0.1 s to import
+
+        points = self.of.asperities.positions
+        tree, size = cKDTree(points), float(np.abs(points).max())
+        for said, moved in (
+            ("x and y exchanged", points[:, ::-1]),
+            ("the other sign of x", points * [-1, 1]),
+            ("the other sign of y", points * [1, -1]),
+            ("the other sign of x and y", -points),
+        ):
+            distances, partners = map(np.asarray, tree.query(moved))
+            left = np.abs(values[partners] - true).max()
+            if distances.max() <= SAME_PLACE * size and (
+                left <= CORRECTED * np.abs(values - true).max()
+            ):
+                return said
+        return ""
+
     def _wrong_by(self, factor: float) -> str:
         size = f"are {abs(factor):.4g} times those of the solution"
         if abs(abs(factor) - 1) <= WITHIN:
             size = ""
         elif power := _power_of_ten(abs(factor)):
             prefix = PREFIXES.get(power)
-            example = f", as {prefix}{self.unit} for {self.unit}" if prefix else ""
+            unit = self.of.units.force or "N"
+            example = f", as {prefix}{unit} for {unit}" if prefix else ""
             modulus = ", or of the modulus" if self.total_prescribed is None else ""
             size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
         return " and ".join(filter(None, ("have the other sign" if factor < 0 else "", size)))

@@ -31,10 +31,6 @@ from convexrough.scene.scene import Scene
 #: Loads up to this fraction of the largest are called noise in hints.
 NOISE = 1e-6
 
-#: For `_moved`: distance over the size of the array that counts as 0, and largest remaining part of
-#: the error.
-SAME_PLACE, CORRECTED = 1e-9, 1e-3
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Claim, Table, Plottable):
@@ -93,8 +89,8 @@ class Verdict(Claim, Table, Plottable):
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
 
     @property
-    def unit(self) -> str:
-        return self.scene.units.force or "N"
+    def of(self) -> Scene:
+        return self.scene
 
     @property
     def errors_alone(self) -> Array:
@@ -117,29 +113,6 @@ class Verdict(Claim, Table, Plottable):
                 "them as open"
             )
         yield from super().hints()
-        if self.solution is not None and (moved := self._moved(self.solution.loads)):
-            yield f"the loads are right with {moved}"
-
-    def _moved(self, true: Array) -> str:
-        """A symmetry of the array (exchanged axes or signs) that corrects the loads; "" if none."""
-        from scipy.spatial import cKDTree  # takes 0.1 s to import
-
-        points = self.scene.asperities.positions
-        tree, size = cKDTree(points), float(np.abs(points).max())
-        for said, moved in (
-            ("x and y exchanged", points[:, ::-1]),
-            ("the other sign of x", points * [-1, 1]),
-            ("the other sign of y", points * [1, -1]),
-            ("the other sign of x and y", -points),
-        ):
-            distances, partners = map(np.asarray, tree.query(moved))
-            off = np.abs(self.loads[partners] - true).max()
-            if (
-                distances.max() <= SAME_PLACE * size
-                and off <= CORRECTED * np.abs(self.loads - true).max()
-            ):
-                return said
-        return ""
 
 
 def rounded_up(value: float) -> str:

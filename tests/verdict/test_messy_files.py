@@ -566,12 +566,14 @@ def test_explain_reads_and_judges_nothing(tmp_path: Path, command: Any, case: Ca
     name = put(tmp_path, german(case.table("x\xa0[m] y\xa0[m] P", gap=case.loads)))
     outcome = command("verify", "scene.toml", name, "--explain", "--column", "load=P")
     assert (outcome.status, outcome.err) == (0, "")
-    for said in ("separated by semicolons, decimal comma", "x [m]", "load: column P",
+    for said in ("separated by semicolons, decimal comma", "x: column x in m", "load: column P",
                  "matched by position", "not looked at: gap", "closest"):  # fmt: skip
         assert said in outcome.out
     assert "certificate" not in outcome.out
     shown = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
     assert json.loads(shown.out)["read"] == outcome.out.removesuffix("\n").split("\n")
+    refused = command("verify", "scene.toml", name, "--explain", "--junit", "found.xml")
+    assert (refused.status, "--explain checks nothing" in refused.err) == (2, True)
 
 
 def test_loads_beside_pressures(tmp_path: Path, command: Any, case: Case) -> None:
