@@ -17,7 +17,7 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import WORKBOOKS, bare, read_text_table, unit
+from convexrough.tabular.text import HOLES, WORKBOOKS, TextTable, bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
 #: The quantity that each column measures.
@@ -46,9 +46,6 @@ INDEX = (
     "asperity",
     "",
 )
-
-#: Cells that mean an unknown number, in lower case.
-HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
 #: First words of rows below a table that are not part of it, in lower case.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
@@ -151,6 +148,7 @@ def read_table(
     holes: Sequence[str] = (),
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
+    table: TextTable | None = None,
 ) -> ReadTable:
     """Columns of a file by known names. The numbers of other columns are not checked.
 
@@ -158,12 +156,14 @@ def read_table(
     instead : columns that replace a required one if the file has the first of them
     also  : other names of columns;  holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
+    table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
     wanted = (*required, *optional, *text, *(each for names in instead.values() for each in names))
+    known = [*wanted, *INDEX[:-1], *(each.lower() for each in how.columns.values())]
     with reading(path):
-        source = _source(path, [*wanted, *INDEX[:-1], *(c.lower() for c in how.columns.values())])
+        source = _source(path, known) if table is None else _text_source(path, table)
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
@@ -294,12 +294,16 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             numbers=_as_numbers,
             mistakes=[],
         )
-    table = read_text_table(path, known)
+    return _text_source(path, read_text_table(path, known))
+
+
+def _text_source(path: Path, table: TextTable) -> _Source:
+    header = table.header.cells if table.header else None
     named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
-    width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
+    width = len(header) if header else max(len(row.cells) for row in table.rows)
     mistakes, whole = [], []
     for row in table.rows:
-        if what := row.wrong or _misfit(row.cells, width, table.header):
+        if what := row.wrong or _misfit(row.cells, width, header):
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
@@ -310,7 +314,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
         found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
-        header=table.header,
+        header=header,
         columns=[[row.cells[i] for row in whole] for i in range(width)],
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],
