@@ -143,25 +143,26 @@ class Stepper:
         size = float(np.abs(level.indentations).max())
         eta, x = trial.even(total)
         tried = [trial.at(eta, x, total)]
+        residuals = [tried[0].residual]
         for _ in range(ITERATIONS):
-            iterate, worst = tried[-1], max(each.residual for each in tried[-RECENT:])
-            if iterate.residual <= ACCURATE * size:
+            if residuals[-1] <= ACCURATE * size:
                 break
+            iterate, worst = tried[-1], max(residuals[-RECENT:])
             change, shift = iterate.newton(self.A)
-            part = 1.0
-            for _ in range(HALVINGS):
+            for k in range(HALVINGS):
+                part = 2.0**-k
                 following = trial.at(iterate.eta + part * change, iterate.x + part * shift, total)
-                if following.residual < worst:
+                if (residual := following.residual) < worst:
                     break
-                part /= 2
             else:
                 break
             tried.append(following)
-        iterate = min(tried, key=lambda each: each.residual)
-        if iterate.residual > 1e3 * ACCURATE * size:
-            found = f"a residual of {iterate.residual / size:.1e} of the indentation"
+            residuals.append(residual)
+        least = min(residuals)
+        if least > 1e3 * ACCURATE * size:
+            found = f"a residual of {least / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
-        return self._reached(now, level, iterate)
+        return self._reached(now, level, tried[residuals.index(least)])
 
     def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
         moved = now.positions + iterate.eta
