@@ -66,12 +66,9 @@ def _numbers(path: Path, table: TextTable) -> Array:
         where = f"{path}: row {row.number}"
         cells = ["nan" if cell.lower() in HOLES else cell for cell in row.cells]
         if (values := table.style.numbers(cells)) is None:
-            found = [table.style.number(cell) for cell in cells]
-            if None in found:
-                column = found.index(None)
-                shown, where = repr(cells[column])[:60], f"{where}, column {column + 1}"
-                raise InputError("height", found=shown, expected="a number", where=where)
-            values = np.array(found, dtype=np.float64)
+            column = [table.style.number(cell) for cell in cells].index(None)
+            shown, where = repr(cells[column])[:60], f"{where}, column {column + 1}"
+            raise InputError("height", found=shown, expected="a number", where=where)
         if rows and len(values) != len(rows[0]):
             expected = f"{len(rows[0])}, as in the first row"
             raise InputError("cells", found=len(values), expected=expected, where=where)

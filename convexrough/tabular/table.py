@@ -104,9 +104,8 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the other columns by header; text where some cell is no number
+    others  : the other columns by header, also by an empty one; text where a cell is no number
     factors : factors other than 1 by which columns were multiplied
-    indices : columns of whole numbers with a name in `INDEX`
     """
 
     columns: dict[str, NDArray[Any]]
@@ -117,7 +116,6 @@ class ReadTable(NamedTuple):
     called: dict[str, str]
     others: dict[str, NDArray[Any]]
     factors: dict[str, float]
-    indices: dict[str, NDArray[np.intp]]
 
     def mistake(self, row: int, what: str) -> str:
         """The message of a mistake in a row, with the line."""
@@ -214,11 +212,9 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        {names[i]: _numbers_or_text(source, i) for i in rest if names[i]},
+        {names[i]: _numbers_or_text(source, i) for i in rest} if source.header else {},
         factors,
-        {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
-         if (whole := _whole(source, i)) is not None},
-    )  # fmt: skip
+    )
 
 
 def _factors(
@@ -270,14 +266,6 @@ def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     cells = source.columns[place]
     numbers = source.numbers(cells)
     return np.array([str(cell) for cell in cells]) if numbers is None else numbers
-
-
-def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
-    """The column if all its cells are whole numbers >= 0, else None."""
-    values = [source.number(cell) for cell in source.columns[place]]
-    if all(value is not None and value >= 0 and value == value // 1 < 2**53 for value in values):
-        return np.array(values).astype(np.intp)
-    return None
 
 
 def _source(path: Path, known: Sequence[str]) -> _Source:

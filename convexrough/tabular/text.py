@@ -11,6 +11,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
@@ -96,14 +97,13 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[str]) -> Array | None:
-        """The numbers in cells, converted at once if all are plain numbers; else None."""
+        """The numbers in cells, converted at once if all are plain; None if some are no numbers."""
         joined = "\n".join(cells)
-        if "_" in joined or (self.decimal == "," and "." in joined):
-            return None
-        try:
-            return np.array(joined.replace(self.decimal, ".").split("\n"), dtype=np.float64)
-        except ValueError:
-            return None
+        if "_" not in joined and (self.decimal == "." or "." not in joined):
+            with suppress(ValueError):
+                return np.array(joined.replace(self.decimal, ".").split("\n"), dtype=np.float64)
+        found = [self.number(cell) for cell in cells]
+        return None if None in found else np.array(found, dtype=np.float64)
 
 
 #: Styles in order of preference, for files that allow several.
