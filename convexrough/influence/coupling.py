@@ -32,12 +32,11 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """Bounds on the error of a computed product A P, for loads of either sign.
 
-    The error of component i is at most  relative * (A |P|)_i + r_i  with |r_i| <= each  and
-    ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md.
+    The error of component i is at most  relative * (A |P|)_i + each: eta and rho of
+    docs/theory/operators.md.
     """
 
     relative: float
-    norm: float
     each: float
 
     def of(self, displacement: Array) -> Array:
@@ -47,7 +46,7 @@ class Rounding(NamedTuple):
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce, because the bounds are larger."""
         size = math.sqrt(np.vdot(displacement, displacement))
-        return 0.1 * self.relative * size + 0.02 * self.norm
+        return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
 
 class Coupling(Protocol):
