@@ -158,14 +158,9 @@ def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair,
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))
 
 
-def squared_distances(
-    points: Array, others: Array, tails: tuple[Array, Array] | None = None
-) -> Array:
-    """(n, m) [length^2] r_ij^2; `tails` are low parts of the points and of the others."""
+def squared_distances(points: Array, others: Array) -> Array:
+    """(n, m) [length^2] r_ij^2."""
     squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
-    if tails is not None:
-        squares += np.subtract.outer(tails[0][:, 0], tails[1][:, 0])
-        y += np.subtract.outer(tails[0][:, 1], tails[1][:, 1])
     squares *= squares
     y *= y
     squares += y
