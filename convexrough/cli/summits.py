@@ -73,7 +73,7 @@ def press_options(command: Command) -> Command:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Smallest prominence of a hill, as a fraction of the height Sz.")  # fmt: skip
+              help="Remove hills less prominent than this fraction of the height Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.friction.curve import MemoryCurve
 from convexrough.sphere import hertz
 
 #: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5 and Z are their positions.
@@ -79,19 +78,18 @@ class ConePiece(NamedTuple):
         return self.own * force + 0.6 * self.rate**2 * float(np.cbrt(level)) ** 5
 
 
-def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
-    """The pieces of an asperity with this memory curve before the step.
+def pieces_of(levels: Array, heights: Array, own: float, k: float) -> list[ConePiece]:
+    """The pieces of an asperity whose memory curve before the step has these vertices, (m,).
 
-    own : its indentation after the step, positive
-    k   : its coefficient of Hertz's law
+    levels : up to its indentation after the step, at most
+    own    : its indentation after the step, positive
+    k      : its coefficient of Hertz's law
     """
+    distinct = np.diff(levels, prepend=-1.0) > 0
+    s, base = levels[distinct], float(levels[-1])
     load = float(hertz.load(own, k))
-    base = min(float(curve.load), own)
-    old, heights = ([float(each) for each in of] for of in (curve.levels, curve.heights))
-    inner = curve if base >= old[-1] else curve.go(base, float(np.interp(base, old, heights)))[0]
-    s = np.array([float(each) for each in inner.levels])
-    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in inner.heights]) / own
-    slopes = [float(each) for each in inner.slopes]
+    N, xi = hertz.load(s, k) / load, heights[distinct] / own
+    slopes = (np.diff(heights[distinct]) / np.diff(s)).tolist()
     T = np.concatenate(([0.0], np.cumsum(np.array(slopes) * np.diff(N))))
     top, moved = float(N[-1]), float(xi[-1])
     found = []

@@ -41,11 +41,11 @@ class ConicStepper(Stepper):
         forces, x = program.invert(raw)
         own = np.maximum(level.indentations, 0.0)
         targets = program.deflections(forces)
-        pairs = zip(now.curves, own.tolist(), targets.tolist(), strict=True)
-        curves = [old.go(top, target)[0] for old, top, target in pairs]
+        reached = now.curves.cut(own).step(own, targets)
         moved = x - self.A @ (forces - now.carried)
         positions, displacement = now.positions + moved, now.displacement + x
-        return Bundle(now.load, level, tuple(curves), forces, positions, displacement)
+        curves, fronts = reached.curves, reached.fronts
+        return Bundle(now.load, level, curves, fronts, forces, positions, displacement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +78,12 @@ class StepProgram:
         gaps = np.maximum(-now.level.indentations[which], 0.0)
         scene = stepper.levels.scene
         scale = 1.0 / (np.pi * scene.material.contact_modulus)
+        old = now.curves.cut(np.maximum(level.indentations, 0.0))
+        vertices = old.levels[which], old.heights[which], own, k
         pieces = [
             (place, piece)
-            for place, i in enumerate(which)
-            for piece in pieces_of(now.curves[i], float(own[place]), float(k[place]))
+            for place, each in enumerate(zip(*vertices, strict=True))
+            for piece in pieces_of(*each)
         ]
         program = cls(
             stepper=stepper,

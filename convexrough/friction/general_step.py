@@ -22,6 +22,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import SolverError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
+from convexrough.friction.own_curves import OwnCurves, OwnStep
 from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.progress import LOGGER
@@ -52,7 +53,8 @@ class Bundle:
     """The state of n asperities after a step.
 
     load, height : [force] P and T = Q / f
-    curves    : the memory curve of each asperity
+    curves    : the memory curves of the asperities
+    fronts    : (n,) indentations at their slip fronts, or the whole indentations
     carried   : (n,) T_i
     positions : (n,) deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
@@ -61,7 +63,8 @@ class Bundle:
 
     load: Fraction
     level: Snapshot
-    curves: tuple[MemoryCurve, ...]
+    curves: OwnCurves
+    fronts: Array
     carried: Array
     positions: Array
     displacement: float = 0.0
@@ -71,7 +74,7 @@ class Bundle:
     @property
     def deflections(self) -> Array:
         """(n,) own deflection over c_t f."""
-        return np.array([float(curve.height) for curve in self.curves])
+        return self.curves.heights[:, -1]
 
 
 class Stepper:
@@ -89,9 +92,8 @@ class Stepper:
     def start(self, curve: MemoryCurve) -> Bundle:
         """The state without shear at the load of this curve."""
         level = self.levels.snapshot(curve.load)
-        own = tuple(MemoryCurve.pressed(max(each, 0.0)) for each in level.indentations)
-        zero = np.zeros(len(own))
-        return Bundle(curve.load, level, own, zero, zero)
+        own, zero = np.maximum(level.indentations, 0.0), np.zeros(len(level.indentations))
+        return Bundle(curve.load, level, OwnCurves.pressed(own, self.coefficients), own, zero, zero)
 
     def along(
         self, start: MemoryCurve, points: Sequence[tuple[Fraction, Fraction]], steps: int
@@ -132,7 +134,7 @@ class Stepper:
         """The state in which all asperities slide, at the least displacement at which they do."""
         trial, on = _Trial.of(self, now, level), level.indentations > 0
         coupled = self.A @ (sign * level.loads - now.carried)
-        taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]
+        taken = (sign * level.indentations - now.deflections)[on] / trial.parts[on]
         x = sign * float((sign * (taken + coupled[on])).max())
         return self._reached(now, level, trial.at(x - coupled, x, sign * level.load))
 
@@ -141,43 +143,36 @@ class Stepper:
         size = float(np.abs(level.indentations).max())
         eta, x = trial.even(total)
         tried = [trial.at(eta, x, total)]
+        residuals = [tried[0].residual]
         for _ in range(ITERATIONS):
-            iterate, worst = tried[-1], max(each.residual for each in tried[-RECENT:])
-            if iterate.residual <= ACCURATE * size:
+            if residuals[-1] <= ACCURATE * size:
                 break
+            iterate, worst = tried[-1], max(residuals[-RECENT:])
             change, shift = iterate.newton(self.A)
-            part = 1.0
-            for _ in range(HALVINGS):
+            for k in range(HALVINGS):
+                part = 2.0**-k
                 following = trial.at(iterate.eta + part * change, iterate.x + part * shift, total)
-                if following.residual < worst:
+                if (residual := following.residual) < worst:
                     break
-                part /= 2
             else:
                 break
             tried.append(following)
-        iterate = min(tried, key=lambda each: each.residual)
-        if iterate.residual > 1e3 * ACCURATE * size:
-            found = f"a residual of {iterate.residual / size:.1e} of the indentation"
+            residuals.append(residual)
+        least = min(residuals)
+        if least > 1e3 * ACCURATE * size:
+            found = f"a residual of {least / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
-        return self._reached(now, level, iterate)
+        return self._reached(now, level, tried[residuals.index(least)])
 
     def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
         moved = now.positions + iterate.eta
         displacement = now.displacement + iterate.x
-        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement)
+        own = iterate.own
+        return Bundle(now.load, level, own.curves, own.fronts, own.forces, moved, displacement)
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
-        own = 0.0
-        for curve, k in zip(state.curves, self.coefficients, strict=True):
-            carried = 0.0
-            levels = np.array([float(level) for level in curve.levels])
-            loads = hertz.load(levels, k)
-            for j, slope in enumerate(map(float, curve.slopes)):
-                run, added = levels[j + 1] - levels[j], loads[j + 1] - loads[j]
-                own += slope * (carried - slope * loads[j]) * run
-                own += 0.4 * slope**2 * (loads[j + 1] * levels[j + 1] - loads[j] * levels[j])
-                carried += slope * added
+        own = float(state.curves.energies().sum())
         return own + 0.5 * float(state.carried @ self.A @ state.carried)
 
 
@@ -246,19 +241,14 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
         states=States(*fields),
         losses=frozen(f * travel * spent),
         status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
-        fronts=np.array([[_front(curve) for curve in each.curves] for each in bundles]),
+        fronts=np.array([each.fronts for each in bundles]),
     )
-
-
-def _front(curve: MemoryCurve) -> float:
-    return float(curve.load if curve.front is None else curve.front)
 
 
 class _Iterate(NamedTuple):
     eta: Array
     x: float
-    curves: tuple[MemoryCurve, ...]
-    carried: Array
+    own: OwnStep
     slopes: Array  # dT_i / deta_i
     defect: Array  # (n,) defects of the first equation of (1)
     excess: float  # sum of T_i minus T
@@ -266,9 +256,9 @@ class _Iterate(NamedTuple):
     @property
     def residual(self) -> float:
         """The largest defect, or the displacement that supplies what the total lacks."""
-        stiffness, rounding = float(self.slopes.sum()), len(self.carried) * ROUNDOFF
+        stiffness, rounding = float(self.slopes.sum()), len(self.eta) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
-        beyond = abs(self.excess) > rounding * float(np.abs(self.carried).sum())
+        beyond = abs(self.excess) > rounding * float(np.abs(self.own.forces).sum())
         return max(float(np.abs(self.defect).max()), missing if beyond else 0.0)
 
     def newton(self, A: Array) -> tuple[Array, float]:
@@ -293,7 +283,8 @@ class _Trial(NamedTuple):
     stepper: Stepper
     now: Bundle
     level: Snapshot
-    deflections: Array  # (n,) before the step
+    indentations: Array  # (n,) after the step, 0 where open
+    curves: OwnCurves  # before the step, up to these indentations
     parts: Array  # (n,) fraction of the step during which each asperity touches
 
     @classmethod
@@ -301,40 +292,18 @@ class _Trial(NamedTuple):
         own = np.maximum(level.indentations, 0.0)
         gaps = np.maximum(-now.level.indentations, 0.0)
         parts = np.divide(own, own + gaps, out=np.zeros_like(own), where=own > 0)
-        return cls(stepper, now, level, now.deflections, parts)
+        return cls(stepper, now, level, own, now.curves.cut(own), parts)
 
     def even(self, total: float) -> tuple[Array, float]:
         """Start values of eta and x: each asperity carries the same part of its friction limit."""
-        own = np.maximum(self.level.indentations, 0.0)
-        wanted = total / self.level.load * own - self.deflections
-        eta = np.divide(wanted, self.parts, out=np.zeros_like(own), where=self.parts > 0)
+        wanted = total / self.level.load * self.indentations - self.now.deflections
+        eta = np.divide(wanted, self.parts, out=np.zeros(len(wanted)), where=self.parts > 0)
         return eta, float(eta @ self.level.loads / self.level.load)
 
     def at(self, eta: Array, x: float, total: float) -> _Iterate:
-        curves, carried, slopes = [], np.zeros(len(eta)), np.zeros(len(eta))
-        targets = self.deflections + eta * self.parts
-        for i, (old, k) in enumerate(zip(self.now.curves, self.stepper.coefficients, strict=True)):
-            own = max(float(self.level.indentations[i]), 0.0)
-            curve, _ = old.go(own, min(max(targets[i], -own), own))
-            curves.append(curve)
-            if own == 0.0:
-                continue
-            levels = np.array([float(level) for level in curve.levels])
-            loads = hertz.load(levels, k)
-            carried[i] = np.diff(loads) @ np.array([float(slope) for slope in curve.slopes])
-            if abs(targets[i]) < own:
-                slopes[i] = self.parts[i] * _slope(old, curve, k)
-        defect = eta + self.stepper.A @ (carried - self.now.carried) - x
-        return _Iterate(
-            eta, x, tuple(curves), carried, slopes, defect, float(carried.sum()) - total
-        )
-
-
-def _slope(old: MemoryCurve, curve: MemoryCurve, k: float) -> float:
-    """The derivative of T_i with respect to the deflection: by sticking, or at the slip front."""
-    high = float(curve.load)
-    if curve.front is None and curve.load > old.load:
-        low = float(old.load)
-        return float((hertz.load(high, k) - hertz.load(low, k)) / (high - low))
-    front = high if curve.front is None else float(curve.front)
-    return float(1.5 * np.sqrt(front / k**3))
+        limits = self.indentations
+        targets = np.clip(self.now.deflections + eta * self.parts, -limits, limits)
+        own = self.curves.step(limits, targets)
+        defect = eta + self.stepper.A @ (own.forces - self.now.carried) - x
+        excess = float(own.forces.sum()) - total
+        return _Iterate(eta, x, own, self.parts * own.stiffness, defect, excess)

@@ -261,7 +261,9 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """The largest (a_i + a_j) / r_ij, for contact radii a; the search ends at distant pairs."""
+        """The largest (a_i + a_j) / r_ij, for contact radii a.
+
+        Pairs are searched up to the distance beyond which none can exceed the largest found."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)

@@ -54,9 +54,9 @@ class Certificate(Table):
     duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
         prescribed, the loads are first scaled to it, without those of asperities that cannot touch
-    fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
-        unless contacts are crowded. Uniqueness nearby is proved only among solutions with these
-        asperities open
+    fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
+        in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
+        of them touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution: on its largest
         (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where there is no
         other solution, and 0 where nothing is known

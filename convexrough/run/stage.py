@@ -112,7 +112,7 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`; if it is no status, the attribute.
+    """The number of asperities with the status `name`, or the attribute of this name.
 
     The attribute is that of `found`, or of `found.certificate` where `found` has none.
     """
@@ -201,7 +201,7 @@ class Result(Table, Plottable):
         return {}
 
     def prepare(self, *, figures: bool) -> None:
-        """Compute what tables and figures need, so that writing them solves nothing."""
+        """Compute all that tables and figures need; while they are written nothing is solved."""
         _ = self.known
 
     def lines(self) -> list[str]:
@@ -311,6 +311,6 @@ def unit_of(name: str, units: UnitNames) -> str:
 
 
 def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
-    """The title, followed by the units of the printed quantities that the scene names."""
+    """The title, followed by the units of the printed quantities, if the scene names units."""
     named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
     return f"{title}  ({', '.join(named)})" if named else title

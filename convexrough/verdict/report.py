@@ -209,7 +209,8 @@ def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
 
 
 def _off(claim: Claim) -> str:
-    beyond = f"; exceeded by {len(claim.off):,}" if len(claim.off) else ""
+    noun = claim.one if len(claim.off) == 1 else claim.many
+    beyond = f"; exceeded by {len(claim.off):,} {noun}" if len(claim.off) else ""
     allowed = f"{100 * claim.within:g} %" if claim.within > PERCENT else f"{claim.within:g}"
     if math.isinf(claim.error):
         return f"no bound is proved ({allowed} allowed)"

@@ -131,12 +131,12 @@ def verify(
     floor: float = 0.0,
     influence: Kind | None = None,
 ) -> Verdict:
-    """Compare loads from any source with the solution: which touch, and how accurate they are.
+    """Compare loads from any source with the solution: the contact set, and the errors of loads.
 
     loads : (n,) [force] in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed, as a fraction of the largest load, and of the total as
-        a fraction of the total; with 1, little but the contact set is checked
+    within : largest error allowed of a load, over the largest load, and of the total load, over the
+        total; with 1, little but the contact set is checked
     floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
         asperity is open
     influence : compliance operator; None for the cheapest
