@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -104,7 +105,7 @@ class SiteBox:
         block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
-        sums: dict[int, list[Array]] = {}  # by block: sums of each kernel and of its squares
+        sums: dict[int, list[float]] = {}  # by block: sums of squares of each kernel
 
         def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
@@ -113,18 +114,17 @@ class SiteBox:
             for k, each in enumerate(self._laid_out(values, taken)):
                 if k == len(halves):
                     halves.append(np.zeros(shape, dtype=whole))
-                squares = np.einsum("ij,ij->i", each, each)
-                sums[taken.start].append(weights @ np.stack((each.sum(axis=1), squares), axis=1))
+                sums[taken.start].append(float(weights @ np.einsum("ij,ij->i", each, each)))
                 halves[k][taken] = fft.rfft(each.astype(dtype, copy=False), axis=1)
 
         transform(blocks[0])  # this first block shows how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
-        whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
+        squares = np.sum([sums[taken.start] for taken in blocks], axis=0)
         found = []
-        for total, square in whole_sums[::-1]:
-            spectrum = self._spectrum(halves.pop(), dtype, odd)
-            found.append(Kernel(spectrum, float(total), float(np.sqrt(square))))
-        return found[::-1]
+        for square in squares.tolist():
+            spectrum = self._spectrum(halves.pop(0), dtype, odd)
+            found.append(Kernel(spectrum, math.sqrt(square)))
+        return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
         """Values in some rows of the padded box, for the shortest difference at each place."""
@@ -202,18 +202,9 @@ class SiteBox:
         return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on the 2-norm of the error of `convolve`, divided by the 2-norm of the field.
-
-        (1) of docs/theory/operators-lattice.md, "Rounding".
-        """
-        size = float(np.sqrt(float(self.padded[0]) * self.padded[1]))
-        spectral = self.loss * size * kernel.norm
-        return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
-
-    def bound_each(self, kernel: Kernel, roundoff: float) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        (2) of docs/theory/operators-lattice.md, "Rounding".
+        (1) of docs/theory/operators-lattice.md, "Rounding".
         """
         inverse = float(np.sqrt(2.0)) * self.loss
         return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
@@ -223,12 +214,11 @@ class SiteBox:
 class Kernel:
     """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary.
 
-    spectrum    : the transform, or the imaginary part of the transform
-    total, norm : the sum and the 2-norm of the kernel
+    spectrum : the transform, or the imaginary part of the transform
+    norm     : the 2-norm of the kernel
     """
 
     spectrum: NDArray[Any]
-    total: float
     norm: float
 
 

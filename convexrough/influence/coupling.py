@@ -32,12 +32,11 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """Bounds on the error of a computed product A P, for loads of either sign.
 
-    The error of component i is at most  relative * (A |P|)_i + r_i  with |r_i| <= each  and
-    ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md.
+    The error of component i is at most  relative * (A |P|)_i + each: eta and rho of
+    docs/theory/operators.md.
     """
 
     relative: float
-    norm: float
     each: float
 
     def of(self, displacement: Array) -> Array:
@@ -47,7 +46,7 @@ class Rounding(NamedTuple):
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce, because the bounds are larger."""
         size = math.sqrt(np.vdot(displacement, displacement))
-        return 0.1 * self.relative * size + 0.02 * self.norm
+        return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
 
 class Coupling(Protocol):
@@ -159,14 +158,9 @@ def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair,
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))
 
 
-def squared_distances(
-    points: Array, others: Array, tails: tuple[Array, Array] | None = None
-) -> Array:
-    """(n, m) [length^2] r_ij^2; `tails` are low parts of the points and of the others."""
+def squared_distances(points: Array, others: Array) -> Array:
+    """(n, m) [length^2] r_ij^2."""
     squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
-    if tails is not None:
-        squares += np.subtract.outer(tails[0][:, 0], tails[1][:, 0])
-        y += np.subtract.outer(tails[0][:, 1], tails[1][:, 1])
     squares *= squares
     y *= y
     squares += y

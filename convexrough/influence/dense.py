@@ -117,7 +117,7 @@ class DenseInfluence:
     def rounding(self, loads: Array) -> Rounding:
         """Bounds for sums in blocks: Higham, Accuracy and Stability, section 4.2."""
         terms = self._block + -(-len(self) // self._block) + 1
-        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0, 0.0)
+        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         inverse = self.matrix / self.scale  # 1 / r: powers of the scale may underflow
@@ -187,7 +187,7 @@ class DenseCoupling:
 
     def rounding(self, loads: Array) -> Rounding:
         terms = len(self.points) + 1
-        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0, 0.0)
+        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         total = np.empty(len(self.targets))

@@ -80,13 +80,10 @@ class LatticeCoupling:
 
     def rounding(self, loads: Array) -> Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
-        # row sum of this bounds the effect on the 2-norm and on the largest component.
-        kernel, off = self._kernel, self._displaced
-        size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
-        norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
-        each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
-        relative = 1.01 * ENTRY_ROUNDOFFS * ROUNDOFF
-        return Rounding(relative, self._unit * norm, self._unit * each)
+        # row sum of this bounds the effect on a component.
+        each = self.box.bound(self._kernel, ROUNDOFF) * float(np.linalg.norm(loads))
+        each += self._displaced * float(np.abs(loads).max(initial=0.0))
+        return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """(m,) upper bounds on sum_j strengths_j / r_ij^power, computed in single precision."""
@@ -94,7 +91,7 @@ class LatticeCoupling:
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
         total = self._convolve(shares, kernel.spectrum).astype(np.float64)
-        total += self.box.bound_each(kernel, 2.0**-24) * float(np.linalg.norm(shares))
+        total += self.box.bound(kernel, 2.0**-24) * float(np.linalg.norm(shares))
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 

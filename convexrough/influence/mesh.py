@@ -73,15 +73,14 @@ class Interpolation:
             field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
         return field
 
-    def from_nodes(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """(n,) W times a field on the mesh, or |W| times the field if `absolute`."""
+    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
+        """(n,) W times a field on the mesh."""
         result = np.empty(len(self.x), dtype=field.dtype)
-        x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
-        width = x.shape[1]
+        width = self.x.shape[1]
         for start, stop, i, j in self.patches:
             mine = slice(start, stop)
-            along = x[mine] @ field[i : i + width, j : j + width]
-            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
+            along = self.x[mine] @ field[i : i + width, j : j + width]
+            np.einsum("ij,ij->i", along, self.y[mine], out=result[mine])
         return result
 
 

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
-from convexrough.arithmetic.pairs import Pair, two_sum
+from convexrough import checks, threads
+from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
 
-#: Number of pairs processed together, and number of such groups in memory at once.
-PIECE, BATCH = 2**17, 32
+#: Memory [bytes] for half a near pair while the matrix is assembled, and least number of points
+#: from which the number of pairs is estimated before.
+BYTES, SAMPLE = 24, 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +63,14 @@ class Order:
             (rows, columns),
         )
 
+    def squares(self, i: Indices, j: Indices) -> Array:
+        """(m,) [length^2] squared distances of pairs of the sorted points."""
+        apart = self.points[i] - self.points[j]
+        if self.tails is not None:
+            apart += self.tails[i] - self.tails[j]
+        apart *= apart
+        return np.asarray(apart[:, 0] + apart[:, 1])
+
 
 def _placed(
     points: Array, low: Array, spacing: float, tails: Array | None
@@ -79,10 +84,6 @@ def _placed(
     cells -= (away.high == cells) & (away.low < 0)
     cells = np.maximum(cells, 0.0)
     return cells.astype(np.intp), (away.high - cells) + away.low
-
-
-#: A slice of the sorted points, and the first and last neighbours in each row of blocks.
-Piece: TypeAlias = tuple[slice, Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,81 +104,28 @@ class NearPairs:
     @classmethod
     def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
         from scipy.sparse import csr_array
+        from scipy.spatial import cKDTree
 
-        n = len(order.points)
-        pieces = list(_neighbourhoods(order, splitting))
-        most = sum((rows.stop - rows.start) * int((b - a).sum()) for rows, a, b in pieces)
-        # About half of these pairs are near; memory is allocated only when it is written to.
-        checks.fits_in_memory("asperities that could touch", n, 6.0 * most / max(n, 1))
-        index: Any = np.int32 if most < 2**31 else np.int64
-        where, values = np.empty(most, dtype=index), np.empty(most, dtype=dtype)
-        counts = np.zeros(n, dtype=np.int64)
-        nearest, done = splitting.cut, 0
-        pairs_of = partial(_pairs, order, splitting)
-        with ThreadPoolExecutor(2) as threads:
-            for batch in range(0, len(pieces), BATCH):
-                for found in threads.map(pairs_of, pieces[batch : batch + BATCH]):
-                    taken = slice(done, done + len(found.others))
-                    counts[found.rows] = found.counts
-                    where[taken], values[taken] = found.others, found.values
-                    done, nearest = taken.stop, min(nearest, found.closest)
-        starts = np.concatenate(([0], np.cumsum(counts)))
-        both = counts
-        for start in range(0, done, 2**24):  # bincount copies its argument
-            both = both + np.bincount(where[start : min(start + 2**24, done)], minlength=n)
-        upper = csr_array((values[:done], where[:done], starts.astype(index)), shape=(n, n))
-        return cls(upper, -splitting.kernel.centre, int(both.max(initial=0)), nearest)
+        n, tree = len(order.points), cKDTree(order.points)
+        some = order.points[:: max(1, n // SAMPLE)]
+        near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
+        checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
+        i, j = tree.query_pairs(splitting.cut, output_type="ndarray").T.astype(np.int32)
+        values, nearest = np.empty(len(i), dtype=dtype), [splitting.cut]
+
+        def compute(some: slice) -> None:
+            squares = order.squares(i[some], j[some])
+            values[some] = splitting.kernel.local(squares)
+            nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
+
+        threads.each(compute, threads.chunks(len(i), CHUNK), threads.worthwhile(len(i)))
+        terms = np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
+        upper = csr_array((values, (i, j)), shape=(n, n))
+        most = int(terms.max(initial=0))
+        return cls(upper, -splitting.kernel.centre, most, min(nearest))
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         result: NDArray[Any] = self.upper @ loads
         result += self.upper.T @ loads
         result += loads.dtype.type(self.own) * loads
         return result
-
-
-class _Pairs(NamedTuple):
-    """Near pairs of some points with later points, sorted by point."""
-
-    rows: slice  # the points
-    counts: Indices  # how many pairs each has
-    others: NDArray[np.int32]
-    values: Array  # S
-    closest: float  # [length] the least distance that is not 0
-
-
-def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
-    rows, firsts, lasts = piece
-    others = np.concatenate(
-        [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
-    )
-    tails = None if order.tails is None else (order.tails[rows], order.tails[others])
-    squares = squared_distances(order.points[rows], order.points[others], tails)
-    wanted = squares < splitting.cut**2
-    own = lasts[0] - firsts[0]  # each pair once
-    wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]
-    row, column = np.nonzero(wanted)
-    counts = np.bincount(row, minlength=len(squares))
-    squares = squares[wanted]
-    closest = float(np.sqrt(squares[squares > 0].min(initial=np.inf)))
-    return _Pairs(rows, counts, others[column], splitting.kernel.local(squares), closest)
-
-
-def _neighbourhoods(order: Order, splitting: Splitting) -> Iterator[Piece]:
-    """Slices of points, each with the later points that can be nearer than the cut."""
-    rows, columns = order.shape
-    away = 0
-    if splitting.meshed:
-        side = splitting.block * splitting.spacing
-        away = min(int(np.ceil(splitting.cut / side)), max(rows, columns))
-    i, j = order.keys // columns, order.keys % columns
-    ahead = np.arange(min(away, rows - 1) + 1)
-    left = np.where(ahead > 0, np.maximum(j[:, None] - away, 0), j[:, None])
-    right = np.minimum(j + away, columns - 1)[:, None]
-    line = (i[:, None] + ahead) * columns
-    first = order.starts[np.searchsorted(order.keys, line + left, side="left")]
-    last = order.starts[np.searchsorted(order.keys, line + right, side="right")]
-    for block, sizes in enumerate((last - first).sum(axis=1).tolist()):
-        top, bottom = order.starts[block : block + 2].tolist()
-        step = max(1, PIECE // sizes)
-        for start in range(top, bottom, step):
-            yield slice(start, min(start + step, bottom)), first[block], last[block]

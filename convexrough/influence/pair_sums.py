@@ -44,7 +44,7 @@ class Product:
         order = Order.of(points, splitting, tails)
         near = NearPairs.assemble(order, splitting, dtype)
         if not splitting.meshed:
-            nothing = Kernel(np.empty((0, 0)), 0.0, 0.0)
+            nothing = Kernel(np.empty((0, 0)), 0.0)
             return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing)
         weights = Interpolation.assemble(order, splitting, dtype)
         rows, columns = weights.shape
@@ -52,7 +52,7 @@ class Product:
         size = float(mesh.padded[0]) * mesh.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
         kernel = mesh.softened(splitting.kernel)
-        kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.total, kernel.norm)
+        kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.norm)
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
@@ -90,11 +90,6 @@ class Product:
         bounds[self.order.places] = kernel.pair_error(spacing) * near
         return bounds
 
-    @cached_property
-    def interpolation_norm(self) -> float:
-        """Bound on the 2-norm of the interpolation error for loads of 2-norm 1."""
-        return float(self.interpolation(np.ones(len(self.order.points))).max(initial=0.0))
-
     def above(self, strengths: Array) -> Array:
         """(n,) upper bounds on the sums, for strengths of at least 0."""
         total = self.apply(strengths)
@@ -118,22 +113,19 @@ class Product:
         docs/theory/operators-mesh.md, "Errors".
         """
         relative, own = self._rounding
-        norm, each = own * float(np.linalg.norm(loads)), own * float(np.abs(loads).max(initial=0.0))
+        each = own * float(np.abs(loads).max(initial=0.0))
         if self.weights is not None:
             ordered = loads[self.order.places]
             field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
             sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
-            mesh, kernel = self.mesh, self.kernel
+            kernel, soft = self.kernel, self.splitting.kernel
             to_mesh, from_mesh = self._weighing
-            soft = self.splitting.kernel
             from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
-            transforms = mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.total
-            norm += self._stretch * (transforms * field + to_mesh * kernel.total * sizes)
-            # For each component: Cauchy's inequality for a row of G, and the sum of a row of |W|.
-            transforms = mesh.bound_each(kernel, ROUNDOFF) + from_mesh * kernel.norm
+            # Cauchy's inequality for a row of G, and the sum of a row of |W|.
+            transforms = self.mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.norm
             growth = lebesgue(soft.order) ** 2
             each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
-        return Rounding(relative, 1.01 * norm, 1.01 * each)
+        return Rounding(relative, 1.01 * each)
 
     @property
     def _weighing(self) -> tuple[float, float]:
@@ -144,21 +136,6 @@ class Product:
         crowded = float(np.diff(self.order.starts).max())
         to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)
         return (weights + float(to_mesh)) * ROUNDOFF, (weights + 2.0 * order) * ROUNDOFF
-
-    @cached_property
-    def _stretch(self) -> float:
-        """Bound on the 2-norms of W and |W|: the root of max (|W| |W|^T v)_i / v_i for a v > 0."""
-        assert self.weights is not None
-        vector = np.ones(len(self.order.points))
-        least = np.inf
-        for _ in range(3):
-            nodes = self.weights.to_nodes(vector, absolute=True)
-            image = self.weights.from_nodes(nodes, absolute=True)
-            least = min(least, float((image / vector).max()))
-            vector = np.sqrt(vector * image)
-            vector /= vector.max()
-            vector = np.maximum(vector, 1e-3)
-        return 1.01 * float(np.sqrt(least))
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:

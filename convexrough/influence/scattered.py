@@ -72,12 +72,10 @@ class ScatteredInfluence:
     def rounding(self, loads: Array) -> Rounding:
         rounding = self._double.rounding(loads)
         points = entry_error(self._unknown, self._double.near.nearest)
-        interpolation = self._double.interpolation_norm * float(np.linalg.norm(loads))
-        each = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
+        interpolated = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
         return Rounding(
             1.01 * (rounding.relative + points),
-            1.01 * self.scale * (rounding.norm + interpolation),
-            1.01 * self.scale * (rounding.each + each),
+            1.01 * self.scale * (rounding.each + interpolated),
         )
 
     def falloff(self, strengths: Array, power: int) -> Array:

@@ -228,7 +228,7 @@ class Sliced:
 def each_loss(box: SiteBox, count: int) -> float:
     """Bound on the error of a component of a level, divided by the product of the 2-norms.
 
-    (2) of docs/theory/operators-lattice.md, with 2 `count` + 6 roundoffs instead of 4: up to
+    (1) of docs/theory/operators-lattice.md, with 2 `count` + 6 roundoffs instead of 4: up to
     `count` products are added up before the inverse transform, and the last slices are rounded.
     """
     return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)

@@ -176,8 +176,8 @@ def test_products(name: str, count: int, shift: float) -> None:
     """To 1e-13 of the largest displacement, and within the bounds, which are not absurd.
 
     Measured against extended precision: 8e-15 of the largest at most about the axis. Off it, points
-    in float64 are themselves off a lattice: 6e-14 at 300 spacings. The bound on the 2-norm is 200
-    to 8000 times what is lost, on a component 100 to 3000 times.
+    in float64 are themselves off a lattice: 6e-14 at 300 spacings. The bound is 100 to 3000 times
+    what is lost.
     """
     points = patch(turned(BASES[name], 0.3), count) + shift
     A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
@@ -194,7 +194,6 @@ def test_products(name: str, count: int, shift: float) -> None:
         rounding, magnitude = A.rounding(loads), A.apply(np.abs(loads))
         assert (error <= rounding.of(magnitude)).all()
         beyond = np.maximum(error - rounding.relative * np.maximum(magnitude, 0), 0)
-        assert np.linalg.norm(beyond) <= rounding.norm <= least * np.linalg.norm(magnitude)
         assert beyond.max() <= rounding.each
         assert rounding.of(magnitude).max() <= least * magnitude.max()
         single = A.apply(loads.astype(np.float32))
@@ -265,7 +264,6 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
     rng = np.random.default_rng(1)
     for dtype, roundoff in ((np.float64, ROUNDOFF), (np.float32, 2.0**-24)):
         kernel = box.kernel(power, dtype)
-        assert kernel.total >= inverse.sum(axis=1).max() * (1 - 1e-12)
         assert kernel.norm >= np.sqrt((inverse**2).sum(axis=1).max()) * (1 - 1e-12)
         for field in (rng.standard_normal(shape), np.ones(shape), rng.random(shape) ** 20):
             given = field.astype(dtype)
@@ -277,5 +275,4 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
             slack = 24 * ROUNDOFF * power * (inverse @ np.abs(given).ravel()).reshape(shape)
             lost = np.maximum(np.abs(found - exact) - slack, 0)
             size = float(np.linalg.norm(given))
-            assert np.linalg.norm(lost) <= box.bound(kernel, roundoff) * size
-            assert lost.max() <= box.bound_each(kernel, roundoff) * size
+            assert lost.max() <= box.bound(kernel, roundoff) * size
