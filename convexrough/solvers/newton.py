@@ -16,7 +16,7 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import refined_loads, refines
+from convexrough.normal.refine import refined_loads
 from convexrough.solvers.pressing import Pressing, PressingState, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
@@ -90,8 +90,7 @@ class Newton:
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _refines(self, problem: NormalProblem) -> bool:
-        quickly = problem.influence.stored or problem.influence.cheap_sums
-        return quickly and refines(problem) and not self.tolerance > 0
+        return problem.influence.cheap_sums and not self.tolerance > 0
 
     def _iterate(
         self,
