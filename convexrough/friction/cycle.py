@@ -31,8 +31,8 @@ from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import points_of, pressed_for
-from convexrough.friction.state import by_status, displacements_of, states_of, stick_radii
-from convexrough.friction.walk import Point, Walk, levels_needed
+from convexrough.friction.state import Point, by_status, displacements_of, states_of, stick_radii
+from convexrough.friction.walk import Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER

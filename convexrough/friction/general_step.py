@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from convexrough.errors import SolverError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
 from convexrough.friction.own_curves import OwnCurves, OwnStep
-from convexrough.friction.state import States, by_status
+from convexrough.friction.state import Point, States, by_status
 from convexrough.influence import couple
 from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
@@ -95,20 +96,19 @@ class Stepper:
         own, zero = np.maximum(level.indentations, 0.0), np.zeros(len(level.indentations))
         return Bundle(curve.load, level, OwnCurves.pressed(own, self.coefficients), own, zero, zero)
 
-    def along(
-        self, start: MemoryCurve, points: Sequence[tuple[Fraction, Fraction]], steps: int
-    ) -> list[Bundle]:
+    def along(self, start: MemoryCurve, points: Sequence[Point], steps: int) -> list[Bundle]:
         """The state at each point, with `steps` general steps per segment."""
-        now, found = self.start(start), list[Bundle]()
-        load, height = start.load, start.height
-        for target, shear in points:
+        now, found, segments = self.start(start), list[Bundle](), list[list[Point]]()
+        for (load, height), (target, shear) in pairwise([(start.load, start.height), *points]):
             grading = 1 if load else 3  # indentations grow as L^(2/3)
-            for k in range(steps):
-                part = Fraction(k + 1, steps) ** grading
-                now = self.step(
-                    now, load + part * (target - load), height + part * (shear - height)
-                )
-            load, height = target, shear
+            parts = [Fraction(k + 1, steps) ** grading for k in range(steps)]
+            segments.append(
+                [(load + x * (target - load), height + x * (shear - height)) for x in parts]
+            )
+        self.levels.prepare(load for each in segments for load, _ in each)
+        for segment in segments:
+            for load, height in segment:
+                now = self.step(now, load, height)
             found.append(now)
         return found
 
@@ -193,7 +193,7 @@ class SteppedPath(NamedTuple):
 def followed(
     levels: FrictionLevels,
     start: MemoryCurve,
-    points: Sequence[tuple[Fraction, Fraction]],
+    points: Sequence[Point],
     steps: int | None = None,
     stepper: type[Stepper] | None = None,
 ) -> SteppedPath:

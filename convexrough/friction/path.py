@@ -21,7 +21,8 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import Stepper
 from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.friction.order import Order
-from convexrough.friction.walk import Point, Walk
+from convexrough.friction.state import Point
+from convexrough.friction.walk import Walk
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table

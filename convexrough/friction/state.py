@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.normal.level import Level
+
+#: A point (P, T = Q / f) of a path, as exact fractions.
+Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +22,8 @@ from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import States, states_of, statuses_of, used_by
+from convexrough.friction.state import Point, States, states_of, statuses_of, used_by
 from convexrough.roundoff import SAFETY
-
-#: (P, T = Q / f) as exact fractions.
-Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, eq=False)

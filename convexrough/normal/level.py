@@ -312,7 +312,7 @@ class Levels:
         """The levels at positive loads (k,), solved together; None where `at` must solve one."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
-        if not able or found is None or found.box.fixed_open.any():
+        if not able or found is None:
             return [None] * len(loads)
         rows, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
         for start in range(0, len(loads), rows):
@@ -325,10 +325,14 @@ class Levels:
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The level in the box of `top`; a second attempt starts from the loads of `top`."""
-        state, found = self._sought(problem, None)
+        """The level in the box of `top`, sought from nothing; then from the loads of `top`.
+
+        If other solutions than that of `top` are possible, only the second is tried.
+        """
         top = self.top.solution
-        if isinstance(found, Obstacle) and top is not None:
+        local = top is not None and top.box.scope == "local"
+        state, found = self._sought(problem, top.trial.loads.high if top and local else None)
+        if isinstance(found, Obstacle) and top is not None and not local:
             with suppress(SolverError):
                 state, found = self._sought(problem, top.trial.loads.high)
         if isinstance(found, Obstacle):

@@ -167,6 +167,7 @@ def solved(
     found = Solved(state, box, good, *known)
     decided = known.loads.positive | known.indentation.positive | known.indentation.negative
     good &= np.isfinite(known.loads.radius).all(axis=1) & decided.all(axis=1)
+    good &= (known.indentation.negative | ~box.fixed_open).all(axis=1)
     good &= defect_of(state) <= 4.0 * rounding_of(state)
     return found
 
