@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -217,6 +218,17 @@ def read_table(
     )
 
 
+def matrix(path: Path, table: TextTable) -> Array:
+    """The numbers of a table without a header; `HOLES` are nan. Raises TableError."""
+    source, mistakes = _text_source(path, table), list[str]()
+    columns = [
+        _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
+    ]
+    if mistakes := [*mistakes, *source.mistakes]:
+        raise TableError(str(path), few(mistakes))
+    return np.column_stack(columns)
+
+
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
@@ -288,14 +300,14 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
 def _text_source(path: Path, table: TextTable) -> _Source:
     header = table.header.cells if table.header else None
     named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
-    width = len(header) if header else max(len(row.cells) for row in table.rows)
+    counts = [len(row.cells) for row in table.rows]
+    width = len(header) if header else Counter(counts).most_common(1)[0][0]
     mistakes, whole = [], []
     for row in table.rows:
         if what := row.wrong or _misfit(row.cells, width, header):
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
-    counts = [len(row.cells) for row in table.rows]
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
     if table.style.separator == "," and doubled and pointless:
@@ -392,9 +404,12 @@ def _numbers(
     name: str, cells: Sequence[Any], source: _Source, mistakes: list[str], holes: bool
 ) -> Array:
     """The numbers of a column; wrong cells are added to `mistakes`."""
+    if holes:
+        cells = ["nan" if str(cell).lower() in HOLES else cell for cell in cells]
     if (plain := source.numbers(cells)) is not None:
         sizes = np.abs(plain)
         fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
+        fine |= np.isnan(plain) & holes
         if (fine & (plain > 0) if name in POSITIVE else fine).all():
             return plain
     if not any(map(str, cells)):
@@ -405,8 +420,7 @@ def _numbers(
     numbers = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
         number = source.number(cell)
-        unknown = str(cell).lower() in HOLES or (number is not None and math.isnan(number))
-        if holes and unknown:
+        if holes and (cell == "nan" or (number is not None and math.isnan(number))):
             continue
         place = f"{source.rows[i]}, column {name}"
         try:
