@@ -11,11 +11,8 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.tabular.table import Reading, matrix, read_table
+from convexrough.tabular.table import COLUMNS, Reading, matrix, read_table
 from convexrough.tabular.text import COMMENT, TextTable, read_text_table
-
-#: Other names of the column of heights.
-HEIGHTS = ("z", "h")
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
@@ -47,7 +44,7 @@ def read_grid(path: Path) -> HeightGrid:
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
     """
-    table = read_text_table(path, ("x", "y", "height", *HEIGHTS), _COMMENT)
+    table = read_text_table(path, ("x", "y", "height", *COLUMNS["height"].also), _COMMENT)
     width = len(table.rows[0].cells) if table.rows else 0
     if table.header is None and width != 3:
         heights = matrix(path, table)
@@ -105,7 +102,7 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 def _from_list(path: Path, cells: TextTable) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes."""
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
-                       also={"height": HEIGHTS}, holes=("height",),
+                       holes=("height",),
                        how=Reading(alike=False), table=cells)  # fmt: skip
     x, y, z = (table.columns[name] for name in ("x", "y", "height"))
     units = [table.units.get(name, "") for name in ("x", "y", "height")]
