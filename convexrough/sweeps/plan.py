@@ -89,7 +89,7 @@ def planned(
     for number in range(tried):
         try:
             asked = ask(number)
-            contact, stages = asked.pressed(), asked.stages
+            contact, stages = asked.press(), asked.stages
             columns = chosen(contact, stages, measures)
             break
         except FAILURES as error:
