@@ -61,12 +61,8 @@ def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> d
         cycle = _cycle(each, columns)
         usual = each.solver.name == "newton" and each.influence in (None, "dense")
         if usual and not (cycle and each.scene.friction is None):
-            key = (
-                len(each.scene),
-                each.load is not None,
-                len(cycle.maximum_fraction) if cycle else 0,
-            )
-            groups.setdefault(key, []).append(number)
+            ends = len(cycle.maximum_fraction) if cycle else 0
+            groups.setdefault((len(each.scene), each.load is not None, ends), []).append(number)
     found: dict[int, Measured] = {}
     for (_, by_load, _), numbers in groups.items():
         some = [asked[number] for number in numbers]
