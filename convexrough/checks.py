@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sized
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,39 +18,34 @@ SMALLEST, LARGEST = 1e-60, 1e60
 #: What an error message expects instead of a number outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
-#: What an error message expects as a coefficient of variation.
-VARIATION = "a standard deviation over the mean, from 0 to 1: not in per cent"
 
-#: What an error message expects as a phase; pi may be rounded up.
-PHASE = "a phase in radians, from -pi to pi; 90 degrees are 1.5708"
+class Kind(NamedTuple):
+    """A kind of number: what an error message expects, and a condition on finite numbers."""
 
+    expected: str
+    holds: Callable[[float], bool]
 
-def finite(what: str, value: float | None) -> float:
-    return _checked(what, value, "a finite number", lambda number: True)
-
-
-def positive(what: str, value: float | None) -> float:
-    return _checked(what, value, "a positive number", lambda number: number > 0)
-
-
-def non_negative(what: str, value: float | None) -> float:
-    return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
+    def __call__(self, what: str, value: float | None) -> float:
+        """The value as a float; raises InputError unless it is of this kind and size."""
+        number = _number(what, value, self.expected)
+        if not (math.isfinite(number) and self.holds(number)):
+            raise InputError(what, found=number, expected=self.expected)
+        if not is_sized(number):
+            raise InputError(what, found=number, expected=SIZED)
+        return number
 
 
-def variation(what: str, value: float | None) -> float:
-    return _checked(what, value, VARIATION, is_variation)
-
-
-def is_variation(number: float) -> bool:
-    return 0 <= number <= 1
-
-
-def phase(what: str, value: float | None) -> float:
-    return _checked(what, value, PHASE, is_phase)
-
-
-def is_phase(number: float) -> bool:
-    return abs(number) < 3.15
+finite = Kind("a finite number", math.isfinite)
+positive = Kind("a positive number", lambda number: number > 0)
+non_negative = Kind("a number that is not negative", lambda number: number >= 0)
+variation = Kind(
+    "a standard deviation over the mean, from 0 to 1: not in per cent",
+    lambda number: 0 <= number <= 1,
+)
+#: pi may be rounded up.
+phase = Kind(
+    "a phase in radians, from -pi to pi; 90 degrees are 1.5708", lambda number: abs(number) < 3.15
+)
 
 
 def is_sized(number: float) -> bool:
@@ -201,17 +197,6 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     if near := difflib.get_close_matches(name.lower(), names, n=1):
         return f'did you mean "{names[near[0]]}"?'
     return f"valid: {', '.join(names.values())}"
-
-
-def _checked(
-    what: str, value: float | None, expected: str, holds: Callable[[float], bool]
-) -> float:
-    number = _number(what, value, expected)
-    if not (math.isfinite(number) and holds(number)):
-        raise InputError(what, found=number, expected=expected)
-    if not is_sized(number):
-        raise InputError(what, found=number, expected=SIZED)
-    return number
 
 
 def _number(what: str, value: float | None, expected: str) -> float:

@@ -13,7 +13,6 @@ from convexrough.cli.speech import (
     SOLVER_FAILED,
     echo,
     progress,
-    say_aside,
 )
 from convexrough.errors import FileError, blamed_on
 
@@ -65,9 +64,8 @@ def compare(
     if log is not None:
         write_rows(log, report.steps(comparison))
     summary = report.comparison_summary(comparison, within)
-    echo(summary, report.describe_comparison(summary, file.scene.units), as_json)
-    for warning in report.comparison_warnings(summary):
-        say_aside("warning", warning)
+    lines = report.describe_comparison(summary, file.scene.units)
+    echo(summary, lines, as_json, report.comparison_warnings(summary))
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:
         return SOLVER_FAILED

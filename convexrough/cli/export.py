@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from convexrough.cli.options import PATH, force_option, json_option, out_option
-from convexrough.cli.speech import DONE, echo, progress, say_aside, written
+from convexrough.cli.speech import DONE, echo, progress, written
 from convexrough.errors import blamed_on
 
 
@@ -57,7 +57,6 @@ def export(
         f"{about['objective']:.12g}"
         for name, about in index["programs"].items()
     ]
-    echo(index, [*lines, *written(folder, files)], as_json)
-    for name, reason in index["left_out"].items():
-        say_aside("warning", f"{name}: left out: {reason}")
+    left_out = (f"{name}: left out: {reason}" for name, reason in index["left_out"].items())
+    echo(index, [*lines, *written(folder, files)], as_json, left_out)
     return DONE

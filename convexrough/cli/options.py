@@ -42,17 +42,15 @@ def _from_here(given: tuple[Any, ...]) -> Any:
     return given[-1]
 
 
-def figure_options(command: Command) -> Command:
-    """Add the options for figures: `formats`, a tuple, and `dpi`."""
-    for option in (
-        click.option("--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
-                     help="Pixels per inch of figures."),
-        click.option("--formats", metavar="LIST", default="png", show_default=True,
-                     callback=lambda *given: _formats(given[-1]),
-                     help="Formats of figures: png, svg, pdf."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
+def _together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """A decorator that adds several options; the help shows them in this order."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
 
 
 def _formats(given: str) -> tuple[str, ...]:
@@ -62,13 +60,18 @@ def _formats(given: str) -> tuple[str, ...]:
     return formats
 
 
-def output_options(command: Command) -> Command:
-    """Add the options of every command that writes a folder of results."""
-    for option in (
-        json_option,
-        force_option,
-        click.option("--no-figures", is_flag=True, help="Do not write figures."),
-        out_option,
-    ):
-        command = option(command)
-    return command
+#: The options for figures: `formats`, a tuple, and `dpi`.
+figure_options = _together(
+    click.option("--formats", metavar="LIST", default="png", show_default=True,
+                 callback=lambda *given: _formats(given[-1]),
+                 help="Formats of figures: png, svg, pdf."),
+    click.option("--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
+                 help="Pixels per inch of figures."),
+)  # fmt: skip
+#: The options of every command that writes a folder of results.
+output_options = _together(
+    out_option,
+    click.option("--no-figures", is_flag=True, help="Do not write figures."),
+    force_option,
+    json_option,
+)

@@ -31,17 +31,20 @@ def say(
     from convexrough.run.summary import describe, summarise, warnings
 
     results = list(results)
-    echo(summarise(results) | (more or {}), [*describe(results), *lines], as_json)
-    for warning in warnings(results):
-        say_aside("warning", warning)
+    summary = summarise(results) | (more or {})
+    echo(summary, [*describe(results), *lines], as_json, warnings(results))
     return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
 
-def echo(summary: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
-    """Print the summary as a JSON object, or the lines."""
+def echo(
+    summary: dict[str, Any], lines: Iterable[str], as_json: bool, warnings: Iterable[str] = ()
+) -> None:
+    """Print the summary as a JSON object, or the lines; print warnings on standard error."""
     from convexrough.run.summary import to_json
 
     click.echo(to_json(summary) if as_json else "\n".join(lines))
+    for warning in warnings:
+        say_aside("warning", warning)
 
 
 def say_aside(*parts: str) -> None:

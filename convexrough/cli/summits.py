@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from convexrough.cli.options import PATH, Command, figure_options, json_option
+from convexrough.cli.options import PATH, figure_options, json_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
@@ -28,48 +28,90 @@ if TYPE_CHECKING:
     from convexrough.surface.report import Scanned
 
 
-def map_options(command: Command) -> Command:
-    """Add the options for reading the file of a map."""
-    for option in (
-        click.option("--fill", is_flag=True, help="Fill holes in the map and report them."),
-        click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
-                     default="plane", show_default=True,
-                     help="Form to remove before finding summits."),
-        click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different."),
-        click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ..."),
-        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file states none."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
+class Pressing(NamedTuple):
+    """How to press: as a scene file says, or a sphere of this radius; all None not to press."""
+
+    scene: Path | None
+    radius: float | None
+    approach: float | None
+    load: float | None
+    modulus: float | None
+
+    def check(self) -> None:
+        """Raise UsageError for options that do not go together."""
+        scene, radius, approach, load, modulus = self
+        others = any(each is not None for each in self[1:])
+        if scene is not None and others:
+            raise click.UsageError("--scene says how to press: omit --radius and similar options.")
+        if scene is None and others:
+            if radius is None or (approach is None) == (load is None):
+                raise click.UsageError("--radius needs exactly one of --approach and --load.")
+            if (load is None) != (modulus is None):
+                raise click.UsageError("--load and --modulus go together.")
+
+    def of(
+        self, surface: Surface, summits: Callable[[Surface], Asperities]
+    ) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
+        """The surface in the scene's unit, and a function that presses; None without a sphere."""
+        if self.scene is not None:
+            return _as_in_scene(self.scene, surface, summits)
+        if self.radius is None:
+            return surface, None
+        from convexrough.contact import press
+        from convexrough.scene.material import Material
+        from convexrough.scene.scene import Scene
+
+        # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
+        stuff = Material(1.0 if self.modulus is None else self.modulus, 0.3)
+        base = partial(Scene, self.radius, material=stuff, geometry="closest")
+        pressed = partial(press, approach=self.approach, load=self.load)
+        return surface, lambda it: pressed(base(asperities=it))
 
 
-def press_options(command: Command) -> Command:
-    """Add the options for pressing the summits."""
-    for option in (
-        click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load."),
-        click.option("--load", metavar="P", type=float, help="Prescribed load."),
-        click.option(
-            "--approach",
-            metavar="D",
-            type=float,
-            help="Prescribed approach, in the unit of the map.",
-        ),
-        click.option(
-            "--radius",
-            metavar="R",
-            type=float,
-            help="Radius of the sphere in the unit of the map, without --scene.",
-        ),
-        click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file."),
-    ):
-        command = option(command)
-    return command
+def _as_in_scene(
+    scene: Path, surface: Surface, summits: Callable[[Surface], Asperities]
+) -> tuple[Surface, Callable[[Asperities], Contact]]:
+    from convexrough.run.scene_file import read_scene, read_units
+
+    unit = read_units(scene).length
+    if unit and not surface.unit:
+        raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
+    if surface.unit and not unit:
+        expected = f"[units] length in {scene}, as the map is in {surface.unit}"
+        raise InputError("unit", found="none of the scene", expected=expected)
+    surface = surface.to_unit(unit) if unit != surface.unit else surface
+    file = read_scene(scene, asperities=summits(surface))
+    return surface, lambda it: replace(file, scene=replace(file.scene, asperities=it)).press()
+
+
+def _pixel(given: str | None) -> float | tuple[float, ...] | None:
+    if given is None:
+        return None
+    try:
+        sides = tuple(float(each) for each in given.split(","))
+    except ValueError as error:
+        expected = "a number, or two with a comma"
+        raise InputError("--pixel", found=repr(given), expected=expected) from error
+    return sides[0] if len(sides) == 1 else sides
 
 
 @click.command()
 @click.argument("surface", type=PATH)
-@press_options
-@map_options
+@click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file.")
+@click.option("--radius", metavar="R", type=float,
+              help="Radius of the sphere in the unit of the map, without --scene.")  # fmt: skip
+@click.option("--approach", metavar="D", type=float,
+              help="Prescribed approach, in the unit of the map.")  # fmt: skip
+@click.option("--load", metavar="P", type=float, help="Prescribed load.")
+@click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load.")
+@click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
+              help="Size of a pixel, if the file states none.")  # fmt: skip
+@click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ...")
+@click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different.")
+@click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
+              default="plane", show_default=True,
+              help="Form to remove before finding summits.")  # fmt: skip
+@click.option("--fill", is_flag=True, help="Fill holes in the map and report them.")
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
@@ -87,6 +129,7 @@ def summits(
     out: Path,
     prune: float,
     fit: int,
+    detrend: Any,
     whole: bool,
     no_figures: bool,
     force: bool,
@@ -105,24 +148,22 @@ def summits(
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
-    from convexrough.surface import report
+    from convexrough.surface import read, report
 
-    how = {name: options.pop(name) for name in ("scene", "radius", "approach", "load", "modulus")}
-    _check_pressing(**how)
-    if whole and how["scene"] is None and how["radius"] is None:
+    how = Pressing(**{name: options.pop(name) for name in Pressing._fields})
+    how.check()
+    if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
     _claim(out, force)
     with progress(f"reading {surface}"):
-        scan = _read(surface, **options)
+        scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
         with blamed_on(surface):
-            scan, press = _pressing(scan, lambda it: it.summits(prune, fit), **how)
+            scan, press = how.of(scan, lambda it: it.summits(prune, fit))
             scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
     with progress("writing"):
         files = _written(out, scanned, figures=not no_figures, formats=formats, dpi=dpi)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
-    echo(report.surface_summary(scanned), lines, as_json)
-    for message in report.warnings_about(scanned):
-        say_aside("warning", message)
+    echo(report.surface_summary(scanned), lines, as_json, report.warnings_about(scanned))
     if scanned.curve is None:
         say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
     return DONE if scanned.certified else NOT_CERTIFIED
@@ -156,70 +197,3 @@ def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> li
         named = {f"{path.stem}-{stem}": figure for stem, figure in pictures.items()}
         files += write_figures(path.parent, named, **saved)
     return files
-
-
-def _check_pressing(
-    scene: Path | None,
-    radius: float | None,
-    approach: float | None,
-    load: float | None,
-    modulus: float | None,
-) -> None:
-    others = (radius, approach, load, modulus)
-    if scene is not None and any(each is not None for each in others):
-        raise click.UsageError("--scene says how to press: omit --radius and similar options.")
-    if scene is None and any(each is not None for each in others):
-        if radius is None or (approach is None) == (load is None):
-            raise click.UsageError("--radius needs exactly one of --approach and --load.")
-        if (load is None) != (modulus is None):
-            raise click.UsageError("--load and --modulus go together.")
-
-
-def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Surface:
-    from convexrough.surface import read
-
-    size: Any = None
-    if pixel is not None:
-        try:
-            sides = [float(each) for each in pixel.split(",")]
-        except ValueError as error:
-            expected = "a number, or two with a comma"
-            raise InputError("--pixel", found=repr(pixel), expected=expected) from error
-        size = sides[0] if len(sides) == 1 else tuple(sides)
-    trend: Any = None if detrend == "none" else detrend
-    return read(path, pixel=size, detrend=trend, **options)
-
-
-def _pressing(
-    surface: Surface,
-    summits: Callable[[Surface], Asperities],
-    *,
-    scene: Path | None,
-    radius: float | None,
-    approach: float | None,
-    load: float | None,
-    modulus: float | None,
-) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
-    """The surface in the scene's unit, and a function that presses, or None without a sphere."""
-    if scene is not None:
-        from convexrough.run.scene_file import read_scene, read_units
-
-        unit = read_units(scene).length
-        if unit and not surface.unit:
-            raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
-        if surface.unit and not unit:
-            expected = f"[units] length in {scene}, as the map is in {surface.unit}"
-            raise InputError("unit", found="none of the scene", expected=expected)
-        surface = surface.to_unit(unit) if unit != surface.unit else surface
-        file = read_scene(scene, asperities=summits(surface))
-        return surface, lambda it: replace(file, scene=replace(file.scene, asperities=it)).press()
-    if radius is None:
-        return surface, None
-    from convexrough.contact import press
-    from convexrough.scene.material import Material
-    from convexrough.scene.scene import Scene
-
-    # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
-    stuff = Material(1.0 if modulus is None else modulus, 0.3)
-    base = partial(Scene, radius, material=stuff, geometry="closest")
-    return surface, lambda it: press(base(asperities=it), approach=approach, load=load)

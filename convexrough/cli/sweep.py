@@ -101,9 +101,7 @@ def sweep(
         say_aside("error", str(error), progress_kept(folder, plan))
         return SOLVER_FAILED
     said = summarise(done.table, done)
-    echo(said, describe(said), as_json)
-    for line in (*failures(done.table), *cautions(done.table)):
-        say_aside("warning", line)
+    echo(said, describe(said), as_json, (*failures(done.table), *cautions(done.table)))
     return _status(said)
 
 

@@ -13,7 +13,6 @@ import click
 from convexrough.atomic import write_text
 from convexrough.cli.options import (
     PATH,
-    Command,
     force_option,
     json_option,
     out_option,
@@ -37,41 +36,9 @@ if TYPE_CHECKING:
     from convexrough.verdict.report import Verified
 
 
-def claim_options(command: Command) -> Command:
-    """Add the options of `verify`: what is checked, and how files are read."""
-    called = "Header or number (from 1) of the column with load, x, y, ..."
-    for option in (
-        click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
-        force_option,
-        out_option,
-        click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
-        click.option("--shear-force", metavar="Q", type=float, help="Prescribed total of FORCES."),
-        click.option("--shear", metavar="FORCES", type=PATH,
-                     help="Also check the shear forces in this file."),
-        click.option("--nodes", is_flag=True,
-                     help="Rows are nodes; sum their forces at the nearest asperity."),
-        click.option("--missing-open", is_flag=True,
-                     help="Asperities without a row in the file are open."),
-        click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
-                     help="-1 if compression is negative in the file."),
-        click.option("--scale", metavar="NAME=FACTOR", multiple=True,
-                     help="Multiply the numbers of a column."),
-        click.option("--column", metavar="NAME=COLUMN", multiple=True, help=called),
-        click.option("--tolerance", metavar="X", type=float,
-                     help="Largest distance of a position from its asperity; "
-                          "default 1 % of the smallest spacing."),
-        click.option("--floor", metavar="X", type=float, default=0.0,
-                     help="Treat loads up to X as zero, so that their asperities are open."),
-        click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-                     help="Largest error allowed, as a fraction of the largest load."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
     from convexrough.checks import finite
-    from convexrough.tabular.table import KINDS, named_columns
+    from convexrough.tabular.table import named_columns
     from convexrough.verdict.claims import Manner
 
     names = ("load", "pressure", "area", "x", "y", "force", "status")
@@ -82,20 +49,40 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
             factors[name] = finite("--scale", float(factor))
         except ValueError as error:
             raise InputError("--scale", found=each, expected="NAME=FACTOR, a number") from error
-        if name not in names or name not in KINDS or not factors[name]:
+        if name not in names[:-1] or not factors[name]:
             expected = f"NAME=FACTOR, not 0, where NAME is one of {', '.join(names[:-1])}"
             raise InputError("--scale", found=each, expected=expected)
-    columns: dict[str, str] = {}
-    for each in column:
-        name, _, called = each.partition("=")
-        columns |= named_columns("--column", {name: called}, names)
+    pairs = dict(each.partition("=")[::2] for each in column)
+    columns = named_columns("--column", pairs, names)
     return Manner(columns=columns, scales=factors, sign=int(sign), **options)
 
 
 @click.command()
 @click.argument("scene", type=PATH)
 @click.argument("loads", type=PATH)
-@claim_options
+@click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
+              help="Largest error allowed, as a fraction of the largest load.")  # fmt: skip
+@click.option("--floor", metavar="X", type=float, default=0.0,
+              help="Treat loads up to X as zero, so that their asperities are open.")  # fmt: skip
+@click.option("--tolerance", metavar="X", type=float,
+              help="Largest distance of a position from its asperity; default 1 % of the smallest "
+              "spacing.")  # fmt: skip
+@click.option("--column", metavar="NAME=COLUMN", multiple=True,
+              help="Header or number (from 1) of the column with load, x, y, ...")  # fmt: skip
+@click.option("--scale", metavar="NAME=FACTOR", multiple=True,
+              help="Multiply the numbers of a column.")  # fmt: skip
+@click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
+              help="-1 if compression is negative in the file.")  # fmt: skip
+@click.option("--missing-open", is_flag=True, help="Asperities without a row in the file are open.")
+@click.option("--nodes", is_flag=True,
+              help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
+@click.option("--shear", metavar="FORCES", type=PATH,
+              help="Also check the shear forces in this file.")  # fmt: skip
+@click.option("--shear-force", metavar="Q", type=float, help="Prescribed total of FORCES.")
+@click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
+@out_option
+@force_option
+@click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML.")
 @proof_option
 @json_option
 def verify(
@@ -176,9 +163,7 @@ def verify(
     lines = report.describe_verdict(found)
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
-    echo(summary, lines, as_json)
-    for caution in cautions_about(file.scene, found.verdict.loads):
-        say_aside("warning", caution)
+    echo(summary, lines, as_json, cautions_about(file.scene, found.verdict.loads))
     for claim in found.claims:
         for hint in claim.hints():
             say_aside("hint", hint)
@@ -218,13 +203,11 @@ def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Pat
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
+    import numpy as np
+
     from convexrough.proof import prove
 
-    verdict = found.verdict
-    claimed = [
-        load if touches else 0.0
-        for load, touches in zip(verdict.loads, verdict.claimed, strict=True)
-    ]
+    claimed = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
         return prove(file.scene, claimed, **control)

@@ -24,7 +24,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from convexrough.checks import PHASE, SIZED, VARIATION, is_phase, is_sized, is_variation, nearest
+from convexrough import checks
+from convexrough.checks import SIZED, is_sized, nearest
 
 #: Keys that a user may have written, and the keys to suggest.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
@@ -56,16 +57,14 @@ NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else 
 
 _SIZED = expected(SIZED, is_sized)
 
-Finite = Annotated[float, expected("a finite number"), _SIZED]
-Positive = Annotated[float, expected("a positive number", lambda value: value > 0), _SIZED]
-NonNegative = Annotated[
-    float, expected("a number that is not negative", lambda value: value >= 0), _SIZED
-]
+Finite = Annotated[float, expected(*checks.finite), _SIZED]
+Positive = Annotated[float, expected(*checks.positive), _SIZED]
+NonNegative = Annotated[float, expected(*checks.non_negative), _SIZED]
 Ratio = Annotated[float, expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
-Variation = Annotated[float, expected(VARIATION, is_variation)]
+Variation = Annotated[float, expected(*checks.variation)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
-Phase = Annotated[float, expected(PHASE, is_phase)]
+Phase = Annotated[float, expected(*checks.phase)]
 #: Where the file has a number, a list of this number.
 ALSO_ONE = BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool), ALSO_ONE]

@@ -11,23 +11,15 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.tabular.table import HOLES, Reading, read_table
-from convexrough.tabular.text import (
-    SAMPLE,
-    STYLES,
-    WORKBOOKS,
-    Style,
-    lines_of,
-    sheet_lines,
-    sniff,
-    stripped,
-)
+from convexrough.tabular.table import Reading, read_table
+from convexrough.tabular.text import COMMENT, HOLES, TextTable, read_text_table
 
 #: Other names of the column of heights.
 HEIGHTS = ("z", "h")
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
+_COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 #: Largest accepted distance of a coordinate from the grid, in pixels.
@@ -55,63 +47,30 @@ def read_grid(path: Path) -> HeightGrid:
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
     """
-    comments: list[str] = []
-    body: list[tuple[int, str]] = []
-    workbook = path.suffix.lower() in WORKBOOKS
-    names = ("x", "y", "height", *HEIGHTS)
-    for number, line in sheet_lines(path, names)[1] if workbook else lines_of(path):
-        text = line.strip()
-        if text.startswith(("#", "%")) or (not body and _SAID.fullmatch(text)):
-            comments.append(text)
-        elif text:
-            body.append((number, line.rstrip("\r\n")))
-            if len(body) == SAMPLE and _style(body) is None:
-                break
-    style = _style(body)
-    if style is None:
-        _refuse_titles(path, body)
-        return _from_list(path)
-    return _said(comments, _numbers(path, body, style))
-
-
-def _refuse_titles(path: Path, body: Sequence[tuple[int, str]]) -> None:
-    """Raise InputError for a line of text above a matrix with another number of cells."""
-    if _style(body[1:]) is None:
-        return
-    style = sniff([line for _, line in body[1:SAMPLE]], STYLES)
-    count, cells = (len(stripped(style.split(body[k][1]))) for k in (1, 0))
-    if count > 3 > cells:
+    table = read_text_table(path, ("x", "y", "height", *HEIGHTS), _COMMENT)
+    width = len(table.rows[0].cells) if table.rows else 0
+    if table.header is None and width != 3:
+        return _said(table.comments, _numbers(path, table))
+    if table.header and len(table.header.cells) < 3 < width:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
-        where = f"{path}: row {body[0][0]}"
-        raise InputError("text", found=repr(body[0][1][:60]), expected=expected, where=where)
+        where = f"{path}: row {table.header.number}"
+        found = repr(table.header.text[:60])
+        raise InputError("text", found=found, expected=expected, where=where)
+    return _from_list(path, table)
 
 
-def _style(body: Sequence[tuple[int, str]]) -> Style | None:
-    """The number format of a matrix, from its first lines; None if they are those of a list."""
-    if not body:
-        return None
-    style = sniff([line for _, line in body[:SAMPLE]], STYLES)
-    first = stripped(style.split(body[0][1]))
-    heads = any(cell.lower() not in HOLES and style.number(cell) is None for cell in first)
-    return None if heads or len(first) == 3 else style
-
-
-def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    """The numbers in all lines; empty cells, and texts such as BAD, are holes."""
+def _numbers(path: Path, table: TextTable) -> Array:
+    """The numbers in all rows; empty cells, and texts such as BAD, are holes."""
     rows: list[Array] = []
-    for number, line in body:
-        cells = ["nan" if it.lower() in HOLES else it for it in stripped(style.split(line))]
-        if (values := style.numbers(cells)) is None:
-            found = [style.number(cell) for cell in cells]
-            if None in found:
-                column = found.index(None)
-                where = f"{path}: row {number}, column {column + 1}"
-                shown = repr(cells[column])[:60]
-                raise InputError("height", found=shown, expected="a number", where=where)
-            values = np.array(found, dtype=np.float64)
+    for row in table.rows:
+        where = f"{path}: row {row.number}"
+        cells = ["nan" if cell.lower() in HOLES else cell for cell in row.cells]
+        if (values := table.style.numbers(cells)) is None:
+            column = [table.style.number(cell) for cell in cells].index(None)
+            shown, where = repr(cells[column])[:60], f"{where}, column {column + 1}"
+            raise InputError("height", found=shown, expected="a number", where=where)
         if rows and len(values) != len(rows[0]):
             expected = f"{len(rows[0])}, as in the first row"
-            where = f"{path}: row {number}"
             raise InputError("cells", found=len(values), expected=expected, where=where)
         rows.append(values)
     heights = np.array(rows)
@@ -160,11 +119,11 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
     return HeightGrid(heights, (across / columns, upwards / rows), unit_x, value_unit)
 
 
-def _from_list(path: Path) -> HeightGrid:
+def _from_list(path: Path, cells: TextTable) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes."""
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
                        also={"height": HEIGHTS}, holes=("height",),
-                       how=Reading(alike=False))  # fmt: skip
+                       how=Reading(alike=False), table=cells)  # fmt: skip
     x, y, z = (table.columns[name] for name in ("x", "y", "height"))
     units = [table.units.get(name, "") for name in ("x", "y", "height")]
     if units[0] != units[1]:

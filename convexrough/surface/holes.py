@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to neighbours along a side, so each pair is found once.
-SIDES = ((0, 1), (1, 0))
+#: Steps (row, column) from a pixel to its neighbours along the sides.
+SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
+
+#: In a map of numbers of holes: a pixel with a height, and a place outside of the map.
+KNOWN, OUTSIDE = -1, -2
 
 #: Least distance of a spike from the median, over the standard deviation that quartiles suggest.
 OUTLYING = 6.0
@@ -68,24 +71,15 @@ def filled(heights: Array) -> Array:
     No filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
-    number = np.full(heights.shape, -1)
-    number[holes] = np.arange(np.count_nonzero(holes))
-    known = np.where(holes, 0.0, heights)
-    neighbours, sums = np.zeros(heights.shape), np.zeros(heights.shape)
-    rows, columns = [], []
-    for down, right in SIDES:
-        ahead = np.s_[down:, right:]
-        behind = np.s_[: heights.shape[0] - down, : heights.shape[1] - right]
-        for here, there in ((ahead, behind), (behind, ahead)):
-            neighbours[here] += 1
-            sums[here] += known[there]
-            both = holes[here] & holes[there]
-            rows.append(number[here][both])
-            columns.append(number[there][both])
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    place = np.arange(np.count_nonzero(holes))
-    values = np.concatenate((neighbours[holes], -np.ones(len(row))))
-    where = (np.concatenate((place, row)), np.concatenate((place, column)))
+    count = np.count_nonzero(holes)
+    number = np.full(heights.shape, KNOWN)
+    number[holes] = np.arange(count)
+    around = (np.argwhere(holes)[:, None] + 1 + SIDES).T  # in the padded maps
+    neighbours = np.pad(number, 1, constant_values=OUTSIDE)[*around].T
+    sums = np.pad(np.where(holes, 0.0, heights), 1)[*around].sum(axis=0)
+    row, side = np.nonzero(neighbours >= 0)
+    between = coo_array((np.ones(len(row)), (row, neighbours[row, side])), shape=(count, count))
+    own = diags_array((neighbours != OUTSIDE).sum(axis=1, dtype=np.float64))
     mended = heights.copy()
-    mended[holes] = spsolve(coo_array((values, where)).tocsc(), sums[holes])
+    mended[holes] = spsolve((own - between).tocsc(), sums)
     return mended

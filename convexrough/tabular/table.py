@@ -17,7 +17,7 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import WORKBOOKS, bare, read_text_table, unit
+from convexrough.tabular.text import HOLES, WORKBOOKS, TextTable, bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
 #: The quantity that each column measures.
@@ -46,9 +46,6 @@ INDEX = (
     "asperity",
     "",
 )
-
-#: Cells that mean an unknown number, in lower case.
-HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
 #: First words of rows below a table that are not part of it, in lower case.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
@@ -107,9 +104,8 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the other columns by header; text where some cell is no number
+    others  : the other columns by header, also by an empty one; text where a cell is no number
     factors : factors other than 1 by which columns were multiplied
-    indices : columns of whole numbers with a name in `INDEX`
     """
 
     columns: dict[str, NDArray[Any]]
@@ -120,7 +116,6 @@ class ReadTable(NamedTuple):
     called: dict[str, str]
     others: dict[str, NDArray[Any]]
     factors: dict[str, float]
-    indices: dict[str, NDArray[np.intp]]
 
     def mistake(self, row: int, what: str) -> str:
         """The message of a mistake in a row, with the line."""
@@ -151,6 +146,7 @@ def read_table(
     holes: Sequence[str] = (),
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
+    table: TextTable | None = None,
 ) -> ReadTable:
     """Columns of a file by known names. The numbers of other columns are not checked.
 
@@ -158,12 +154,14 @@ def read_table(
     instead : columns that replace a required one if the file has the first of them
     also  : other names of columns;  holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
+    table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
     wanted = (*required, *optional, *text, *(each for names in instead.values() for each in names))
+    known = [*wanted, *INDEX[:-1], *(each.lower() for each in how.columns.values())]
     with reading(path):
-        source = _source(path, [*wanted, *INDEX[:-1], *(c.lower() for c in how.columns.values())])
+        source = _source(path, known) if table is None else _text_source(path, table)
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
@@ -214,11 +212,9 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        {names[i]: _numbers_or_text(source, i) for i in rest if names[i]},
+        {names[i]: _numbers_or_text(source, i) for i in rest} if source.header else {},
         factors,
-        {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
-         if (whole := _whole(source, i)) is not None},
-    )  # fmt: skip
+    )
 
 
 def _factors(
@@ -272,14 +268,6 @@ def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     return np.array([str(cell) for cell in cells]) if numbers is None else numbers
 
 
-def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
-    """The column if all its cells are whole numbers >= 0, else None."""
-    values = [source.number(cell) for cell in source.columns[place]]
-    if all(value is not None and value >= 0 and value == value // 1 < 2**53 for value in values):
-        return np.array(values).astype(np.intp)
-    return None
-
-
 def _source(path: Path, known: Sequence[str]) -> _Source:
     if path.suffix.lower() in ARRAYS:
         arrays = read_arrays(path, known)
@@ -294,12 +282,16 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             numbers=_as_numbers,
             mistakes=[],
         )
-    table = read_text_table(path, known)
+    return _text_source(path, read_text_table(path, known))
+
+
+def _text_source(path: Path, table: TextTable) -> _Source:
+    header = table.header.cells if table.header else None
     named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
-    width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
+    width = len(header) if header else max(len(row.cells) for row in table.rows)
     mistakes, whole = [], []
     for row in table.rows:
-        if what := row.wrong or _misfit(row.cells, width, table.header):
+        if what := row.wrong or _misfit(row.cells, width, header):
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
@@ -310,7 +302,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
         found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
-        header=table.header,
+        header=header,
         columns=[[row.cells[i] for row in whole] for i in range(width)],
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],

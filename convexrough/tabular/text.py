@@ -11,6 +11,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
@@ -34,6 +35,12 @@ WORKBOOKS = (".xlsx", ".xlsm")
 
 #: Number of lines that decide on separator and decimal mark.
 SAMPLE = 200
+
+#: Cells that mean an unknown number, in lower case.
+HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
+
+#: The beginning of a line that is a comment.
+COMMENT = re.compile("[#%]")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 _SURROGATE = re.compile("[\udc80-\udcff]")
@@ -90,14 +97,13 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[str]) -> Array | None:
-        """The numbers in cells, converted at once if all are plain numbers; else None."""
+        """The numbers in cells, converted at once if all are plain; None if some are no numbers."""
         joined = "\n".join(cells)
-        if "_" in joined or (self.decimal == "," and "." in joined):
-            return None
-        try:
-            return np.array(joined.replace(self.decimal, ".").split("\n"), dtype=np.float64)
-        except ValueError:
-            return None
+        if "_" not in joined and (self.decimal == "." or "." not in joined):
+            with suppress(ValueError):
+                return np.array(joined.replace(self.decimal, ".").split("\n"), dtype=np.float64)
+        found = [self.number(cell) for cell in cells]
+        return None if None in found else np.array(found, dtype=np.float64)
 
 
 #: Styles in order of preference, for files that allow several.
@@ -120,11 +126,12 @@ class TextRow(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """The header of a file, or None, and the rows below it."""
+    """The header of a file with its names as cells, or None, the rows below it, and comments."""
 
-    header: list[str] | None
+    header: TextRow | None
     rows: list[TextRow]
     style: Style
+    comments: list[str]
 
 
 def bare(name: str) -> str:
@@ -143,49 +150,54 @@ def _with_unit(name: str) -> re.Match[str] | None:
     return _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
 
 
-def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
+def read_text_table(
+    path: Path, known: Sequence[str] = (), comment: re.Pattern[str] = COMMENT
+) -> TextTable:
     """The cells of a text file or workbook. Raises FileError if it is empty or of another kind.
 
     known : names of columns that distinguish the header from titles and comments
     """
     lines: list[tuple[int, str]] = []
-    comment, separator, sheet = "", "", ""
-    numbered = lines_of(path)
+    comments: list[str] = []
+    title, separator, sheet = "", "", ""
+    numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
-        separator, (sheet, numbered) = "\t", sheet_lines(path, known)
+        separator, (sheet, numbered) = "\t", _sheet_lines(path, known)
     for number, line in numbered:
         text = line.strip("\r\n")
         inner = text.strip()
         if not lines and not separator and re.fullmatch(r"sep=.", inner):  # written by Excel
             separator = inner[-1]
-        elif inner.startswith(("#", "%")):
-            comment = comment if lines else inner.lstrip("#%")
+        elif comment.match(inner):
+            comments.append(inner)
+            title = title if lines else inner.lstrip("#%")
         elif inner and not _RULE.fullmatch(inner):
             text = text if '"' in text else text.partition("#")[0]
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
-    style = sniff([text for _, text in lines[:SAMPLE]], styles)
+    style = _sniffed([text for _, text in lines[:SAMPLE]], styles)
     read = (_row(number, text, style) for number, text in lines)
     rows = [row for row in read if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
     if not rows:
         raise FileError(f"{path}: empty")
-    header, rows = _headed(rows, comment, style, known)
-    return TextTable(*_trimmed(header, rows, style), style)
+    header, rows = _headed(rows, title, style, known)
+    return TextTable(*_trimmed(header, rows, style), style, comments)
 
 
 def _headed(
-    rows: list[TextRow], comment: str, style: Style, known: Sequence[str]
-) -> tuple[list[str] | None, list[TextRow]]:
+    rows: list[TextRow], title: str, style: Style, known: Sequence[str]
+) -> tuple[TextRow | None, list[TextRow]]:
     """The names of columns, with units if the line below them has these, and the rows below."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
 
     if _numeric(rows[0].cells, style):
-        named = _header(comment, style)
-        return (named if len(named) == len(rows[0].cells) and wanted(named) else None), rows
+        named = _header(title, style)
+        found = len(named) == len(rows[0].cells) and wanted(named)
+        return (TextRow(0, title, named) if found else None), rows
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
     width = len(rows[first].cells) if first < len(rows) else 0
@@ -201,7 +213,7 @@ def _headed(
         header[: len(below)] = [f"{name} [{each}]" if each not in ("", "-") else name
                                 for name, each in zip(header, below, strict=False)]  # fmt: skip
         rows = rows[1:]
-    return header, rows
+    return line._replace(cells=header), rows
 
 
 def _listed(
@@ -228,7 +240,7 @@ def _listed(
     return header, kept
 
 
-def lines_of(path: Path) -> Iterator[tuple[int, str]]:
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """Numbered lines of a file, unzipped. Bytes that are not UTF-8 are read as Latin-1."""
     with path.open("rb") as packed:
         is_packed = packed.peek(2)[:2] == b"\x1f\x8b"
@@ -247,7 +259,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
-def sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
+def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
     """Name and numbered rows, with tabs, of the first sheet with a known column, else the first."""
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -285,14 +297,14 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
     return "utf-8-sig"
 
 
-def sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
+def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     """The style in which most lines have the same number of cells and most cells are numbers."""
 
     def score(style: Style) -> float:
         rows = [_row(0, line, style) for line in lines]
         body = rows[1:] or rows
-        width, _ = Counter(len(stripped(row.cells)) for row in body).most_common(1)[0]
-        equal = sum(len(stripped(row.cells)) == width for row in rows) / len(rows)
+        width, _ = Counter(len(_stripped(row.cells)) for row in body).most_common(1)[0]
+        equal = sum(len(_stripped(row.cells)) == width for row in rows) / len(rows)
         cells = [cell for row in body for cell in row.cells if cell]
         numbers = sum(style.number(cell) is not None for cell in cells)
         doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0].cells, style)
@@ -315,10 +327,12 @@ def _header(text: str, style: Style) -> list[str]:
 
 
 def _numeric(cells: Sequence[str], style: Style) -> bool:
-    return any(cells) and all(style.number(cell) is not None for cell in cells if cell)
+    return any(cells) and all(
+        cell.lower() in HOLES or style.number(cell) is not None for cell in cells
+    )
 
 
-def stripped(cells: list[str]) -> list[str]:
+def _stripped(cells: list[str]) -> list[str]:
     """The cells without empty ones at the end, which trailing separators cause."""
     end = len(cells)
     while end and not cells[end - 1]:
@@ -327,22 +341,23 @@ def stripped(cells: list[str]) -> list[str]:
 
 
 def _trimmed(
-    header: list[str] | None, rows: list[TextRow], style: Style
-) -> tuple[list[str] | None, list[TextRow]]:
+    header: TextRow | None, rows: list[TextRow], style: Style
+) -> tuple[TextRow | None, list[TextRow]]:
     """Header and rows without trailing empty cells. Row names of R get an empty name."""
     if header is None:
-        width = max((len(stripped(row.cells)) for row in rows), default=0)
+        width = max((len(_stripped(row.cells)) for row in rows), default=0)
     else:
-        header = stripped(header)
-        width = len(header)
-        longer = [row.cells for row in rows if len(stripped(row.cells)) == width + 1]
+        names = _stripped(header.cells)
+        width = len(names)
+        longer = [row.cells for row in rows if len(_stripped(row.cells)) == width + 1]
         if style.separator in " \t" and longer and len(longer) == len(rows):
             count = {style.number(cells[0]) for cells in longer}
             if count in ({*range(len(rows))}, {*range(1, len(rows) + 1)}):
-                header, width = ["", *header], width + 1
+                names, width = ["", *names], width + 1
+        header = header._replace(cells=names)
     return header, [
         row
         if len(row.cells) <= width
-        else row._replace(cells=[*row.cells[:width], *stripped(row.cells[width:])])
+        else row._replace(cells=[*row.cells[:width], *_stripped(row.cells[width:])])
         for row in rows
     ]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
-from typing import NamedTuple
 
 #: Largest number of mistakes of one file that are explained.
 MOST_SLIPS = 10
@@ -13,64 +11,42 @@ MOST_SLIPS = 10
 #: Largest number of characters of a line that are shown.
 MOST_SHOWN = 60
 
-_KEY = r"(?P<key>\s*[A-Za-z0-9_.-]+\s*)"
+_KEY = "[A-Za-z0-9_.-]+"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
-
-class _Slip(NamedTuple):
-    """A kind of wrong line, the correction, and the reason."""
-
-    pattern: re.Pattern[str]
-    meant: Callable[[re.Match[str]], str]
-    why: str
-
-
-def _slip(pattern: str, meant: Callable[[re.Match[str]], str], why: str) -> _Slip:
-    return _Slip(re.compile(pattern + r"\s*(?:#.*)?"), meant, why)
-
-
-def _number(text: str) -> str:
-    """The number as TOML, with digits on both sides of the point."""
-    text = re.sub(r"(?<!\d)\.(?=\d)", "0.", text)
-    return re.sub(r"(?<=\d)\.(?!\d)", ".0", text)
-
-
+#: What follows the key in a wrong line, the correction of it, and the reason.
 _SLIPS = [
-    _slip(
-        rf"{_KEY}=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)",
-        lambda found: f"{found['key'].strip()} = {found['whole']}.{found['part']}",
+    (
+        r"=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)",
+        "{whole}.{part}",
         "a decimal point, no comma",
     ),
-    _slip(
-        rf"{_KEY}=\s*(?P<number>{_NUMBER})[dD](?P<power>[+-]?\d+)",
-        lambda found: f"{found['key'].strip()} = {_number(found['number'])}e{found['power']}",
+    (
+        rf"=\s*(?P<number>{_NUMBER})[dD](?P<power>[+-]?\d+)",
+        "{number}e{power}",
         "an exponent with e",
     ),
-    _slip(
-        rf"{_KEY}=\s*(?P<number>{_NUMBER})\s*(?P<unit>[^\d\s#.,;\]\[\"'=_-][^\s#=]*)",
-        lambda found: f"{found['key'].strip()} = {_number(found['number'])}",
+    (
+        rf"=\s*(?P<number>{_NUMBER})\s*[^\d\s#.,;\]\[\"'=_-][^\s#=]*",
+        "{number}",
         "a number without unit; units are only named, in [units]",
     ),
-    _slip(
-        rf"{_KEY}=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)",
-        lambda found: f"{found['key'].strip()} = {_number(found['number'])}",
+    (
+        r"=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)",
+        "{number}",
         "digits on both sides of the point",
     ),
-    _slip(
-        rf"{_KEY}=\s*[\u201c\u201d\u201e\u2018\u2019\u00ab]?"
+    (
+        r"=\s*[\u201c\u201d\u201e\u2018\u2019\u00ab]?"
         r"(?P<text>[^\W\d][^\"'=#\[\]{}\u201c\u201d\u2018\u2019\u00bb]*?)"
         r"[\u201c\u201d\u2018\u2019\u00bb]?",
-        lambda found: f'{found["key"].strip()} = "{found["text"].strip()}"',
+        '"{text}"',
         "text in straight quotes",
     ),
-    _slip(
-        rf"{_KEY}:\s*(?P<value>[^\s#].*?)",
-        lambda found: f"{found['key'].strip()} = {found['value']}",
-        "an equals sign, no colon",
-    ),
-    _slip(
-        rf"{_KEY}=\s*(?P<value>{_NUMBER}|\"[^\"]*\"|\[[^\]]*\])\s*[;,]",
-        lambda found: f"{found['key'].strip()} = {found['value']}",
+    (r":\s*(?P<value>[^\s#].*?)", "{value}", "an equals sign, no colon"),
+    (
+        rf"=\s*(?P<value>{_NUMBER}|\"[^\"]*\"|\[[^\]]*\])\s*[;,]",
+        "{value}",
         "nothing at the end of the line",
     ),
 ]
@@ -105,10 +81,20 @@ def explained(path: object, text: str, error: Exception) -> str:
 def _corrected(line: str) -> tuple[str, str] | None:
     """The correction of a line and the reason; None if it is not known."""
     for pattern, meant, why in _SLIPS:
-        if found := pattern.fullmatch(line):
+        if found := re.fullmatch(rf"\s*(?P<key>{_KEY})\s*{pattern}\s*(?:#.*)?", line):
+            parts = {name: part.strip() for name, part in found.groupdict().items()}
+            if "number" in parts:
+                parts["number"] = _number(parts["number"])
+            mended = f"{parts['key']} = {meant.format(**parts)}"
             try:
-                tomllib.loads(mended := meant(found))
+                tomllib.loads(mended)
             except (ValueError, RecursionError):
                 continue
             return mended, why
     return None
+
+
+def _number(text: str) -> str:
+    """The number as TOML, with digits on both sides of the point."""
+    text = re.sub(r"(?<!\d)\.(?=\d)", "0.", text)
+    return re.sub(r"(?<=\d)\.(?!\d)", ".0", text)

@@ -1,0 +1,356 @@
+"""The asperity of each row of a file: by position, by an index, or in the scene's order."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import permutations
+from shlex import quote
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices
+from convexrough.errors import InputError
+from convexrough.scene.neighbours import nearest_distances
+from convexrough.scene.scene import Scene
+from convexrough.tabular.table import INDEX, ReadTable
+from convexrough.tabular.text import bare
+from convexrough.verdict.verdict import rounded_up
+
+#: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given.
+POSITION_TOLERANCE = 1e-2
+
+#: Number of steps in which a shift of all nodes is estimated.
+REFINEMENTS = 5
+
+#: Largest number of shifts that are tried if rows are missing.
+MOST_TRIED = 1000
+
+#: Relative difference up to which the last row is the sum of the others.
+TOTAL = 1e-4
+
+#: Part of loaded nodes that may be far from all asperities, if not all positions are wrong.
+FEW_FAR = 0.1
+
+#: At most this many unread columns are compared with the positions of asperities.
+MOST_UNREAD = 8
+
+#: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
+#: At random points the median is about 0.4.
+BY_CHANCE = 0.25
+
+#: Names of columns that can only be indices of asperities.
+SURELY_INDEX = ("index", "asperity")
+
+#: True if points are where they should be.
+Fits = Callable[[Array], bool]
+
+
+@dataclass
+class Placing:
+    """How the rows of a table are assigned to asperities: `how` in words, and `mistakes`.
+
+    column : the name of the column of loads, pressures or forces
+    tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
+    missing_open : True if asperities without a row are open
+    """
+
+    scene: Scene
+    table: ReadTable
+    column: str
+    tolerance: float | None
+    missing_open: bool
+    how: str = "in the scene's order"
+    mistakes: list[str] = field(default_factory=list)
+
+    @cached_property
+    def positions(self) -> Array:
+        """(n, 2) [length] positions of the asperities."""
+        return self.scene.asperities.positions
+
+    @cached_property
+    def points(self) -> Array | None:
+        """(m, 2) [length] x and y of the rows, None without these columns."""
+        columns = self.table.columns
+        return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
+
+    def owners(self) -> Indices:
+        """The asperity of each row."""
+        if self.points is not None:
+            found, by = self._matched(self.points), True
+        else:
+            found, by = self._numbered_or_in_order()
+        count, rows = len(self.scene), len(self.table.rows)
+        if rows == count or (rows < count and (by or self.mistakes) and self.missing_open):
+            return found
+        if rows == count + 1 and (total := self._total()):
+            self.mistakes = [total]
+            return found
+        advice = "" if by else unused(self.table)
+        if rows < count and by:
+            advice = "; --missing-open takes the others for open"
+        elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
+            advice += "; --nodes adds up rows at their nearest asperity"
+        expected = f"expected {count}, one per asperity of the scene{advice}"
+        self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+        return found
+
+    def nearest(self, values: Array) -> Indices:
+        """The nearest asperity of each node or pixel; a loaded one must be near its asperity."""
+        assert self.points is not None
+        places, loaded = self.scene.contact_points, values != 0
+        distances, owners = _nearest(places, self.points)
+        apart = np.full(len(self.scene), self.scene.sphere_radius)
+        if len(self.scene) > 1:
+            apart = nearest_distances(self.positions)
+        far = loaded & (distances > apart[owners])
+
+        def fits(points: Array) -> bool:
+            """True if points are near to several asperities, and nearer than random points."""
+            near, their = _nearest(places, points)
+            parts = near / apart[their]
+            return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
+
+        most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
+        if loaded.any() and not fits(self.points[most]):
+            moved = self._misread(loaded, fits) or self._about_shifted(loaded, values, fits)
+            if moved:
+                self.mistakes.append(f"positions: {moved}")
+                return owners
+        for i in np.flatnonzero(far):
+            found = (
+                f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
+            )
+            self._refuse(i, found, f"less than to its neighbour, {apart[owners[i]]:.3g}")
+        if self.column == "pressure":
+            self._refuse_repeated(self.points @ [1, 1j], loaded, "each node or pixel once")
+        self.how = f"{len(owners):,} nodes summed at their nearest asperities"
+        return owners
+
+    # By an index, or in order
+
+    def _numbered_or_in_order(self) -> tuple[Indices, bool]:
+        """The asperities by a column that numbers them, and True; else those in order."""
+        headers = self.table.others
+        places = {it[0].lower(): it for it in headers if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
+        if len(places) == 2:
+            x, y = places["x"], places["y"]
+            expected = f"expected --column x={x} --column y={y}"
+            self.mistakes.append(f"columns {x}, {y}: found no x and y, {expected}")
+        for name, index in self._indices().items():
+            if (numbered := self._numbered(name, index)) is not None:
+                return numbered, True
+        rows = len(self.table.rows)
+        if not self.mistakes and rows == len(self.scene):
+            self.mistakes += self._unread_positions()
+        return np.arange(rows), False
+
+    def _indices(self) -> dict[str, Indices]:
+        """Unread columns of whole numbers: indices by name, then permutations of any name."""
+        count = np.arange(len(self.scene))
+        named, others = dict[str, Indices](), dict[str, Indices]()
+        for name, cells in self.table.others.items():
+            if cells.dtype.kind != "f" or not ((cells >= 0) & (cells % 1 == 0)).all():
+                continue
+            index = cells.astype(np.intp)
+            if bare(name).lower() in INDEX:
+                named[name] = index
+            elif (
+                (np.diff(index) < 0).any()
+                and index.min() <= 1
+                and np.array_equal(np.sort(index), count + index.min())
+            ):
+                others[name] = index
+        return named | others
+
+    def _numbered(self, name: str, index: Indices) -> Indices | None:
+        """The indices of asperities in a column that counts from 0 or 1; else None."""
+        count, least, most = len(self.scene), int(index.min()), int(index.max())
+        values, times = np.unique(index, return_counts=True)
+        sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
+        # Increasing numbers may be those of nodes and are ignored. In another order, or if nearly
+        # all fit, they are indices.
+        if times.max() == 1:
+            sure |= bool(name) and bool((np.diff(index) < 0).any())
+        else:
+            sure |= bool(name) and 2 * len(values) > len(index) and most - min(least, 1) < count
+        if times.max() > 1:
+            twice = values[times.argmax()]
+            where = " and ".join(self.table.rows[i] for i in np.flatnonzero(index == twice)[:2])
+            wrong = f"{twice} in {where}, expected each asperity once"
+        elif least > 0 and most < count:
+            question = "from 0 or from 1? Expected x and y, or a row of asperity 0"
+            wrong = f"numbers from {least} to {most}: {question}"
+        elif most - (first := min(least, 1)) >= count:
+            wrong = f"{most}, expected at most {count - 1 + first}, the last asperity"
+        else:
+            self.how = f"in the order of column {name or '1'}, from {first}"
+            return index - first
+        if sure:
+            self.mistakes.append(f"column {name}: found {wrong}")
+        return None
+
+    def _unread_positions(self) -> Iterator[str]:
+        """A message if two unread columns are positions of the asperities in another order."""
+        numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
+        for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
+            for what, points in {
+                "polar coordinates (in radians)": _polar(one, other),
+                "polar coordinates (in degrees)": _polar(one, np.radians(other)),
+                "positions": np.column_stack((one, other)),
+            }.items():
+                if not self._fits(points):
+                    continue
+                if (_nearest(self.positions, points)[1] != np.arange(len(points))).any():
+                    named = f"--column x={quote(a)} --column y={quote(b)}"
+                    expected = named if what == "positions" else "columns x and y"
+                    found = f"found {what} in another order than the scene's"
+                    yield f"columns {a}, {b}: {found}, expected {expected}"
+                return
+
+    def _total(self) -> str:
+        """A message if the last row has the sum of the others; else ""."""
+        *others, last = self.table.columns[self.column].tolist()
+        if math.isclose(math.fsum(others), last, rel_tol=TOTAL):
+            found = "found the sum of the others"
+            return self.table.mistake(-1, f": {found}, expected only asperities: remove the row")
+        return ""
+
+    # By position
+
+    @cached_property
+    def _spacing(self) -> float:
+        """[length] the smallest distance of two asperities; the tip radius of a single one."""
+        if len(self.positions) == 1:
+            return float(self.scene.asperities.tip_radii[0])
+        return float(nearest_distances(self.positions).min())
+
+    @cached_property
+    def _allowed(self) -> float:
+        """[length] largest distance of a position from its asperity."""
+        given, half = self.tolerance, self._spacing / 2
+        if given is not None and given > half and len(self.scene) > 1:
+            expected = f"at most {half:.3g}, half the smallest distance of two asperities"
+            raise InputError("--tolerance", found=given, expected=expected)
+        return POSITION_TOLERANCE * self._spacing if given is None else given
+
+    def _fits(self, points: Array) -> bool:
+        """True if each point is at an asperity of its own."""
+        distances, owners = _nearest(self.positions, points)
+        return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
+
+    def _matched(self, points: Array) -> Indices:
+        """The asperity at each point; no asperity may occur twice."""
+        allowed = self._allowed
+        distances, owners = _nearest(self.positions, points)
+        far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
+        most = float(distances.max())
+        self.how = f"matched by position (largest distance {most:.2g})"
+        doubtful = far.any() if len(points) == len(self.positions) else far.mean() > 0.5
+        if doubtful or not alone:
+            every = np.ones(len(points), dtype=np.bool_)
+            if moved := self._misread(every, self._fits) or self._shifted(points):
+                self.mistakes.append(f"positions: {moved}")
+                return owners
+        if far.any() and alone and float(rounded_up(most)) <= self._spacing / 2:
+            found = f"found them up to {most:.3g} from the nearest asperities"
+            advice = f"if they are rounded: --tolerance {rounded_up(most)}"
+            self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
+            return owners
+        for i in np.flatnonzero(far):
+            found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
+            self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
+        self._refuse_repeated(owners, ~far, "each asperity once")
+        return owners
+
+    def _misread(self, rows: NDArray[np.bool_], fits: Fits) -> str:
+        """A sentence on the columns, sign or unit of x and y with which rows fit; else ""."""
+        return next((said for said, points in self._readings(rows) if fits(points)), "")
+
+    def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
+        """Other readings of x and y: what to say of each, and its points."""
+        held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
+        called = {name: quote(bare(self.table.called[name])) for name in held}
+        for order in permutations(held):
+            a, b, _ = order
+            if {a, b} != {"x", "y"}:
+                named = dict(zip(held, map(called.__getitem__, order), strict=True))
+                found = "the header names the columns in another order"
+                yield f"{found}: {_options('column', named)}", np.column_stack((held[a], held[b]))
+        points = np.column_stack((held["x"], held["y"]))[rows]
+        exchange = _options("column", {"x": called["y"], "y": called["x"]})
+        yield f"x and y are exchanged, or the array is turned: {exchange}", points[:, ::-1]
+        for names, verb in (("x", "has"), ("y", "has"), ("xy", "have")):
+            ways = _options("scale", dict.fromkeys(names, "-1"))
+            signs = [-1 if name in names else 1 for name in "xy"]
+            yield f"{' and '.join(names)} {verb} the other sign: {ways}", points * signs
+        for power in (*range(-9, 0), *range(1, 10)):
+            found = f"found them 10^{power} times as far out as the scene's"
+            ways = _options("scale", dict.fromkeys("xy", f"{10.0**-power:g}"))
+            yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
+
+    def _shifted(self, points: Array) -> str:
+        """A sentence on the shift that makes all points fit; else ""."""
+        tried: Sequence[Any] = self.positions[:MOST_TRIED] - points[0]
+        if len(points) == len(self.positions):
+            tried = [self.positions.mean(axis=0) - points.mean(axis=0)]
+        for shift in tried:
+            if self._fits(points[:20] + shift) and self._fits(points + shift):
+                digit = 0.1 * min(self._allowed, float(np.abs(shift).max()))
+                by = _pair(np.round(-shift / digit) * digit)
+                expected = f"expected them from the axis of the sphere, to {self._allowed:.3g}"
+                return f"all are shifted by {by}, {expected}"
+        return ""
+
+    def _about_shifted(self, rows: NDArray[np.bool_], values: Array, fits: Fits) -> str:
+        """A sentence on the approximate shift of loaded nodes, if it makes them fit; else ""."""
+        assert self.points is not None
+        points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
+        shift = np.average(points, axis=0, weights=weights)
+        for _ in range(REFINEMENTS):  # the mean distance from the nearest asperities
+            near = places[_nearest(places, points - shift)[1]]
+            shift = np.average(points - near, axis=0, weights=weights)
+        expected = "expected them from the axis of the sphere"
+        return (
+            f"all are shifted by about {_pair(shift)}, {expected}" if fits(points - shift) else ""
+        )
+
+    def _refuse(self, row: Any, found: str, expected: str) -> None:
+        self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
+
+    def _refuse_repeated(
+        self, places: NDArray[Any], chosen: NDArray[np.bool_], expected: str
+    ) -> None:
+        """Add a mistake for each row, of those chosen, with the place of an earlier one."""
+        _, first, back = np.unique(places, return_index=True, return_inverse=True)
+        for i in np.flatnonzero((first[back] != np.arange(len(places))) & chosen):
+            self._refuse(i, f"the same position as in {self.table.rows[first[back[i]]]}", expected)
+
+
+def unused(table: ReadTable) -> str:
+    """The end of a message, with the names of columns that are not read."""
+    return f"; not used: {', '.join(names)}" if (names := [*filter(None, table.others)]) else ""
+
+
+def _options(option: str, values: Mapping[str, str]) -> str:
+    return " ".join(f"--{option} {name}={value}" for name, value in values.items())
+
+
+def _pair(point: Array) -> str:
+    return f"[{', '.join(f'{each + 0.0:.4g}' for each in point)}]"
+
+
+def _polar(radii: Array, angles: Array) -> Array:
+    return np.column_stack((radii * np.cos(angles), radii * np.sin(angles)))
+
+
+def _nearest(positions: Array, points: Array) -> tuple[Array, Indices]:
+    from scipy.spatial import cKDTree  # takes 0.1 s to import
+
+    distances, owners = cKDTree(positions).query(points)
+    return np.asarray(distances), np.asarray(owners)
