@@ -108,8 +108,8 @@ class Verdict(Claim, Table, Plottable):
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
-                f"loads on {len(small):,} asperities proved open are at most {noise:.2g} ({noise / self.largest:.1g} of the "
-                f"largest load): --floor {rounded_up(noise)} counts them as 0"
+                f"loads on {len(small):,} asperities proved open are at most {noise:.2g} "
+                f"({noise / self.largest:.1g} of the largest load): --floor {rounded_up(noise)} counts them as 0"
             )
         yield from super().hints()
 
