@@ -109,7 +109,8 @@ class Verdict(Claim, Table, Plottable):
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
                 f"loads on {len(small):,} asperities proved open are at most {noise:.2g} "
-                f"({noise / self.largest:.1g} of the largest load): --floor {rounded_up(noise)} counts them as 0"
+                f"({noise / self.largest:.1g} of the largest load): "
+                f"--floor {rounded_up(noise)} counts them as 0"
             )
         yield from super().hints()
 
