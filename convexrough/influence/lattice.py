@@ -25,10 +25,10 @@ from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Kernel, SiteBox, neighbours, through_waves
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
-from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
 from convexrough.influence.slopes import pulls
+from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.layout import Layout
@@ -355,8 +355,8 @@ class LatticeInfluence(LatticeCoupling):
         return change * unit, 1.01 * error * unit
 
     def smoother(self, root: Array) -> Smoother:
-        box = self.box
-        return block_smoother(box.shape, box.basis, self.sources, self._unit, root, box.workers)
+        cells = np.stack(np.divmod(self.sources, self.box.shape[1]))
+        return block_smoother(cells, self.box.basis, self._unit, root)
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:

@@ -19,10 +19,10 @@ from convexrough.influence.convolution import Kernel
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, known
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.pair_sums import Product
-from convexrough.influence.scattered_smoother import coarse_inverse
 from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.influence.slopes import by_mesh, mesh_pulls
+from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
@@ -134,8 +134,8 @@ class ScatteredInfluence:
             return MeshSums(self._double)
         return MatrixSums(*known(self.points, self.tails, self.point_error))
 
-    def smoother(self, root: Array) -> Smoother | None:
-        return coarse_inverse(self.points, self.scale, root)
+    def smoother(self, root: Array) -> Smoother:
+        return smoother_of_points(self.points, self.scale, root)
 
     def _stretched(self, power: int) -> float:
         """The factor by which errors of the points can increase 1 / r^power."""

@@ -1,4 +1,4 @@
-"""The coupling on a mesh: the sum over pairs, bounds on the error, an approximate inverse."""
+"""The coupling on a mesh: the sum over pairs, bounds on the error."""
 
 import numpy as np
 import pytest
@@ -156,4 +156,23 @@ def test_few_points(count: int) -> None:
     assert (operator.falloff(loads, 2) >= inverse_sums(points, points, loads, power=2)[0]).all()
     assert len(operator.separations()) == count
     assert operator.crowding(np.ones(count)) >= 0
-    assert operator.smoother(np.ones(count)) is None
+
+
+@pytest.mark.parametrize("layout", ["disc", "clustered", "jittered"])
+@pytest.mark.parametrize("rough", [0.0, 1.0])
+def test_the_preconditioner(layout: str, rough: float) -> None:
+    """It is symmetric and positive definite, and makes I + W A W better conditioned."""
+    rng = np.random.default_rng(9)
+    points = LAYOUTS[layout](rng)[rng.permutation(3900)[:700]]
+    operator = ScatteredInfluence(points, SCALE)
+    root = np.sqrt(operator.separations() / (3 * SCALE))  # so that I + W A W is definite
+    root *= np.exp(-rough * rng.random(700))
+    smooth = operator.smoother(root)
+    M = np.stack([smooth(column)[0] for column in np.eye(700, dtype=np.float32)])
+    M = M.astype(np.float64)
+    assert_allclose(M, M.T, atol=1e-5)
+    assert np.linalg.eigvalsh(M)[0] > 0
+    whole = np.eye(700) + operator.matrix * root * root[:, None]
+    assert np.linalg.cond(np.linalg.cholesky(M).T @ np.linalg.cholesky(whole)) ** 2 < (
+        0.9 if layout == "clustered" else 0.4
+    ) * np.linalg.cond(whole)

@@ -1,19 +1,20 @@
-"""An approximate inverse of I + W A W on a lattice, to precondition conjugate gradients.
+"""An approximate inverse of I + W A W, to precondition conjugate gradients.
 
 It is the preconditioner M of docs/theory/newton.md, "Many asperities", for the compliance operator
-A and a diagonal W. The code computes it on blocks of m x m sites that are smaller than the
-Gaussian, with the mean of A over pairs of blocks. The constants are heuristics: they change the
-number of steps of conjugate gradients, not the answer.
+A and a diagonal W. Asperities are counted in the cells of a lattice, their own or a square one. The
+code computes M on blocks of m x m cells that are smaller than the Gaussian, with the mean of A over
+pairs of blocks. The constants are heuristics: they change the number of steps of conjugate
+gradients, not the answer.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import through_waves
 from convexrough.influence.coupling import Smoother
@@ -23,13 +24,13 @@ Single = NDArray[np.float32]
 #: Windows are so large that the relative variance of the mean of W^2 over a window is about this.
 SCATTER = 0.04
 
-#: Width of a Gaussian that averages over as many sites as a window, divided by the window's side.
+#: Width of a Gaussian that averages over as many cells as a window, divided by the window's side.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
 #: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.
 FINE = 3.5
 
-#: Side of windows for smooth W. Then blocks have 2 x 2 sites, and cost a third of blocks of one.
+#: Side of windows for smooth W. Then blocks have 2 x 2 cells, and cost a third of blocks of one.
 LEAST_WINDOW = 2 * FINE
 
 #: Side of the windows on which the scatter of W^2 is measured.
@@ -39,61 +40,40 @@ WINDOW = 8
 LEAST = 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class _Blocks:
-    """Blocks of m x m sites that cover a box.
+def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
+    """M for asperities anywhere, on square cells that hold about one asperity on average."""
+    away = points - points.min(axis=0)
+    width, height = away.max(axis=0).tolist()
+    side = max(np.sqrt(width * height / len(points)), (width + height) / len(points))
+    return block_smoother((away / side).astype(np.intp).T, np.eye(2), scale / side, root)
 
-    shape  : (rows, columns) of blocks
-    places : (n,) sites of the asperities, as indices into the box extended to whole blocks
-    which  : (n,) block of each asperity
+
+def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:
+    """M for asperities in these cells (2, n) of a lattice, with the diagonal `root` (n,) of W.
+
+    scale : an entry of A between the centres of cells, times their distance in the unit of `basis`
     """
+    (i, j), (rows, columns) = cells, (cells.max(axis=1) + 1).tolist()
+    squares = np.bincount(i * columns + j, root * root, minlength=rows * columns)
+    window = _window(squares.reshape(rows, columns))
+    m = int(window / FINE)
+    shape = rows, columns = -(-rows // m), -(-columns // m)
+    block = i // m * columns + j // m
+    workers = threads.worthwhile(4 * rows * columns)
 
-    m: int
-    shape: tuple[int, int]
-    places: Indices
-    which: Indices
-
-    @classmethod
-    def of(cls, shape: tuple[int, int], sources: Indices, m: int) -> _Blocks:
-        blocks = (-(-shape[0] // m), -(-shape[1] // m))
-        columns = blocks[1] * m
-        places = sources // shape[1] * columns + sources % shape[1]
-        return cls(m, blocks, places, places // columns // m * blocks[1] + places % columns // m)
-
-    def sums(self, values: NDArray[Any]) -> Single:
+    def sums(values: NDArray[Any]) -> Single:
         """The sum of values (n,) over each block."""
-        m = self.m
-        field = np.zeros((self.shape[0] * m, self.shape[1] * m), dtype=np.float32)
-        field.ravel()[self.places] = values
-        parts = (field[i::m, j::m] for i in range(m) for j in range(m))
-        total = next(parts).copy()
-        for part in parts:
-            total += part
-        return total
+        return np.bincount(block, values, rows * columns).astype(np.float32).reshape(shape)
 
-
-def block_smoother(
-    shape: tuple[int, int],
-    basis: Array,
-    sources: Indices,
-    scale: float,
-    root: Array,
-    workers: int,
-) -> Smoother:
-    """M for asperities at the sites `sources` of a box, with the diagonal `root` (n,) of W."""
-    squares = np.zeros(shape[0] * shape[1], dtype=np.float32)
-    squares[sources] = root * root
-    window = _window(squares.reshape(shape))
-    blocks = _Blocks.of(shape, sources, int(window / FINE))
-    sums = blocks.sums(root * root)  # D^2
-    touching = sums > 0
-    count = float(blocks.sums(root > 0)[touching].mean())
-    size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
+    total = sums(root * root)  # D^2
+    touching = total > 0
+    count = float(sums(root > 0)[touching].mean())
+    size, spectrum = _block_spectrum(shape, basis, m, count, workers)
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)
-    passed = _low_pass(size, basis * blocks.m, WIDTH * window / blocks.m)
-    mean = _local_mean(sums, touching, size, passed, workers)
-    q = np.divide(w, np.sqrt(mean).ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
+    passed = _low_pass(size, basis * m, WIDTH * window / m)
+    mean = _local_mean(total, touching, size, passed, workers)
+    q = np.divide(w, np.sqrt(mean).ravel()[block], out=np.zeros_like(w), where=w > 0)
 
     middle = np.float32(np.sqrt(np.median(mean[touching])))
     displacement = np.float32(scale) * middle * spectrum  # of A_b D
@@ -101,9 +81,7 @@ def block_smoother(
     removed *= passed
     energies = displacement * displacement
     energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
-    energies *= np.float32(blocks.m * blocks.m / (size[0] * size[1]))
-
-    columns = blocks.shape[1]
+    energies *= np.float32(m * m / (size[0] * size[1]))
 
     def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
         left = np.zeros(removed.shape[1])
@@ -115,8 +93,8 @@ def block_smoother(
             waves[0] *= removed[:, each]
             return waves
 
-        field = through_waves([blocks.sums(q * values)], size, workers, remove)[0]
-        averages = np.ascontiguousarray(field[:, :columns]).ravel()[blocks.which]
+        field = through_waves([sums(q * values)], size, workers, remove)[0]
+        averages = np.ascontiguousarray(field[:, :columns]).ravel()[block]
         averages *= q
         np.subtract(values, averages, out=averages)
         averages *= touched
@@ -125,7 +103,7 @@ def block_smoother(
     return smooth
 
 
-def _window(squares: Single) -> float:
+def _window(squares: NDArray[Any]) -> float:
     """The smallest m for which the means of W^2 over windows of m x m sites vary little."""
     m = WINDOW
     rows, columns = (max(1, length // m) for length in squares.shape)
