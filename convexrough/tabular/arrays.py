@@ -96,17 +96,32 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     named = named_arrays(path)
     (first, values), *others = named.items() or [("", np.zeros(0))]
     alone = values.ndim > 1 and min(values.shape) > 1 if isinstance(values, np.ndarray) else False
-    if not others and (alone or not first or first.startswith("arr_")):
+    columns_in_it = not first or first.startswith("arr_")
+    if alone:  # x, y and load in one array, or values of pixels
+        columns_in_it |= first.lower() not in known or len(values[0]) <= 3
+    if not others and columns_in_it:
         columns = _table(np.asarray(values))
     else:
-        vectors = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
-                   if isinstance(each, np.ndarray) and each.ndim}  # fmt: skip
-        columns = {name: each.tolist() for name, each in vectors.items() if each.ndim == 1}
+        arrays = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
+                  if isinstance(each, np.ndarray) and each.ndim}  # fmt: skip
+        columns = _of_one_shape(path, arrays, known)
     wanted = [name for name in columns if name.lower() in known] or list(columns)
     lengths = {len(columns[name]) for name in wanted}
     if len(lengths) > 1:
         raise ValueError(f"arrays of lengths {sorted(lengths)}")
     return {name: values for name, values in columns.items() if len(values) in lengths}
+
+
+def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
+    """The vectors; if known arrays have two dimensions and one shape, all arrays of this shape."""
+    shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
+    wide = [shape for shape in shapes.values() if len(shape) > 1]
+    if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
+        found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
+        expected = "vectors, or x, y and values of one shape"
+        raise FileError(f"{path}: found {found} numbers, expected {expected}")
+    return {name: each.ravel().tolist() for name, each in arrays.items()
+            if (each.shape == wide[0] if wide else each.ndim == 1)}  # fmt: skip
 
 
 def _table(values: NDArray[Any]) -> Columns:

@@ -108,7 +108,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(1.0, 0.3)
     for base, approach, told in (
-        (1.0, 9e-5, "every asperity touches, also at the rim of the array"),
+        (1.0, 9e-5, "of the asperities at the rim of the array 100% touch: others beyond it"),
         (1.0, 5e-5, ""),
         (np.inf, 1e-6, ""),
         (1.0, -1e-6, "no asperity carries a load: check the sign and the unit of the approach"),
