@@ -76,21 +76,6 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     assert all((difference > 0) == (fraction > crossing) for fraction, difference in loss)
 
 
-def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
-    command("new", "a.toml")
-    folder = tmp_path / "a-results"
-    folder.mkdir()
-    (folder / "summary.json").write_text("old")
-    (folder / "mine.txt").write_text("precious")
-    refused = command("run", "a.toml", "--no-figures")
-    assert refused.status == 2
-    assert "a-results: not empty" in refused.err
-    assert (folder / "summary.json").read_text() == "old"
-    assert command("run", "a.toml", "--no-figures", "--force").status == 0
-    assert json.loads((folder / "summary.json").read_text())["schema"] == 2
-    assert (folder / "mine.txt").read_text() == "precious"
-
-
 def test_the_folder_is_refused_before_computing(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
