@@ -89,9 +89,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     table = read_table(
         path,
         required=(name,),
-        optional=("x", "y"),
+        optional=("x", "y", "status", "contact"),
         instead={"load": ("pressure", "area")},
-        text=("status", "contact"),
         unnamed=((name,), ("x", "y", name)),
         how=how,
     )
