@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import convexrough as cr
-from convexrough.surface.boundary_elements import HalfSpace, touch
+from convexrough.surface.boundary_elements import half_space, touch
 
 Array = NDArray[np.float64]
 Owner = NDArray[np.intp]  # index of the contact of each pixel
@@ -79,7 +79,7 @@ def loads_by_level(shape: Shape, contacts: int, levels: list[int]) -> Array:
         overlap, owner = shape(centres, centres)
         coarse = pressure.repeat(2, axis=0).repeat(2, axis=1)
         start = coarse if loads else CONTACT_MODULUS * overlap / HALF_WIDTH
-        pressure = touch(HalfSpace((n, n), (size, size), CONTACT_MODULUS), overlap, start, 1e-6)
+        pressure = touch(half_space((n, n), (size, size), CONTACT_MODULUS), overlap, start, 1e-6)
         forces = np.bincount(owner.ravel(), pressure.ravel() * size**2, contacts)
         loads.append(forces.astype(np.float64))
     return np.array(loads)

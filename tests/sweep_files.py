@@ -12,7 +12,8 @@ import numpy as np
 
 import convexrough as cr
 from convexrough.progress import logged
-from convexrough.sweeps.scenes import Ask, Asked, Tables
+from convexrough.run.scene_file import Task
+from convexrough.sweeps.scenes import Ask, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -101,7 +102,7 @@ class Deadly(Tables):
     def opened(self) -> Ask:
         ask = super().opened()
 
-        def ask_one(number: int) -> Asked:
+        def ask_one(number: int) -> Task:
             if number == self.worst:
                 os.kill(os.getpid(), signal.SIGKILL)
             return ask(number)

@@ -51,7 +51,42 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class SceneFile(Record):
+class Task(Record):
+    """A scene, what presses it, and the stages to compute."""
+
+    scene: Scene
+    approach: float | None
+    load: float | None
+    highest_approach: float | None = None
+    stages: Mapping[str, Stage]
+    solver: Solver
+    influence: Kind | None = None
+
+    def problem(self) -> NormalProblem:
+        """The normal contact problem."""
+        return NormalProblem.assemble(
+            self.scene,
+            approach=self.approach,
+            load=self.load,
+            influence=self.influence,
+            highest=self.highest_approach,
+        )
+
+    def press(self) -> Contact:
+        """The contact under the prescribed approach or load. Raises what `press` raises."""
+        return solve(self.problem(), self.solver)
+
+    def cautions(self, contact: Contact) -> Iterator[str]:
+        """Warnings about stages that do not fit the contact, before they are computed."""
+        return (each for stage in self.stages.values() for each in stage.cautions(contact))
+
+    def compute(self, contact: Contact) -> list[Result]:
+        """The results of all stages; the first is the pressed contact."""
+        return [stage.compute(contact) for stage in self.stages.values()]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
     approach [length] or load [force] : what is prescribed; the other is None
@@ -73,36 +108,7 @@ class SceneFile(Record):
     text: str
     seed: int | None
     inputs: Mapping[str, str]
-    scene: Scene
-    approach: float | None
-    load: float | None
-    highest_approach: float | None
-    stages: Mapping[str, Stage]
-    solver: Solver
-    influence: Kind | None
     convert: bool
-
-    def problem(self) -> NormalProblem:
-        """The normal contact problem of the file."""
-        return NormalProblem.assemble(
-            self.scene,
-            approach=self.approach,
-            load=self.load,
-            influence=self.influence,
-            highest=self.highest_approach,
-        )
-
-    def press(self) -> Contact:
-        """The contact that the file prescribes. Raises what `press` raises."""
-        return solve(self.problem(), self.solver)
-
-    def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about stages that do not fit the contact, before they are computed."""
-        return (each for stage in self.stages.values() for each in stage.cautions(contact))
-
-    def compute(self, contact: Contact) -> list[Result]:
-        """The results of all stages; the first is the pressed contact."""
-        return [stage.compute(contact) for stage in self.stages.values()]
 
 
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
@@ -117,51 +123,45 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     >>> len(file.scene)
     61
     """
-    from convexrough.run.study import validate
-
     if not isinstance(path, (str, os.PathLike)):
         raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
     path = Path(path)
     text = read_text(path, MOST_BYTES)
-    study, mistakes = validate(parsed(path, text))
-    if study is None:
-        raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
+    study = _study(path, text)
     if asperities is not None:
         from convexrough.surface.summits import Summits  # only for maps
 
         if isinstance(asperities, Summits):
             _one_unit(path, asperities.origin.unit, study.units.names.length)
-    scene, highest = build_scene(path, study, asperities=asperities)
+    task = task_of(path, study, asperities=asperities)
     layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
     for stage in study.stages.values():
         with blamed_on(path):
-            stage.fits(len(scene))
+            stage.fits(len(task.scene))
     return SceneFile(
+        **vars(task),
         path=path,
         text=text,
         seed=None if layout.pattern == "file" or asperities is not None else layout.seed,
         inputs={str(each): digest(each) for each in sources},
-        scene=scene,
-        approach=study.normal.approach,
-        load=study.normal.load,
-        highest_approach=highest,
-        stages=study.stages,
-        solver=named(study.solver.name),
-        influence=study.solver.influence,
         convert=study.units.convert,
     )
 
 
 def read_units(path: Path) -> UnitNames:
     """The units that a scene file names. Raises FileError and SceneFileError."""
+    return _study(path, read_text(path, MOST_BYTES)).units.names
+
+
+def _study(path: Path, text: str) -> Study:
     from convexrough.run.study import validate
 
-    study, mistakes = validate(parsed(path, read_text(path, MOST_BYTES)))
+    study, mistakes = validate(parsed(path, text))
     if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
-    return study.units.names
+    return study
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
@@ -222,10 +222,10 @@ def _regular(
 READ = Layouts(read_summits, _regular)
 
 
-def build_scene(
+def task_of(
     path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
-) -> tuple[Scene, float | None]:
-    """The scene that checked tables describe, and `SceneFile.highest_approach`.
+) -> Task:
+    """The scene and the stages that checked tables describe.
 
     path    : the scene file, for messages; paths in the tables are relative to its folder
     layouts : functions that make the asperities
@@ -246,19 +246,29 @@ def build_scene(
             units=study.units.names,
         )
 
-    layout = study.asperities
+    layout, highest = study.asperities, None
     with _blamed_on(path, "asperities"):
         if asperities is not None:
-            return press_on(asperities), None
-        if layout.pattern == "file":
+            scene = press_on(asperities)
+        elif layout.pattern == "file":
             how = Reading(
                 columns=named_columns("columns", layout.columns, SUMMIT_COLUMNS),
                 units=study.units.names,
                 convert=study.units.convert,
             )
             place = path.parent / layout.path
-            return press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how)), None
-        return _lattice(layout, study, press_on, layouts)
+            scene = press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how))
+        else:
+            scene, highest = _lattice(layout, study, press_on, layouts)
+    return Task(
+        scene=scene,
+        approach=study.normal.approach,
+        load=study.normal.load,
+        highest_approach=highest,
+        stages=study.stages,
+        solver=named(study.solver.name),
+        influence=study.solver.influence,
+    )
 
 
 def _material(study: Study) -> Material:

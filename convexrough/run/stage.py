@@ -60,7 +60,7 @@ class Stage(FileTable):
 
     name       : name of the table
     frictional : True if it needs the table [friction]
-    numbers    : names of numbers in its summary that a sweep can measure
+    numbers    : names of the numbers in a row of its result
     labels     : keys that identify a row, where there are several rows
     """
 
@@ -206,17 +206,23 @@ class Result(Table, Plottable):
 
     def lines(self) -> list[str]:
         """The printed table, one string per line."""
-        cut = self.known[-MOST_PRINTED:] if self.steps else self.known
-        many = f"(the last {len(cut)} of {len(self.known)} rows; all are in {self.name}.csv)"
-        printed = self.headings()
-        said = [titled(self.title or self.name, printed, self.units)]
-        said += [many] if len(cut) < len(self.known) else []
-        said += aligned(
-            [list(printed.values()), *([row[key] for key in printed] for row in cut)],
-            digits=self.digits,
-        )
+        most = MOST_PRINTED if self.steps else len(self.known)
+        said = self.printed_table(self.name, self.known, self.headings(), self.title, most)
         proved = ", ".join(sorted(self.orders))
         return [*said, *([f"indentations increase with the load: {proved}"] if proved else [])]
+
+    def printed_table(
+        self, name: str, rows: list[Summary], printed: Mapping[str, str], title: str, most: int
+    ) -> list[str]:
+        """The lines of the last `most` rows of the table in NAME.csv, with a title and units."""
+        units = (f"{it} {unit}" for key, it in printed.items()
+                 if (unit := unit_of(key, self.units)))  # fmt: skip
+        named, cut = ", ".join(units), rows[-most:]
+        said = [f"{title or name}  ({named})" if named else title or name]
+        if len(cut) < len(rows):
+            said.append(f"(the last {len(cut)} of {len(rows)} rows; all are in {name}.csv)")
+        cells = [[row[key] for key in printed] for row in cut]
+        return [*said, *aligned([list(printed.values()), *cells], digits=self.digits)]
 
     def headings(self) -> Mapping[str, str]:
         """The headings of the printed columns, by key."""
@@ -308,9 +314,3 @@ def unit_of(name: str, units: UnitNames) -> str:
         "work": f"{force} {length}" if both else "",
         "stiffness": f"{force}/{length}" if both else "",
     }.get(KIND.get(name, ""), "")
-
-
-def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
-    """The title, followed by the units of the printed quantities, if the scene names units."""
-    named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
-    return f"{title}  ({', '.join(named)})" if named else title

@@ -44,7 +44,6 @@ def read_summits(
         path,
         required=("x", "y"),
         optional=("height", "tip_radius"),
-        also={"height": ("z", "h", "heights"), "tip_radius": ("radius",)},
         how=how,
     )
     columns = table.columns

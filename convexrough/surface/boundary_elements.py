@@ -11,18 +11,20 @@ gaps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from scipy import fft, ndimage
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
+from convexrough.influence.convolution import SiteBox
 from convexrough.record import Along, Table
 from convexrough.surface.surface import Surface
 
@@ -30,38 +32,34 @@ from convexrough.surface.surface import Surface
 STEPS, ACCURACY = 2000, 1e-4
 
 
-class HalfSpace:
-    """The operator from pressures on pixels to displacements at their centres, of both bodies.
+#: The operator from pressures on pixels to displacements [length] at their centres.
+HalfSpace = Callable[[Array], Array]
+
+
+def half_space(
+    shape: tuple[int, int], pixel: tuple[float, float], contact_modulus: float
+) -> HalfSpace:
+    """The operator of both bodies.
 
     A pixel of unit pressure displaces the surface by (1 / (pi E*)) times the integral of 1/r over
-    it, in the closed form of Love (1929). Fourier transforms on a grid twice as wide, which avoids
-    periodic images, compute the product.
+    it, in the closed form of Love (1929).
     """
 
-    def __init__(
-        self, shape: tuple[int, int], pixel: tuple[float, float], contact_modulus: float
-    ) -> None:
-        self.shape = shape
-        self.padded = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
-        steps = [np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded]
-        sizes = zip(steps, pixel[::-1], strict=True)
-        edges = [(np.arange(each.max() + 2) - 0.5) * size for each, size in sizes]
-        y, x = edges[0][:, None], edges[1]
+    def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
+        sides = zip((i, j), pixel[::-1], strict=True)
+        y, x = ((np.append(each, each[-1:] + 1) - 0.5) * size for each, size in sides)
+        y = y[:, None]
         corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # its d2/dxdy is 1/r
-        influence = np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)
-        # An even kernel has a real transform.
-        self.symbol = fft.rfft2(influence[np.ix_(*steps)], workers=1).real.copy()
+        return [np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)]
 
-    def displacement(self, pressure: Array) -> Array:
-        """[length] the displacements K p."""
-        (rows, columns), (down, across) = self.shape, self.padded
-        waves = fft.fft(fft.rfft(pressure, across, axis=1, workers=1), down, axis=0, workers=1)
-        waves *= self.symbol
-        lines = fft.ifft(waves, axis=0, overwrite_x=True, workers=1)[:rows]
-        return np.asarray(fft.irfft(lines, across, axis=1, workers=1)[:, :columns])
+    box = SiteBox(shape, np.diag(pixel[::-1]))
+    (kernel,) = box.kernels(influence, np.float64)
+    return partial(box.convolve, spectrum=kernel.spectrum)
 
 
-def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float = ACCURACY) -> Array:
+def touch(
+    displacement: HalfSpace, overlap: Array, start: Array, accuracy: float = ACCURACY
+) -> Array:
     """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
     The method of Polonsky and Keer (Wear 231, 1999) at a given approach: each step sets negative
@@ -71,7 +69,7 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
-    gap = half_space.displacement(pressure) - overlap
+    gap = displacement(pressure) - overlap
     direction = np.zeros_like(gap)
     previous = np.inf
     for _ in range(STEPS):
@@ -81,7 +79,7 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
         gradient = np.where(touching, gap, 0.0)
         square = float(np.vdot(gradient, gradient))
         direction = np.where(touching, gradient + square / previous * direction, 0.0)
-        change = half_space.displacement(direction)
+        change = displacement(direction)
         step = float(np.vdot(gradient, direction) / np.vdot(change, direction))
         trial = pressure - step * direction
         pressure = np.maximum(trial, 0.0)
@@ -89,7 +87,7 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
         pressure[entering] = -step * gap[entering]
         previous = np.inf if entering.any() else square
         if entering.any() or trial.min() < 0:
-            gap = half_space.displacement(pressure) - overlap
+            gap = displacement(pressure) - overlap
         else:
             gap -= step * change
     raise SolverError(
@@ -202,8 +200,8 @@ def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, flo
     checks.fits_in_memory("pixels of the map", inside.size, 200)
     pixel = (surface.pixel[0] * every, surface.pixel[1] * every)
     modulus = contact.scene.material.contact_modulus
-    half_space = HalfSpace((inside.shape[0], inside.shape[1]), pixel, modulus)
+    displacement = half_space((inside.shape[0], inside.shape[1]), pixel, modulus)
     width = max(inside.shape) * max(pixel)
     pressures = np.zeros_like(overlap)
-    pressures[box] = touch(half_space, inside, modulus * inside / width)
+    pressures[box] = touch(displacement, inside, modulus * inside / width)
     return pressures, float(pressures.sum()) * pixel[0] * pixel[1]

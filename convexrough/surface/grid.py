@@ -11,11 +11,8 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.tabular.table import Reading, read_table
-from convexrough.tabular.text import COMMENT, HOLES, TextTable, read_text_table
-
-#: Other names of the column of heights.
-HEIGHTS = ("z", "h")
+from convexrough.tabular.table import COLUMNS, Reading, matrix, read_table
+from convexrough.tabular.text import COMMENT, TextTable, read_text_table
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
@@ -47,37 +44,20 @@ def read_grid(path: Path) -> HeightGrid:
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
     """
-    table = read_text_table(path, ("x", "y", "height", *HEIGHTS), _COMMENT)
+    table = read_text_table(path, ("x", "y", "height", *COLUMNS["height"].also), _COMMENT)
     width = len(table.rows[0].cells) if table.rows else 0
     if table.header is None and width != 3:
-        return _said(table.comments, _numbers(path, table))
+        heights = matrix(path, table)
+        if min(heights.shape) > 2:
+            _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
+            _refuse_numbers(path, "column 1", heights[1:, 0], heights[1:, 1])
+        return _said(table.comments, heights)
     if table.header and len(table.header.cells) < 3 < width:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
         where = f"{path}: row {table.header.number}"
         found = repr(table.header.text[:60])
         raise InputError("text", found=found, expected=expected, where=where)
     return _from_list(path, table)
-
-
-def _numbers(path: Path, table: TextTable) -> Array:
-    """The numbers in all rows; empty cells, and texts such as BAD, are holes."""
-    rows: list[Array] = []
-    for row in table.rows:
-        where = f"{path}: row {row.number}"
-        cells = ["nan" if cell.lower() in HOLES else cell for cell in row.cells]
-        if (values := table.style.numbers(cells)) is None:
-            column = [table.style.number(cell) for cell in cells].index(None)
-            shown, where = repr(cells[column])[:60], f"{where}, column {column + 1}"
-            raise InputError("height", found=shown, expected="a number", where=where)
-        if rows and len(values) != len(rows[0]):
-            expected = f"{len(rows[0])}, as in the first row"
-            raise InputError("cells", found=len(values), expected=expected, where=where)
-        rows.append(values)
-    heights = np.array(rows)
-    if min(heights.shape) > 2:
-        _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
-        _refuse_numbers(path, "column 1", heights[1:, 0], heights[1:, 1])
-    return heights
 
 
 def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
@@ -122,7 +102,7 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 def _from_list(path: Path, cells: TextTable) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes."""
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
-                       also={"height": HEIGHTS}, holes=("height",),
+                       holes=("height",),
                        how=Reading(alike=False), table=cells)  # fmt: skip
     x, y, z = (table.columns[name] for name in ("x", "y", "height"))
     units = [table.units.get(name, "") for name in ("x", "y", "height")]

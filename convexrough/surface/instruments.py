@@ -12,12 +12,10 @@ from convexrough.errors import FileError, InputError
 from convexrough.surface.grid import HeightGrid
 
 
-def read_instrument(
-    path: Path, pixel: float | tuple[float, float] | None, unit: str | None
-) -> HeightGrid:
+def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
     """The default channel of heights in a file that SurfaceTopography can read.
 
-    pixel : used if the file does not state its size;  unit : not used
+    pixel : used if the file does not state its size
 
     Raises FileError if SurfaceTopography cannot read the file or is not installed.
     """
@@ -45,13 +43,6 @@ def read_instrument(
         raise InputError("file", found="a line scan", expected="a map", where=str(path))
     heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
     sizes = topography.physical_sizes
-    size = (
-        None
-        if sizes is None
-        else tuple(
-            float(length) / count for length, count in zip(sizes, heights.shape, strict=True)
-        )
-    )
-    return HeightGrid(
-        heights.T.copy(), size, str(topography.unit or ""), str(topography.unit or "")
-    )
+    size: Any = None if sizes is None else tuple(np.divide(sizes, heights.shape).tolist())
+    unit = str(topography.unit or "")
+    return HeightGrid(heights.T.copy(), size, unit, unit)

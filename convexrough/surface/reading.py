@@ -65,7 +65,7 @@ def read(
     (160.0, 160.0)
     """
     with blamed_on(path, unless_known=True):
-        grid = _grid(Path(path), pixel, unit)
+        grid = _grid(Path(path), pixel)
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)
         if upwards and not length:
@@ -123,7 +123,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
     return filled(heights), holes
 
 
-def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> HeightGrid:
+def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
     kind = path.suffix.lower()
     with reading(path):
         if kind in TEXT:
@@ -132,7 +132,7 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | Non
             return _arrays(path)
         from convexrough.surface.instruments import read_instrument  # slow to import
 
-        return read_instrument(path, pixel, unit)
+        return read_instrument(path, pixel)
 
 
 def _arrays(path: Path) -> HeightGrid:

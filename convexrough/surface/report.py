@@ -29,10 +29,6 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: Columns of summits.csv; a scene file reads x, y, height and tip_radius.
-COLUMNS = ("x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
-           "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations")  # fmt: skip
-
 #: Units of columns, from the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
@@ -132,7 +128,7 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
     """The columns of summits.csv, with units in its header; a scene file can read them."""
-    unit, columns = summits.origin.unit, summits.columns(*COLUMNS)
+    unit, columns = summits.origin.unit, summits.columns(*Summits._along["asperity",])
     named = {
         f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
         for name, values in columns.items()

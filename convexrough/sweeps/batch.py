@@ -10,8 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from convexrough.run.scene_file import Task
 from convexrough.sweeps.measures import FAILURES, Column, Measured, measured
-from convexrough.sweeps.scenes import Asked, Source
+from convexrough.sweeps.scenes import Source
 from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
@@ -54,7 +55,7 @@ def different(versions: Mapping[str, str]) -> str:
 def compute(batch: Batch) -> BatchRows:
     """The rows of a batch, each from its scene alone; the row of a failed scene has the error."""
     with one_thread:
-        ask, asked, rows = batch.source.opened(), dict[int, Asked](), dict[int, Row]()
+        ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
         for number in batch.numbers:
             try:
                 asked[number] = ask(number)
@@ -66,11 +67,11 @@ def compute(batch: Batch) -> BatchRows:
     return BatchRows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
 
 
-def _row(asked: Asked, known: Measured | None, columns: tuple[Column, ...]) -> Row:
+def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Row:
     """The row of one scene; `known` has its numbers if it was measured together with others."""
     try:
         wanted = {column.stage for column in columns}
-        found, unsure, warned = known or measured(asked.pressed(), asked.stages, wanted)
+        found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
         return _failed(error, columns)

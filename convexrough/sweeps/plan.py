@@ -26,18 +26,13 @@ TRIED = 5
 class Plan:
     """The computation of a sweep.
 
-    size     : scenes per batch and part;  left_out : stages without a measured number
-    identity : the SHA-256 of all input on which the numbers depend
-    said     : entries of the manifest on the origin of the sweep;  units : those of its file
+    size     : scenes per batch and part;  manifest : the contents of manifest.json
     """
 
     source: Source
     columns: tuple[Column, ...]
-    left_out: tuple[str, ...]
     size: int
-    identity: str
-    said: Mapping[str, Any]
-    units: UnitNames
+    manifest: Mapping[str, Any]
 
     @property
     def parts(self) -> int:
@@ -51,26 +46,6 @@ class Plan:
     def batch(self, part: range) -> Batch:
         return Batch(self.source.part(part), self.columns, part)
 
-    def manifest(self) -> dict[str, Any]:
-        """The contents of manifest.json; "each" counts scenes that differ only in the seed."""
-        grid = self.source.grid if isinstance(self.source, Tables) else None
-        labels = list(self.source.labels(range(0)))
-        numbers = {key: key for key in labels} | {it.name: it.number for it in self.columns}
-        return {
-            "schema": 2,
-            "version": __version__,
-            "sweep": self.identity,
-            "scenes": self.source.count,
-            "each": 1 if grid is None else grid.each,
-            "batch": self.size,
-            "columns": ["scene", *labels, "status", "message", *(it.name for it in self.columns)],
-            "drawn": [] if grid is None else [draw.key for draw in grid.draws],
-            "not_measured": list(self.left_out),
-            "units": {name: it for name, end in numbers.items() if (it := unit(end, self.units))},
-            **self.said,
-            "versions": VERSIONS,
-        }
-
 
 def planned(
     source: Source,
@@ -81,6 +56,7 @@ def planned(
 ) -> Plan:
     """The plan for scenes; the first one shows which numbers it has and how large batches may be.
 
+    said  : entries of the manifest on the origin of the sweep
     given : all input on which the numbers depend, except measures and version
 
     Raises InputError for an unknown measure, and the error of the first five scenes if all fail.
@@ -89,19 +65,34 @@ def planned(
     for number in range(tried):
         try:
             asked = ask(number)
-            contact, stages = asked.pressed(), asked.stages
-            columns = chosen(contact, stages, measures)
+            contact = asked.press()
+            columns = chosen(contact, asked.stages, measures)
             break
         except FAILURES as error:
             if number == tried - 1:
                 if isinstance(error, InputError) and not error.where:
                     raise error.within(str(said["source"])) from error
                 raise
-    used = {"normal", *(column.stage for column in columns)}
-    left_out = tuple(name for name in stages if name not in used)
     few = -(-source.count // LEAST_BATCHES)
     size = max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few))
     contents = {"version": __version__, "measure": list(measures), **given}
     text = json.dumps(contents, sort_keys=True, default=repr)
-    identity = hashlib.sha256(text.encode()).hexdigest()
-    return Plan(source, columns, left_out, size, identity, said, units)
+    grid = source.grid if isinstance(source, Tables) else None
+    labels = list(source.labels(range(0)))
+    numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
+    used = {"normal", *(column.stage for column in columns)}
+    manifest = {
+        "schema": 2,
+        "version": __version__,
+        "sweep": hashlib.sha256(text.encode()).hexdigest(),  # all on which the numbers depend
+        "scenes": source.count,
+        "each": 1 if grid is None else grid.each,  # scenes that differ only in the seed
+        "batch": size,
+        "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
+        "drawn": [] if grid is None else [draw.key for draw in grid.draws],
+        "not_measured": [name for name in asked.stages if name not in used],
+        "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
+        **said,
+        "versions": VERSIONS,
+    }
+    return Plan(source, columns, size, manifest)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from convexrough.record import rows_of
 from convexrough.run.results import results_folder, write_figures, write_tables
 from convexrough.run.stage import Summary
 from convexrough.run.summary import headed
@@ -54,7 +57,7 @@ def describe(summary: Summary) -> list[str]:
 def describe_quantiles(found: Columns) -> list[str]:
     """The printed table of the first quantiles."""
     heads = [f"{float(name):.0%}" if name[0] in "01" else name for name in found]
-    rows = list(zip(*(values.tolist() for values in found.values()), strict=True))
+    rows = [list(row.values()) for row in rows_of(found)]
     lines = aligned([heads, *rows[:MOST_ROWS]], left=heads.index("quantity") + 1)
     if len(rows) > MOST_ROWS:
         lines.append(f"and {len(rows) - MOST_ROWS:,} more rows: --out DIR writes all of them")
@@ -63,24 +66,22 @@ def describe_quantiles(found: Columns) -> list[str]:
 
 def failures(table: SweepTable) -> list[str]:
     """The messages of the first scenes that failed."""
-    named: list[str] = []
-    for block in table.blocks(["scene", "status", "message"]):
-        for row in np.flatnonzero(block["status"] == "failed")[: MOST_NAMED - len(named)]:
-            named.append(f"scene {block['scene'][row]}: {block['message'][row]}")
-    return named
+    return list(islice(_messages(table, "failed"), MOST_NAMED))
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """A warning with the number of computed scenes that have a message; [] without any."""
-    count, first = 0, ""
+    """A warning with the number of certified scenes that have a message; [] without any."""
+    said = _messages(table, "certified")
+    first, count = next(said, ""), 1 + sum(1 for _ in said)
+    warned = f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
+    return [warned] if first else []
+
+
+def _messages(table: SweepTable, status: str) -> Iterator[str]:
+    """The messages of the scenes with this status."""
     for block in table.blocks(["scene", "status", "message"]):
-        rows = np.flatnonzero((block["status"] == "certified") & (block["message"] != ""))
-        if len(rows) and not count:
-            first = f"scene {block['scene'][rows[0]]}: {block['message'][rows[0]]}"
-        count += len(rows)
-    if not count:
-        return []
-    return [f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"]
+        for row in np.flatnonzero((block["status"] == status) & (block["message"] != "")):
+            yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
 def write_summary(

@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact, solve
 from convexrough.errors import SceneFileError
-from convexrough.influence import Kind
-from convexrough.normal.problem import NormalProblem
-from convexrough.run.scene_file import READ, Layouts, build_scene
+from convexrough.run.scene_file import READ, Layouts, Task, task_of
 from convexrough.scene.scene import Scene
-from convexrough.solvers import named
+from convexrough.solvers import Newton
 from convexrough.sweeps.grid import Grid
 from convexrough.sweeps.measures import Stages
 
@@ -29,40 +26,8 @@ if TYPE_CHECKING:
 KEPT = 8
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A scene, its prescribed approach or load, and the stages to compute.
-
-    approach [length], load [force], solver, influence, highest : as in `SceneFile`
-    """
-
-    scene: Scene
-    approach: float | None
-    load: float | None
-    stages: Stages
-    solver: str = "newton"
-    influence: Kind | None = None
-    highest: float | None = None
-
-    @property
-    def plain(self) -> bool:
-        """True if the solver and the compliance operator are the defaults of `press`."""
-        return self.solver == "newton" and self.influence in (None, "dense")
-
-    def pressed(self) -> Contact:
-        """The contact. Raises the errors of `press`."""
-        problem = NormalProblem.assemble(
-            self.scene,
-            approach=self.approach,
-            load=self.load,
-            influence=self.influence,
-            highest=self.highest,
-        )
-        return solve(problem, named(self.solver))
-
-
 #: A function from the number of a scene to the scene and its stages.
-Ask = Callable[[int], Asked]
+Ask = Callable[[int], Task]
 
 #: The entry of the column `seed` if nothing is random.
 NO_SEED = -1
@@ -102,19 +67,8 @@ class Tables:
         layouts = Layouts(*map(lru_cache(KEPT), READ))
         last: dict[str, Any] = {}
 
-        def ask(number: int) -> Asked:
-            study = self._study(number, last)
-            scene, highest = build_scene(self.path, study, layouts)
-            normal, solver = study.normal, study.solver
-            return Asked(
-                scene,
-                normal.approach,
-                normal.load,
-                study.stages,
-                solver.name,
-                solver.influence,
-                highest,
-            )
+        def ask(number: int) -> Task:
+            return task_of(self.path, self._study(number, last), layouts)
 
         return ask
 
@@ -164,11 +118,13 @@ class Objects:
         return replace(self, scenes=scenes, controls=controls, first=numbers.start)
 
     def opened(self) -> Ask:
-        def ask(number: int) -> Asked:
+        def ask(number: int) -> Task:
             scene = self.scenes[number - self.first]
             control = float(self.controls[number - self.first])
             approach, load = (None, control) if self.by_load else (control, None)
-            return Asked(scene, approach, load, self.stages)
+            return Task(
+                scene=scene, approach=approach, load=load, stages=self.stages, solver=Newton()
+            )
 
         return ask
 

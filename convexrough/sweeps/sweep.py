@@ -122,7 +122,7 @@ def run(
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:
-        folder = make_folder(Path(out), plan.manifest(), overwrite=overwrite)
+        folder = make_folder(Path(out), plan.manifest, overwrite=overwrite)
         todo, found = folder.missing(todo, resume)
         LOGGER.info(found)
     count = sum(map(len, todo))
@@ -138,7 +138,7 @@ def run(
     joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     order = np.argsort(joined["scene"])
     rows = {name: values[order] for name, values in joined.items()}
-    return Done(SweepTable(plan.manifest(), None, rows), found, count, seconds)
+    return Done(SweepTable(plan.manifest, None, rows), found, count, seconds)
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
@@ -152,7 +152,7 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
     if (count := (stop - first) * plan.size) > MOST:
         expected = f"at most {MOST:,} at once: compute the sweep in parts (K/N)"
-        where = str(plan.said["source"])
+        where = str(plan.manifest["source"])
         raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
     return [plan.part(number) for number in range(first, stop)]
 

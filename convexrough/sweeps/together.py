@@ -12,11 +12,11 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.plausibility import cautions_about
 from convexrough.rows import PressedRows, in_rows
+from convexrough.run.scene_file import Task
 from convexrough.run.stages import CycleStage
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth_reference
 from convexrough.sweeps.measures import FAILURES, Column, Measured, Numbers, row_label
-from convexrough.sweeps.scenes import Asked
 
 #: Arrays along the rows, by the names of `Contacts` or `Cycles`.
 Found = Mapping[str, Array]
@@ -52,20 +52,17 @@ CYCLE: dict[str, Callable[[Found], Array]] = {
 KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYCLE}
 
 
-def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> dict[int, Measured]:
+def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
     """The numbers of the scenes that are proved in rows, by the numbers of the scenes."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}
     for number, each in asked.items():
         cycle = _cycle(each, columns)
-        if each.plain and not (cycle and each.scene.friction is None):
-            key = (
-                len(each.scene),
-                each.load is not None,
-                len(cycle.maximum_fraction) if cycle else 0,
-            )
-            groups.setdefault(key, []).append(number)
+        usual = each.solver.name == "newton" and each.influence in (None, "dense")
+        if usual and not (cycle and each.scene.friction is None):
+            ends = len(cycle.maximum_fraction) if cycle else 0
+            groups.setdefault((len(each.scene), each.load is not None, ends), []).append(number)
     found: dict[int, Measured] = {}
     for (_, by_load, _), numbers in groups.items():
         some = [asked[number] for number in numbers]
@@ -80,14 +77,14 @@ def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> 
     return found
 
 
-def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
+def _cycle(asked: Task, columns: Sequence[Column]) -> CycleStage | None:
     stage = asked.stages.get("cycle")
     wanted = any(column.stage == "cycle" for column in columns)
     return stage if wanted and isinstance(stage, CycleStage) else None
 
 
 def _known(
-    rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
+    rows: PressedRows, asked: Sequence[Task], columns: Sequence[Column]
 ) -> dict[int, Measured]:
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)

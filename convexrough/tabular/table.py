@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,16 +21,28 @@ from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
 from convexrough.tabular.text import HOLES, WORKBOOKS, TextTable, bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
-#: The quantity that each column measures.
-KINDS = {
-    **dict.fromkeys(("x", "y", "height", "tip_radius"), "length"),
-    **dict.fromkeys(("load", "force"), "force"),
-    "pressure": "pressure",
-    "area": "area",
-}
 
-#: Columns of positive numbers.
-POSITIVE = ("tip_radius",)
+class Column(NamedTuple):
+    """A known column: the quantity that it measures, "" for text, and its other names."""
+
+    kind: str = "length"
+    also: tuple[str, ...] = ()
+    positive: bool = False
+
+
+#: The known columns.
+COLUMNS = {
+    "x": Column(),
+    "y": Column(),
+    "height": Column(also=("z", "h", "heights")),
+    "tip_radius": Column(also=("radius",), positive=True),
+    "load": Column("force"),
+    "force": Column("force"),
+    "pressure": Column("pressure"),
+    "area": Column("area"),
+    "status": Column(""),
+    "contact": Column(""),
+}
 
 #: Names of columns with row numbers.
 INDEX = (
@@ -140,9 +153,7 @@ def read_table(
     *,
     required: Sequence[str],
     optional: Sequence[str] = (),
-    text: Sequence[str] = (),
     instead: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    also: Mapping[str, Sequence[str]] = MappingProxyType({}),
     holes: Sequence[str] = (),
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
@@ -150,25 +161,21 @@ def read_table(
 ) -> ReadTable:
     """Columns of a file by known names. The numbers of other columns are not checked.
 
-    required, optional, text : names of columns; those in `text` are optional and read as text
+    required, optional : names of columns, all of them in `COLUMNS`
     instead : columns that replace a required one if the file has the first of them
-    also  : other names of columns;  holes : columns in which `HOLES` are read as nan
+    holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
     table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
-    wanted = (*required, *optional, *text, *(each for names in instead.values() for each in names))
+    wanted = (*required, *optional, *(each for names in instead.values() for each in names))
     known = [*wanted, *INDEX[:-1], *(each.lower() for each in how.columns.values())]
     with reading(path):
         source = _source(path, known) if table is None else _text_source(path, table)
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
-    for name, names in also.items():
-        known = [bare(each).lower() for each in source.header or []]
-        if name not in places and (there := [each for each in names if each in known]):
-            places[name] = known.index(there[0])
     for name, others in instead.items():
         if name not in places and others[0] in places:
             required = [each for each in required if each != name]
@@ -185,19 +192,20 @@ def read_table(
         for each in missing
         if each not in how.columns
     ]
-    mistakes += _lookalikes(source, places, [*missing, *optional])
+    measured = (name for name in optional if COLUMNS[name].kind)
+    mistakes += _lookalikes(source, places, [*missing, *measured])
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
     names = source.header or [""] * len(source.columns)
     units = {name: said for name, place in places.items() if (said := unit(names[place]))}
-    factors, wrong = _factors([name for name in places if name in KINDS], units, how)
+    factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
     mistakes += wrong
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
-        if name in text:
+        if not COLUMNS[name].kind:
             read[name] = np.array([str(cell) for cell in cells])
         else:
             numbers = _numbers(name, cells, source, mistakes, name in holes)
@@ -217,13 +225,24 @@ def read_table(
     )
 
 
+def matrix(path: Path, table: TextTable) -> Array:
+    """The numbers of a table without a header; `HOLES` are nan. Raises TableError."""
+    source, mistakes = _text_source(path, table), list[str]()
+    columns = [
+        _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
+    ]
+    if mistakes := [*mistakes, *source.mistakes]:
+        raise TableError(str(path), few(mistakes))
+    return np.column_stack(columns)
+
+
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
     first: dict[str, tuple[str, Unit]] = {}
     for name in names:
-        kind, said, place = KINDS[name], units.get(name, ""), f"column {name}"
+        kind, said, place = COLUMNS[name].kind, units.get(name, ""), f"column {name}"
         scene = how.units.unit(kind)
         if name in how.scales and (scene is None or not said):
             continue
@@ -256,7 +275,7 @@ def _factors(
             mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
                             f"1 {said} is {factor:.15g} {scene.name}: {advice}")  # fmt: skip
     for name in names:
-        there = first.get(KINDS[name])
+        there = first.get(COLUMNS[name].kind)
         if there and there[0] in factors and name not in units and name not in how.scales:
             mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
     return factors, mistakes
@@ -288,14 +307,14 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
 def _text_source(path: Path, table: TextTable) -> _Source:
     header = table.header.cells if table.header else None
     named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
-    width = len(header) if header else max(len(row.cells) for row in table.rows)
+    counts = [len(row.cells) for row in table.rows]
+    width = len(header) if header else Counter(counts).most_common(1)[0][0]
     mistakes, whole = [], []
     for row in table.rows:
         if what := row.wrong or _misfit(row.cells, width, header):
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
-    counts = [len(row.cells) for row in table.rows]
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
     if table.style.separator == "," and doubled and pointless:
@@ -361,6 +380,8 @@ def _places(
                 break
         else:
             if name not in columns:
+                if others := [each for each in COLUMNS[name].also if each in lowered]:
+                    places[name] = lowered.index(others[0])
                 continue
             if called.isdecimal() and 1 <= int(called[:9]) <= len(names):
                 places[name] = int(called) - 1
@@ -392,21 +413,24 @@ def _numbers(
     name: str, cells: Sequence[Any], source: _Source, mistakes: list[str], holes: bool
 ) -> Array:
     """The numbers of a column; wrong cells are added to `mistakes`."""
+    if holes:
+        cells = ["nan" if str(cell).lower() in HOLES else cell for cell in cells]
+    positive = COLUMNS.get(name, Column()).positive
     if (plain := source.numbers(cells)) is not None:
         sizes = np.abs(plain)
         fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
-        if (fine & (plain > 0) if name in POSITIVE else fine).all():
+        fine |= np.isnan(plain) & holes
+        if (fine & (plain > 0) if positive else fine).all():
             return plain
     if not any(map(str, cells)):
         saved = "formulas are, until a spreadsheet program saves their values"
         mistakes.append(f"column {name}: found only empty cells, expected numbers; {saved}")
         return np.full(len(cells), np.nan)
-    check = checks.positive if name in POSITIVE else checks.finite
+    check = checks.positive if positive else checks.finite
     numbers = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
         number = source.number(cell)
-        unknown = str(cell).lower() in HOLES or (number is not None and math.isnan(number))
-        if holes and unknown:
+        if holes and (cell == "nan" or (number is not None and math.isnan(number))):
             continue
         place = f"{source.rows[i]}, column {name}"
         try:

@@ -53,44 +53,6 @@ def test_two_bodies(tmp_path: Path) -> None:
     assert read(tmp_path, material=TWO).scene.material == cr.Material.pair(steel, soft)
 
 
-@pytest.mark.parametrize("radius", ["inf", "[inf, 1.0]"])
-@pytest.mark.parametrize("normal", ["approach = 5e-5", "load = 1e-7"])
-def test_a_base_without_an_end_needs_an_extent(tmp_path: Path, radius: str, normal: str) -> None:
-    with pytest.raises(cr.InputError, match=r"\[asperities\] within: missing, needed with a flat"):
-        read(tmp_path, radius, asperities=HEXAGONAL, normal=normal)
-
-
-WRONG = [
-    ({"radius": "[1.0, -2.0]"}, "[sphere] radius[1]: found -2.0, expected a positive number, or"),
-    ({"radius": "1e99"}, "[sphere] radius: found 1e+99, expected a size from"),
-    (
-        {"material": f"contact_modulus = 1.0\n{TWO}"},
-        "[material] contact_modulus: not used with two bodies",
-    ),
-    (
-        {"material": TWO.replace("70e3", "-70e3")},
-        "[material] base.youngs_modulus: found -70000.0, expected a positive number",
-    ),
-    (
-        {"material": TWO.replace("hardness", "hardnes")},
-        '[material] sphere.hardnes: unknown key, did you mean "hardness"?',
-    ),
-    ({"material": TWO[: TWO.index("[material.base]")]}, "[material] base: missing"),
-    (
-        {"material": TWO.replace("poisson_ratio = 0.33\n", "")},
-        "[material] base.poisson_ratio: missing",
-    ),
-    ({"material": "sphere = 3\nbase = 4\n"}, "[material] sphere: found 3, expected a table"),
-]
-
-
-@pytest.mark.parametrize(("given", "message"), WRONG)
-def test_mistakes(tmp_path: Path, given: dict[str, str], message: str) -> None:
-    with pytest.raises(cr.InputError) as caught:
-        read(tmp_path, **given)
-    assert message in str(caught.value)
-
-
 STAGES = """[friction]
 coefficient = 0.5
 [shear]

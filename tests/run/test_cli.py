@@ -248,32 +248,9 @@ def test_nothing_is_solved_while_writing_or_drawing(
     assert (tmp_path / "a-results" / "hysteresis.png").exists()
 
 
-# Every line of what counts as bad input, through the command.
+# Bad input
 
 SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
-LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
-
-
-@pytest.mark.parametrize(
-    ("scene", "expected"),
-    [
-        (scene_text(LATTICE.format("nan", 1)), "[asperities] spacing: found nan"),
-        (scene_text(more="[sheer]\nx = 1"), '[sheer]: unknown table, did you mean "shear"?'),
-        (scene_text()[:-30], "a.toml: "),
-        (scene_text(LATTICE.format(1e-9, 1)), "within / spacing = 1.41e+07: found 7.26e+14"),
-        (scene_text(LATTICE.format(0.0025, 1), "approach = 0.1", '[solver]\ninfluence = "dense"'),
-         "asperities that could touch"),
-        (scene_text(more='[solver]\ninfluence = "fft"'), "[solver] influence: found 'fft'"),
-    ],
-)  # fmt: skip
-def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> None:
-    (tmp_path / "a.toml").write_text(scene)
-    outcome = command("run", "a.toml")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert expected in outcome.err
-    for line in outcome.err.splitlines():
-        assert line.startswith("convexrough: error: a.toml: ")
-    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "a.toml"]
 
 
 def test_bad_loads(command: Any, tmp_path: Path) -> None:

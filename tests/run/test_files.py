@@ -27,14 +27,6 @@ def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
     return read_scene(path)
 
 
-def mistakes(tmp_path: Path, *parts: str, **tables: str) -> list[str]:
-    with pytest.raises(cr.InputError) as caught:
-        read(tmp_path, *parts, **tables)
-    return [
-        line.removeprefix(f"{tmp_path / 'scene.toml'}: ") for line in str(caught.value).split("\n")
-    ]
-
-
 def small_scene() -> cr.Scene:
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025, tip_radius=0.02, within=0.006, height_std=1e-6, tip_radius_cv=0.1, seed=2
@@ -45,121 +37,6 @@ def small_scene() -> cr.Scene:
 @pytest.fixture(scope="module")
 def contact() -> cr.Contact:
     return cr.press(small_scene(), approach=2e-5)
-
-
-# Scene files
-
-
-@pytest.mark.sample(6)
-@pytest.mark.parametrize(
-    ("asperities", "expected"),
-    [
-        ("spacing = -0.1", "spacing: found -0.1, expected a positive number"),
-        ("spacing = nan", "spacing: found nan, expected a positive number"),
-        ("spacing = true", "spacing: found true, expected a positive number"),
-        ("spacing = 1e-61", "spacing: found 1e-61, expected a size from 1e-60 to 1e+60"),
-        ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
-        ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
-        ("spacing = 1\ntip_radius = [1, -2]", "tip_radius[1]: found -2, expected a positive"),
-        ("spacing = 1\nheight_std = 1", "seed: missing, needed with height_std"),
-        (
-            "spacing = 1\ntip_radius_cv = 10\nseed = 1",
-            "tip_radius_cv: found 10, expected a standard deviation over the mean",
-        ),
-        ("spacing = 1\nseed = 1.5", "seed: found 1.5, expected a whole number"),
-        ("spacing = 1\nwithin = -1", "within: found -1, expected a number that is not negative"),
-        ("spacing = 1\ngeometry = 3", 'geometry: found 3, expected "summit" or "closest"'),
-        ('spacing = 1\npath = "a.csv"', "path: not used with this pattern"),
-        ("", "spacing: missing"),
-    ],
-)
-def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
-    text = 'pattern = "hexagonal"\n' + asperities
-    if "tip_radius = " not in text:
-        text += "\ntip_radius = 0.02"
-    (line,) = mistakes(tmp_path, text)
-    assert line.startswith(f"[asperities] {expected}")
-
-
-PRESSED = "approach = 1e-5"
-FRICTION = "[friction]\ncoefficient = 1\n"
-
-
-@pytest.mark.sample(6)
-@pytest.mark.parametrize(
-    ("normal", "more", "expected"),
-    [
-        ("", "", "[normal] approach, load: found neither, expected exactly one of the two"),
-        ("approach = 1\nload = 1", "", "[normal] approach, load: found both, expected exactly"),
-        ("load = 0", "", "[normal] load: found 0, expected a positive number"),
-        ("approach = nan", "", "[normal] approach: found nan, expected a finite number"),
-        (PRESSED, "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
-        (PRESSED, "[sweep]", "[sweep]: many scenes, which `convexrough sweep` computes"),
-        (PRESSED, "[shear]\nfractions = [0.1]", "[friction]: missing table, needed with [shear]"),
-        (PRESSED, FRICTION + "[shear]\nfractions = [0.1, -0.1]",
-         "[shear] fractions[1]: found -0.1, expected a number from 0 to 1"),
-        (PRESSED, FRICTION + "[shear]\nfractions = []",
-         "[shear] fractions: found [], expected a list of numbers from 0 to 1"),
-        (PRESSED, FRICTION + "[history]\nfractions = [1.1]",
-         "[history] fractions[0]: found 1.1, expected a number from -1 to 1"),
-        (PRESSED, FRICTION + "[cycle]\nmaximum_fraction = [0.1, 0.2]\nminimum_fraction = [0]",
-         "[cycle] minimum_fraction: found 1 values, expected 2, as in maximum_fraction"),
-        (PRESSED, FRICTION + "[cycle]\nmaximum_fraction = [0.1]\nminimum_fraction = [0.1]",
-         "[cycle] maximum_fraction[0]: found 0.1, expected a number above its minimum, 0.1"),
-        (PRESSED, "[solver]\nname = 'newtn'", "[solver] name: found 'newtn', expected one of"),
-        (PRESSED, "[units]\nlength = 1", "[units] length: found 1, expected text in quotes"),
-    ],
-)  # fmt: skip
-def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) -> None:
-    (line,) = mistakes(tmp_path, normal=normal, more=more)
-    assert line.startswith(expected)
-
-
-def test_a_phase_in_degrees(tmp_path: Path) -> None:
-    more = "[friction]\ncoefficient = 1\n[steady]\nphases = [3.1416, 180.0]\n"
-    more += "ellipse = {load = 1.0, force_amplitude = 0.1, phase = 90}"
-    expected = "expected a phase in radians, from -pi to pi; 90 degrees are 1.5708"
-    assert sorted(mistakes(tmp_path, normal="approach = 1e-5", more=more)) == [
-        f"[steady] ellipse.phase: found 90, {expected}",
-        f"[steady] phases[1]: found 180.0, {expected}",
-    ]
-
-
-def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text("r = 1\n[sphere]\nradius = -1\n[material]\npoisson_ratio = 0.6\n[normal]\n")
-    with pytest.raises(cr.InputError) as caught:
-        read_scene(path)
-    lines = str(caught.value).splitlines()
-    assert all(line.startswith(f"{path}: ") for line in lines)
-    places = [line.removeprefix(f"{path}: ").split(":")[0] for line in lines]
-    assert places == [
-        "r",
-        "[sphere] radius",
-        "[material] poisson_ratio",
-        "[material] contact_modulus, youngs_modulus",
-        "[normal] approach, load",
-        "[asperities]",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        (b"", "empty"),
-        (b"# nothing\n", "empty"),
-        (b"[sphere]\nradius = \n", "line 2, column 10"),
-        (b"[sphere\n", "line 1"),
-        (b"\xff\xfe[sphere]", "not UTF-8"),
-        (b"a = " + b"[" * 5000, "not a TOML file"),
-        (b"a = " + b"9" * 5000, "not a TOML file"),
-    ],
-)
-def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    with pytest.raises(cr.FileError, match=expected):
-        read_scene(path)
 
 
 # What `within` is when the file does not say

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
@@ -63,25 +62,6 @@ def test_what_is_written_and_printed(command: Any) -> None:
     assert "by height" not in lines
     assert lines["by friction"] == "0"
     assert lines["by tip_radius"].startswith("up to ")
-
-
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
-        ('of = "los"', "of: found 'los', expected one of: loss, displacement, approach, load"),
-        ('of = "loss"', "fraction: missing, needed with the loss"),
-        ('of = "load"\nfraction = 0.1', "fraction: found 0.1, expected none with the load"),
-        ('of = "loss"\nfraction = 2.0', "expected a number from 0 to 1"),
-        ('of = "load"\nby = ["height"]', "expected a list of some of: heights, tip_radii"),
-        ('of = "load"\nby = []', "by: found [], expected a list of some of: heights, tip_radii"),
-        ('of = "load"\nholding = "gap"', 'expected "load" or "approach"'),
-    ],
-)
-def test_mistakes(command: Any, table: str, said: str) -> None:
-    write(f"[gradient]\n{table}\n")
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 2
-    assert said in outcome.err
 
 
 def test_where_there_is_none(command: Any) -> None:

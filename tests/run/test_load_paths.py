@@ -104,38 +104,6 @@ def test_factors_of_amplitudes_count_in_the_largest_load(tmp_path: Path) -> None
     assert cr.read_scene(file).stages["steady"].highest_load == pytest.approx(5e-7)
 
 
-VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ("[path]\nloads = [1e-7]\n", "[path] loads, forces: missing"),
-        ("[path]\nloads = [1e-7]\nforces = [0.0, 0.0]\n", "found 1 and 2 values"),
-        ("[path]\nloads = [-1e-7]\nforces = [0.0]\n", "expected a number that is not negative"),
-        ("[path]\nloads = [1e-7]\nforces = [1e-7]\n", "[path]: forces[0]"),
-        ("[steady]\nloads = []\nforces = []\n", "at least one"),
-        ("[shakedown]\nloads = 1e-7\nforce_amplitudes = [0.0]\n", "expected a path that moves"),
-        (
-            '[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"\n',
-            '"exact", "elastic" or "v',
-        ),
-        (
-            "[shakedown]\nloads = 1\nforce_amplitudes = [[1, 0]]\n",
-            "expected a number with this kin",
-        ),
-        (f"{VECTOR}[1.0, -1]\n", "force_amplitudes[0]: found 1.0, expected a pair [x, y]"),
-        (f"{VECTOR}[[1, 0]]\nforces = 0.1\n", "forces: found 0.1, expected a pair [x, y]"),
-        (f"{VECTOR}[[1, 0, 0]]\n", "expected a pair [x, y] of finite numbers"),
-    ],
-)
-def test_mistakes(command: Any, table: str, message: str) -> None:
-    Path("scene.toml").write_text(SCENE + table)
-    outcome = command("run", "scene.toml", "--no-figures")
-    assert outcome.status == 2
-    assert message in outcome.err
-
-
 @pytest.mark.parametrize(
     ("kind", "amplitudes", "factor"),
     [

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
@@ -55,26 +54,6 @@ def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) 
     assert said["inputs"] == {"a.toml": digest}
     assert (said["seed"], said["version"]) == (7, cr.__version__)
     assert said["versions"]["numpy"] == np.__version__
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ("loop_points = 3", "[cycle] loop_points: found 3, expected a whole number, at least 4"),
-        ('loop_asperities = "some"', "[cycle] loop_asperities: found 'some', expected \"all\" or"),
-        ("loop_asperities = [-1]", "[cycle] loop_asperities"),
-        (
-            "loop_asperities = [61]",
-            "[cycle] loop_asperities[0]: found 61, expected an index from 0",
-        ),
-    ],
-)
-def test_wrong_loops(command: Any, tmp_path: Path, asked: str, said: str) -> None:
-    more = FRICTION + f"[cycle]\nmaximum_fraction = [0.5]\n{asked}"
-    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102", more=more))
-    outcome = command("run", "a.toml")
-    assert outcome.status == 2
-    assert said in outcome.err
 
 
 # Plausibility: a warning with its numbers, never an error.

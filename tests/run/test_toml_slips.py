@@ -88,7 +88,6 @@ def test_a_thousand_mistakes_are_counted(tmp_path: Path) -> None:
 
 STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
 STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
-SHAKEDOWN = '[friction]\ncoefficient = 0.5\n[shakedown]\nloads = 1e-8\nkind = "elastic"\n'
 
 
 def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any) -> None:
@@ -98,12 +97,3 @@ def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any)
     outcome = command("run", "a.toml", "--no-figures")
     assert outcome.status == 3
     assert "nan" not in outcome.out
-
-
-@pytest.mark.parametrize("kind", ["elastic", "exact"])
-def test_a_shakedown_of_no_amplitudes(tmp_path: Path, command: Any, kind: str) -> None:
-    text = SHAKEDOWN.replace("elastic", kind) + "force_amplitudes = []\n"
-    (tmp_path / "a.toml").write_text(scene_text(more=text))
-    outcome = command("run", "a.toml", "--no-figures")
-    assert outcome.status == 2
-    assert "force_amplitudes: found none, expected a path that moves" in outcome.err

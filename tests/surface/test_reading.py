@@ -143,8 +143,16 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         ("# Height: 7 µm\n" + matrix(), {"pixel": 1.0, "unit": "mm"}, "comments: found only a hei"),
         ("# Width: 9 m\n# Height: 7 m\n" + matrix(), {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
         ("# Value units: V\n" + matrix(), {"pixel": 1.0, "unit": "m"}, "height_unit: found 'V'"),
-        (matrix().replace("\n", "\nx ", 1), {"pixel": 1.0}, "row 2, column 1: height: found 'x'"),
-        (matrix() + "1 2\n", {"pixel": 1.0}, "row 8: cells: found 2, expected 9, as in the first"),
+        (
+            matrix().replace("\n", "\nx", 1),
+            {"pixel": 1.0},
+            "row 2, column 1: found 'x",
+        ),
+        (
+            matrix() + "1 2\n",
+            {"pixel": 1.0},
+            "row 8: found 2 cells, expected 9, as in most rows: 1 2",
+        ),
         ("a b c\n" + matrix(), {"pixel": 1.0}, "columns: found a, b, c, expected a column 'x'"),
         (
             "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",

@@ -69,7 +69,7 @@ def test_draws_belong_to_the_seed_alone() -> None:
     ],
 )
 def test_whatever_numbers_depend_on_is_in_the_hash(changed: dict[str, Any]) -> None:
-    assert plan(changed).identity != plan(SMALL).identity
+    assert plan(changed).manifest["sweep"] != plan(SMALL).manifest["sweep"]
 
 
 def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) ->
     identities = set()
     for x in (0.0, 1e-4):
         (tmp_path / "a.csv").write_text(f"x,y,tip_radius\n{x},0.0,0.02\n")
-        identities.add(plan_of(contents, tmp_path / "sweep.toml").identity)
+        identities.add(plan_of(contents, tmp_path / "sweep.toml").manifest["sweep"])
     assert len(identities) == 2
 
 

@@ -221,6 +221,8 @@ READ: dict[str, tuple[Any, ...]] = {
     "areas of 0 without pressure": (
         lambda case: {name: [*each, 0.0] for name, each in tributary(case).items()},),
     "nodal forces": (patches, "a.csv", "--nodes"),
+    "columns that differ in case": (
+        lambda case: case.table(Load=2 * case.loads[case.order]), "a.csv", "--column load=load"),
     "another unit, scaled": (
         lambda case: case.table("x y load\xa0[mN]",
                                 **{"load\xa0[mN]": 1e3 * case.loads[case.order]}),
@@ -239,7 +241,18 @@ def headed(header: str, scale: float = 1.0) -> Callable[[Case], Columns]:
     return made
 
 
-#: What a file holds; its name, or ""; and all that is said.
+def moved(change: Callable[[Any, Any], Any]) -> Callable[[Case], Columns]:
+    """Nodes at other places, where every node is near some asperity all the same."""
+
+    def made(case: Case) -> Columns:
+        nodes = patches(case)
+        x, y = change(nodes["x"], nodes["y"])
+        return nodes | {"x": x, "y": y}
+
+    return made
+
+
+#: What a file holds; its name and the options it is read with, or ""; and all that is said.
 REFUSED: dict[str, tuple[Any, ...]] = {
     "x in mm": (headed("x\xa0[mm] y\xa0[mm] load"), "",
                 "column x: found mm, expected m", "--scale x=0.001"),
@@ -303,6 +316,14 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         "", "row 14643: found a load at [0.01, 0.0]"),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
+    "nodes in km": (moved(lambda x, y: (1e-3 * x, 1e-3 * y)), "a.csv --nodes",
+                    "found them 10^-3 times as far out"),
+    "nodes mirrored": (moved(lambda x, y: (-x, y)), "a.csv --nodes",
+                       "x has the other sign: --scale x=-1"),
+    "nodes exchanged": (moved(lambda x, y: (y, x)), "a.csv --nodes",
+                        "x and y are exchanged, or the array is turned: --column x=y --c"),
+    "columns that differ in case": (lambda case: case.table(Load=case.loads), "",
+                                    "found 'load' and 'Load', expected one of them: --column"),
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",
                 "all are shifted by [0.0003, 0]"),
     "loaded nodes only": (lambda case: touching(case, case.table()), "",
@@ -352,7 +373,8 @@ REFUSED: dict[str, tuple[Any, ...]] = {
 
 #: One cause is all there is to say.
 MOVED = ("x and y exchanged", "x mirrored", "shifted", "places in mm", "places in km",
-         "pixels in mm", "pixels shifted")  # fmt: skip
+         "pixels in mm", "pixels shifted", "nodes in km", "nodes mirrored",
+         "nodes exchanged")  # fmt: skip
 
 
 @pytest.mark.sample(8)
@@ -370,8 +392,9 @@ def test_read_right(tmp_path: Path, command: Any, case: Case, name: str) -> None
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("name", REFUSED)
 def test_refused_with_the_cause(tmp_path: Path, command: Any, case: Case, name: str) -> None:
-    make, file, *causes = REFUSED[name]
-    outcome = command("verify", "scene.toml", put(tmp_path, make(case), file or "loads.csv"))
+    make, read, *causes = REFUSED[name]
+    file, *options = (read or "loads.csv").split()
+    outcome = command("verify", "scene.toml", put(tmp_path, make(case), file), *options)
     assert (outcome.status, outcome.out) == (2, "")
     assert all(cause in outcome.err for cause in causes), outcome.err
     assert len(outcome.err.splitlines()) <= (1 if name in MOVED else 11)
@@ -403,35 +426,6 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
 # Units
 
 UM = {"X (µm)": 1e6 * PLACES[:, 0], "Y (µm)": 1e6 * PLACES[:, 1]}
-
-
-@pytest.mark.parametrize(
-    ("moved", "said"),
-    [
-        (lambda x, y: (1e-3 * x, 1e-3 * y), "found them 10^-3 times as far out"),
-        (lambda x, y: (-x, y), "x has the other sign: --scale x=-1"),
-        (lambda x, y: (y, x), "x and y are exchanged, or the array is turned: --column x=y --c"),
-    ],
-)
-def test_nodes_that_are_moved(
-    tmp_path: Path, command: Any, case: Case, moved: Any, said: str
-) -> None:
-    """In one line, also where every node is near some asperity."""
-    nodes = patches(case)
-    x, y = moved(nodes["x"], nodes["y"])
-    outcome = command("verify", "scene.toml", put(tmp_path, nodes | {"x": x, "y": y}), "--nodes")
-    assert (outcome.status, outcome.err.count("\n")) == (2, 1)
-    assert said in outcome.err
-
-
-def test_columns_that_differ_in_case(tmp_path: Path, command: Any, case: Case) -> None:
-    name = put(tmp_path, case.table(Load=2 * case.loads[case.order]))
-    outcome = command("verify", "scene.toml", name)
-    assert outcome.status == 2
-    assert "columns: found 'load' and 'Load', expected one of them: --column" in outcome.err
-    for column, status in (("load", 0), ("Load", 3)):
-        options = ("--column", f"load={column}", "--within", "1e-6")
-        assert command("verify", "scene.toml", name, *options).status == status
 
 
 def test_units_of_a_pressure(tmp_path: Path, command: Any, case: Case) -> None:

@@ -15,7 +15,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Loop, cycles, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
-from convexrough.run.stage import Columns, Result, Stage, Summary, limit, numbers_of
+from convexrough.run.stage import Columns, Result, Stage, Summary, limit
 from convexrough.run.values import Fractions, Mistake, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -30,11 +30,6 @@ Chosen = Annotated[
     Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
 ]
 
-#: Attributes of a cycle that are numbers.
-OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secant_stiffness",
-       "loss_factor", "loss", "loss_error", "loss_normalised", "smooth_normalised",
-       "balance_defect", "sliding", "partial", "undecided")  # fmt: skip
-
 
 class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
@@ -47,7 +42,10 @@ class CycleStage(Stage):
     """
 
     name = "cycle"
-    numbers = (*OWN, "loss_over_smooth", "partial_slip_loss", "sliding_loss")
+    numbers = ("force_amplitude", "displacement_amplitude", "displacement_error",
+               "secant_stiffness", "loss_factor", "loss", "loss_error", "loss_normalised",
+               "smooth_normalised", "balance_defect", "sliding", "partial",
+               "undecided")  # fmt: skip
     labels = ("maximum_fraction", "minimum_fraction")
 
     maximum_fraction: Fractions
@@ -107,14 +105,18 @@ class CycleResult(Result):
     }
 
     def rows(self) -> list[Summary]:
-        found = []
-        ends = zip(self.stage.maximum_fraction, self.stage.lowest, strict=True)
-        for (high, low), cycle in zip(ends, self.found, strict=True):
-            row = {"maximum_fraction": high, "minimum_fraction": low} | numbers_of(cycle, OWN)
-            row["loss_over_smooth"] = cycle.loss_normalised / (cycle.smooth_normalised or math.nan)
-            row["partial_slip_loss"] = float(cycle.partial_slip_losses.sum())
-            found.append(row | {"sliding_loss": float(cycle.sliding_losses.sum())})
-        return found
+        highs, lows = self.stage.maximum_fraction, self.stage.lowest
+        return [
+            {
+                "maximum_fraction": high,
+                "minimum_fraction": low,
+                **row,
+                "loss_over_smooth": cycle.loss_normalised / (cycle.smooth_normalised or math.nan),
+                "partial_slip_loss": float(cycle.partial_slip_losses.sum()),
+                "sliding_loss": float(cycle.sliding_losses.sum()),
+            }
+            for high, low, row, cycle in zip(highs, lows, super().rows(), self.found, strict=True)
+        ]
 
     @cached_property
     def loops(self) -> list[Loop]:

@@ -40,10 +40,6 @@ class GradientStage(Stage):
 
     name = "gradient"
     frictional = False
-    numbers = (
-        *("value", "largest_by_height", "height_error", "balance_defect"),
-        *(f"by.{name}" for name in SHARED),
-    )
 
     of: Annotated[str, expected(f"one of: {', '.join(LETTERS)}", LETTERS.__contains__)]
     fraction: Share | None = None

@@ -47,12 +47,6 @@ class NormalStage(Stage):
     name = "normal"
     frictional = False
     alternatives = ("approach", "load")
-    numbers = (
-        *("asperities", *COUNTS, "approach", "approach_error", "load", "largest_load"),
-        *(f"certificate.{name}" for name in PROOF[1:]),
-        *("candidates", "iterations", "seconds", "model_error", "crowding", "covered", "extent"),
-        *("steepness", "mean_pressure", "beyond_hardness", "mismatch", "contact_modulus"),
-    )
 
     approach: Finite | None = None
     load: Positive | None = None

@@ -18,7 +18,9 @@ from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, phase_losses
 from convexrough.friction.shapes import elliptic_path
+from convexrough.record import rows_of
 from convexrough.run.stage import (
+    MOST_PRINTED,
     STATUSES,
     Columns,
     Single,
@@ -27,7 +29,6 @@ from convexrough.run.stage import (
     Summary,
     numbers_of,
     plain,
-    titled,
 )
 from convexrough.run.values import (
     FileTable,
@@ -38,7 +39,6 @@ from convexrough.run.values import (
     Positive,
     expected,
 )
-from convexrough.tabular.columns import aligned
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
@@ -232,14 +232,10 @@ class SteadyResult(Single):
     def lines(self) -> list[str]:
         said = super().lines()
         for losses in self.found[1:]:
-            columns = _by_phase(losses)
-            printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
+            printed = {"phase": "phase", "factor": "factor", "loss": "loss"}
             printed |= {"smooth": "smooth sphere"}
-            rows = list(zip(*(columns[name].tolist() for name in printed), strict=True))
-            said += ["", titled("loss against phase", printed, self.units)]
-            if len(rows) > 20:
-                said.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
-            said += aligned([list(printed.values()), *rows[-20:]], digits=self.digits)
+            rows, title = rows_of(_by_phase(losses)), "loss against phase"
+            said += ["", *self.printed_table("phase_losses", rows, printed, title, MOST_PRINTED)]
         return said
 
     def figures(self) -> Mapping[str, Any]:
