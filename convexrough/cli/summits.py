@@ -138,7 +138,7 @@ def summits(
     dpi: int,
     **options: Any,
 ) -> int:
-    """Find the summits of a measured surface, and recommend a pruning threshold.
+    """Find the summits of a measured surface.
 
     SURFACE is .npy, .npz, .mat, a text file with a matrix or columns x, y, height, or an
     instrument's file. With --scene, with --radius and --approach, or with --radius, --load and

@@ -23,7 +23,8 @@ from convexrough.roundoff import SAFETY
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     """(n,) violations e for residuals F - beta.
 
-    inside : (n,) False where x is on a lower face of K; on an upper face True gives a larger e
+    inside : (n,) False where x is on a lower face of K. True is also valid on an upper face, where
+        the e of an interior point is at least as large
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)

@@ -357,12 +357,12 @@ class NormalProblem:
 
     def _twofold_offsets(self, which: Indices) -> Pair:
         scene, length = self.scene, self.units.length
-        points, further = scene.asperities.positions[which] / length, np.zeros(len(which))
+        points, further = scene.asperities.positions[which] / length, np.zeros(1)
         if scene.geometry == "closest":
             further = scene.asperities.tip_radii[which] / length
         offsets = Pair.exact(scene.asperities.heights[which] / length)
         for R, axes in scene.curved:
-            far = Pair(*two_sum(np.full(len(which), R / length), further))
+            far = Pair(*two_sum(R / length, further))
             offsets = offsets - square_sum(*points[:, axes].T) / (far + far)
         return offsets
 

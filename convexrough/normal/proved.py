@@ -131,36 +131,44 @@ def proved(
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
     """The solution in this box, or bounds (n,) on load errors, which are too large for the box."""
-    at_first = errors_in(problem, box, state)
-    if not stays_in(box, state, at_first):
-        return at_first
-    known = solution_in(problem, box, state, at_first)
-    return Proved(problem, state, box, *known)
+    known = solution_in(problem, box, state)
+    if not known.inside:
+        return known.at_first
+    return Proved(problem, state, box, *known[2:])
 
 
-def stays_in(box: Box, state: Trial, errors: Array) -> Any:
-    """True if loads with errors of at most these (n,) stay inside the box."""
-    inside = (state.loads.high + errors < box.faces) & np.isfinite(errors)
-    return inside.all(axis=-1)
+class Known(NamedTuple):
+    """What the theorem proves in a box: for one problem or in rows.
+
+    inside   : True if the box is proved to hold the solution, on which the other fields rest
+    at_first : (n,) bounds on the errors of the trial loads, if it does
+    distance, compliance, loads, indentation, approach : the fields of `Proved`
+    """
+
+    inside: Any
+    at_first: Array
+    distance: Any
+    compliance: Array
+    loads: Ball
+    indentation: Ball
+    approach: Ball
 
 
-def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
-    """(n,) bounds on the errors of the trial loads, valid if the box holds the solution."""
-    missing = _Missing.of(problem, state)
+@np.errstate(all="ignore")
+def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
+    """The trial loads with error bounds, by the theorem on the box and then on a smaller one."""
+    trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
-    within = distance(residual, box.compliance, 1.0 - box.convexity_number)
-    return missing.errors(within, box.compliance)
 
+    def theorem(h: Array, margin: Any) -> tuple[Any, Array]:
+        within = distance(residual, h, margin)
+        return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + missing.loads)
 
-def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
-    """The solution by the theorem on a smaller box: the trial loads plus bounds on their errors."""
-    missing = _Missing.of(problem, state)
-    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
-    near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
-    h = problem.compliance(near)
-    margin = 1.0 - np.minimum(box.convexity_number, box.problem.convexity_at(h))
-    within = distance(residual, h, margin)
-    errors = missing.errors(within, h)
+    _, at_first = theorem(box.compliance, 1.0 - box.convexity_number)
+    inside = ((trial + at_first < box.faces) & np.isfinite(at_first)).all(axis=-1)
+    h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
+    number = np.minimum(box.convexity_number, box.problem.convexity_at(h))
+    within, errors = theorem(h, 1.0 - number)
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
     moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
@@ -169,45 +177,32 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
     found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
-    return Known(within, h, _sharpened(problem, found, indentation), indentation, approach)
-
-
-class Known(NamedTuple):
-    """The computed fields of `Proved`."""
-
-    distance: Any
-    compliance: Array
-    loads: Ball
-    indentation: Ball
-    approach: Ball
+    loads = _sharpened(problem, found, indentation)
+    return Known(inside, at_first, within, h, loads, indentation, approach)
 
 
 class _Missing(NamedTuple):
     """The effect of a difference between prescribed total and sum: docs/theory/one-theorem.md.
 
     loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals, where
-        (1 + t) P have the prescribed total
+        (1 + t) P have the prescribed total; 0 if they have it
     """
 
-    loads: Array
-    coupled: Array
-    residual: Array
+    loads: Any
+    coupled: Any
+    residual: Any
 
     @classmethod
-    @np.errstate(divide="ignore", invalid="ignore")
     def of(cls, problem: Problem, state: Trial) -> _Missing:
-        loads, coupled, local = state.loads.high, state.product.upper, state.local
         if not state.missing.size.any():
-            return cls(0.0 * loads, 0.0 * loads, 0.0 * loads)
+            return cls(0.0, 0.0, 0.0)
+        loads, coupled, local = state.loads.high, state.product.upper, state.local
         part = state.missing.size / summed(loads) * (1 + SAFETY)
         grows = coupled + 2.0 / 3.0 * local
         middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
         rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
         known = part <= 0.5
         return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
-
-    def errors(self, within: Any, compliance: Array) -> Array:
-        return np.asarray(within / np.sqrt(compliance) * (1 + SAFETY) + self.loads)
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:

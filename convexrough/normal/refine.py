@@ -73,6 +73,12 @@ class Trial:
         """(n,) violations of the contact law: |gap| where loaded, and the overlap elsewhere."""
         return excess(self.gap, self.inside)
 
+    @cached_property
+    def defect(self) -> Array:
+        """(n,) the residual of the contact law: the gap where loaded, and minus the overlap."""
+        gap = self.gap.value
+        return np.where(self.inside, gap, np.minimum(gap, 0.0))
+
     def frozen(self) -> Trial:
         """The same trial with read-only arrays, because proofs rest on it."""
         for ball in (self.product, self.gap):
@@ -164,27 +170,18 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
 
 def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
     """(n,) the loads of `corrected`, before they are scaled to a prescribed total."""
-    loads, inside = state.loads, state.inside
-    gap = state.gap.value
-    local, change = state.local, np.zeros(gap.shape)
-    slopes = np.divide(1.5 * loads.high, local, out=np.zeros(gap.shape), where=inside)
-    defect = np.where(inside, gap, np.minimum(gap, 0.0))
+    loads, inside, defect = state.loads, state.inside, state.defect
+    own = np.where(inside, state.local, np.minimum(-state.gap.value, 0.0))
+    slopes = np.divide(1.5 * loads.high, own, out=np.zeros(own.shape), where=inside)
     size = largest(np.abs(defect))
     step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), enough, todo)
-    # P ((1 + step / n)^(3/2) - 1) where P > 0, and the whole load of new contacts
-    ratio = np.divide(step, local, out=np.zeros(gap.shape), where=inside)
-    change[inside] = loads.high[inside] * np.expm1(1.5 * np.log1p(np.maximum(ratio[inside], -0.5)))
-    left = inside & (ratio <= -0.5)
-    new = np.where(inside, 0.0, np.minimum(-gap, 0.0)) + np.where(left, local, 0.0) + step
-    entering = (left | ~inside) & (new > 0)
-    change[left] = -loads.high[left]
-    share = new[entering] / np.broadcast_to(problem.coefficients, gap.shape)[entering]
-    change[entering] += share * np.sqrt(share)
-    following = loads + Pair.exact(change)
-    gone = left & ~entering
-    if gone.any():
-        return Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
-    return following
+    ratio = np.divide(step, own, out=np.zeros(own.shape), where=inside)
+    near = inside & (ratio > -0.5)
+    ends = hertz.load(own + step, problem.coefficients)
+    grown = loads.high * np.expm1(1.5 * np.log1p(np.where(near, ratio, 0.0)))
+    following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
+    loaded = near | (ends > 0)
+    return Pair(following.high * loaded, following.low * loaded)
 
 
 def scaled(problem: Problem, loads: Pair) -> Pair:
@@ -223,10 +220,9 @@ def sums(values: Pair) -> Pair:
 
 def defect_of(state: Trial) -> Any:
     """The 2-norm of the residual of the contact law: a number, or (m,) for rows."""
-    defect = np.where(state.inside, state.gap.value, np.minimum(state.gap.value, 0.0))
-    return np.linalg.norm(defect, axis=-1)
+    return np.sqrt((state.defect**2).sum(axis=-1))
 
 
 def rounding_of(state: Trial) -> Any:
     """The 2-norm of the rounding errors of the residual: a number, or (m,) for rows."""
-    return np.linalg.norm(state.gap.radius, axis=-1)
+    return np.sqrt((state.gap.radius**2).sum(axis=-1))

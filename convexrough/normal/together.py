@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, summed
 from convexrough.normal.boxes import Box
 from convexrough.normal.load_control import approach_bound, shifted_to_load
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import Proved, errors_in, solution_in, stays_in
+from convexrough.normal.proved import Proved, solution_in
 from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -161,10 +161,9 @@ def solved(
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
     state = refined_loads(stack, finite)
     box = widest(stack, state) if box is None else box
-    at_first = errors_in(stack, box, state)
-    good = stays_in(box, state, at_first) & np.ravel(box.convexity_number < 1)
-    known = solution_in(stack, box, state, at_first)
-    found = Solved(state, box, good, *known)
+    known = solution_in(stack, box, state)
+    good = known.inside & np.ravel(box.convexity_number < 1)
+    found = Solved(state, box, good, *known[2:])
     decided = known.loads.positive | known.indentation.positive | known.indentation.negative
     good &= np.isfinite(known.loads.radius).all(axis=1) & decided.all(axis=1)
     good &= (known.indentation.negative | ~box.fixed_open).all(axis=1)

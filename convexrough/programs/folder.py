@@ -13,12 +13,12 @@ from convexrough.programs.program import FORMS, WRITERS, solved, stated
 from convexrough.scene.scene import Scene
 from convexrough.version import __version__
 
-#: File endings, with the contents and the programs that read them.
+#: File endings, with the contents and the software that reads them.
 FORMATS = {
-    "cbf": "cones and their dual in the Conic Benchmark Format: MOSEK, PICOS, SCIP-SDP, ...",
+    "cbf": "the cone program and its dual in the Conic Benchmark Format: MOSEK, PICOS, ...",
     "json": "the same for clarabel.load_from_file",
-    "mps": "rows of bristles, QUADOBJ: HiGHS (which has no second-order cones), Gurobi, CPLEX, ...",
-    "npz": "all: sparse matrices of the cones; bristles for qpsolvers.Problem.load, dense",
+    "mps": "the quadratic program of bristles: HiGHS (which has no cones), Gurobi, CPLEX, ...",
+    "npz": "all programs: cones as sparse matrices, bristles for qpsolvers.Problem.load",
 }
 
 
@@ -38,8 +38,9 @@ def write_programs(
     formats        : some of `FORMATS`
     bristles       : number of bristles per asperity
 
-    A program that would not be equivalent to the contact law is left out; the index says why.
-    Raises InputError, with the last reason, if no program remains, and FileError.
+    A program whose bounds do not contain the solution is left out; the index gives the reason.
+    Raises InputError, with the reason for the last one left out, if no program remains, and
+    FileError if a file cannot be written.
     """
     problem, own = solved(scene, approach, load)
     about: dict[str, Any] = {}

@@ -148,7 +148,7 @@ def program(
     220
 
     Raises TooDenseError if the solution lies outside the boxes in which the program is exact, and
-    SolverError if Newton's method finds no solution to compare with.
+    SolverError if Newton's method, whose loads set the bounds and the minimum, finds no solution.
     """
     checks.instance("scene", scene, Scene)
     if not isinstance(bristles, int) or bristles < 1:
@@ -157,7 +157,7 @@ def program(
 
 
 def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
-    """The problem of a scene with a matrix, and the loads of its solution in scaled units."""
+    """The problem of a scene, with the matrix stored, and the scaled loads of its solution."""
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:
         expected = "an approach at which an asperity touches"

@@ -117,7 +117,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads, and the approach, which is the multiplier of a prescribed total load."""
+        """The loads and the approach, which is the multiplier of a prescribed total load."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

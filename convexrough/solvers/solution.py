@@ -18,8 +18,8 @@ from convexrough.record import Record
 class Solution(Record):
     """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
-    residual : residual of the contact law, as `problem.residual`; with a trial, an upper bound on
-        the residual of the loads of the trial
+    residual : residual of the contact law for these loads, which `problem.residual` computes; if
+        `trial` is given, an upper bound on the residual of its loads
     refine   : True if the loads may be corrected to more digits; False to certify them unchanged
     trial    : these loads to more digits, if the solver has computed them; else None
     """
@@ -41,7 +41,7 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution with the residual of the problem, which is infinite if it is undefined."""
+        """A solution whose residual is computed from the loads; infinity stands for nan."""
         if np.shape(loads) != (len(problem),):
             raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)

@@ -1,7 +1,7 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
 Where the loads are too inaccurate to prove every status, Newton's method continues from them to a
-solution, and the certificate of that solution shows which asperities are wrong. `friction.verdict`
+solution, and the certificate of that solution shows which loads are wrong. `friction.verdict`
 does the same for shear forces.
 """
 
@@ -37,7 +37,7 @@ class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
     loads       : (n,) [force] as given
-    floor       : [force] a load up to this size claims that the asperity is open
+    floor       : [force] a load up to this size counts as 0, and its asperity as open
     within      : largest error allowed, as a fraction of the largest load
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
@@ -108,9 +108,9 @@ class Verdict(Claim, Table, Plottable):
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
-                f"{len(small):,} of the loads, on asperities proved open, are at most {noise:.2g}, "
-                f"{noise / self.largest:.1g} of the largest: --floor {rounded_up(noise)} counts "
-                "them as open"
+                f"loads on {len(small):,} asperities proved open are at most {noise:.2g} "
+                f"({noise / self.largest:.1g} of the largest load): "
+                f"--floor {rounded_up(noise)} counts them as 0"
             )
         yield from super().hints()
 
@@ -137,8 +137,8 @@ def verify(
     approach [length] or load [force] : the prescribed quantity, exactly one
     within : largest error allowed of a load, over the largest load, and of the total load, over the
         total; with 1, little but the contact set is checked
-    floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
-        asperity is open
+    floor  : [force] a load up to this size, also a negative one, counts as 0, and its asperity
+        as open
     influence : compliance operator; None for the cheapest
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
