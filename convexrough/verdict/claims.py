@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ SMALL = 1e-3
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
+
+#: Largest number of unknown words of a column in a note.
+MOST = 3
 
 #: Words that are statuses of shear in a column of any name.
 OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
@@ -131,8 +135,9 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
     if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
         units.append(f"column {name}, not pressure")
-    note = ", ".join(filter(None, [table.style, *units, place.how]))
-    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
+    read_how = [*(_not_compared(columns, values > floor) if name == "load" else ()), place.how]
+    note = ", ".join(filter(None, [table.style, *units, *read_how]))
+    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
 
 
 def _negative(
@@ -165,6 +170,17 @@ def _contradicted(
             right = (("0", "1") if found[i] in FLAGS else ("open", "contact"))[int(touches[i])]
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
             yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
+
+
+def _not_compared(columns: dict[str, NDArray[Any]], loaded: NDArray[np.bool_]) -> Iterator[str]:
+    """A note for each column of statuses with other words: which occur with a load, and without."""
+    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
+        found = np.array([each.strip() for each in columns.get(name, [])], dtype=str)
+        other = np.array([each.lower() not in (*known, "", "undecided") for each in found])
+        if other.any():
+            here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
+            with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
+            yield f"column {name} not compared ({with_load} with a load, {without} without)"
 
 
 def _areas(path: Path, table: ReadTable) -> Any:
@@ -202,6 +218,7 @@ def _unread_statuses(table: ReadTable) -> Iterator[str]:
         name, said = bare(header), {str(cell).strip().lower() for cell in cells.tolist()}
         known = {*WORDS, *OF_SHEAR}
         if said & known and said <= {*known, ""}:
-            yield f"column {name}: found statuses, expected them in a column called status"
+            named = f"--column status={quote(name)}"
+            yield f"column {name}: found statuses, expected them in a column called status: {named}"
         elif re.fullmatch("(?i)(stick|slip|slid).*", name) and said <= FLAGS.keys():
             yield f"column {name}: found flags, expected a column status with words such as sliding"
