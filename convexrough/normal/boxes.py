@@ -128,7 +128,9 @@ def box_of_touching(
     least = LEEWAY * loads + LEAST_LEEWAY * float(loads.max(initial=0.0))
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
     h = problem.compliance(box)
-    shelled = replace(problem, shells=_shells(influence, h, which))
+    shells = np.zeros(len(h))
+    shells[which] = fitted_shells(influence, problem.radii(h[which]), FITTED)
+    shelled = replace(problem, shells=shells)
     number = shelled.convexity_at(h)
     if not number < 1:
         number = 1.0 - crowded_margin(influence, h[which])
@@ -163,14 +165,6 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
         if poor.any():
             return which[poor]
     return which
-
-
-def _shells(influence: Influence, compliance: Array, which: Indices) -> Array:
-    """(n,) shells fitted to the asperities `which`, 0 elsewhere."""
-    shells = np.zeros(len(compliance))
-    radii = (np.pi / 2.0) * influence.scale / compliance[which]
-    shells[which] = fitted_shells(influence, radii, FITTED)
-    return shells
 
 
 def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:

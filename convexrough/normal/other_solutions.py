@@ -27,7 +27,8 @@ class OtherSolutions(NamedTuple):
         """The bounds for loads (n,) up to `near`, and approaches up to `approach_bound`."""
         A = problem.influence
         perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
-        a, most = (_radii(problem, loads) for loads in (near, problem.bounds(approach_bound)))
+        both = near, problem.bounds(approach_bound)
+        a, most = (problem.radii(problem.compliance(loads)) * (1 + SAFETY) for loads in both)
         t = 2.0 / np.pi * _mean(a, most)
         if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
             return NO_OTHERS
@@ -37,11 +38,6 @@ class OtherSolutions(NamedTuple):
 
 
 NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0.0, False)
-
-
-def _radii(problem: NormalProblem, loads: Array) -> Array:
-    radii: Array = np.pi / 2.0 * problem.influence.scale / problem.compliance(loads) * (1 + SAFETY)
-    return radii
 
 
 def _mean(a: Array, b: Array) -> Array:

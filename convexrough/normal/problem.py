@@ -291,10 +291,12 @@ class NormalProblem:
 
     def fitted_to(self, loads: Array) -> NormalProblem:
         """The same problem, with the largest shells that neighbours with these loads allow."""
-        with np.errstate(divide="ignore"):
-            radii = (np.pi / 2.0) * self.influence.scale / self.compliance(loads)
-        shells = fitted_shells(self.influence, radii, FITTED)
+        shells = fitted_shells(self.influence, self.radii(self.compliance(loads)), FITTED)
         return replace(self, shells=shells)
+
+    def radii(self, compliance: Array) -> Array:
+        """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
+        return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
 
     def energy(self, loads: Array, displacement: Array) -> float:
         """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""

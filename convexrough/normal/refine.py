@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import TINY, Ball, of_rows
 from convexrough.arithmetic.kernels import residual
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
-from convexrough.arrays import Array, largest, summed
+from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
@@ -81,11 +81,8 @@ class Trial:
 
     def frozen(self) -> Trial:
         """The same trial with read-only arrays, because proofs rest on it."""
-        for ball in (self.product, self.gap):
-            for part in (*ball.mid, ball.radius):
-                part.flags.writeable = False
-        for part in (*self.loads, self.local):
-            part.flags.writeable = False
+        for each in (self.loads, self.product, self.local, self.gap):
+            of_rows(frozen, each)
         return self
 
     @property

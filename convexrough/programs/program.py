@@ -19,8 +19,8 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
-from convexrough.solvers import Newton, TooDenseError
-from convexrough.solvers.bristles import LARGEST_S, BristleProgram, BristleQP
+from convexrough.solvers import Newton
+from convexrough.solvers.bristles import BristleProgram, BristleQP
 from convexrough.solvers.cone_boxes import ConeBoxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
@@ -181,9 +181,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     )
     if form == "bristles":
         rows = BristleProgram.assemble(problem, bristles, form)
-        if len(beyond := np.flatnonzero(rows.cut & (own >= rows.box))):
-            ratios = problem.shells[beyond] / problem.compliance(own[beyond], beyond)
-            raise TooDenseError(form, problem.candidates[beyond], ratios, LARGEST_S)
+        rows.refuse_cut(own)
         data = rows.apply()
         try:
             objective = _value(data, BristleQP(bristles).run(data).x)

@@ -181,10 +181,15 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         approach = -float(raw.multipliers[-1]) if problem.approach is None else problem.approach
         if problem.load is not None:
             loads = loads * (problem.load / loads.sum())
+        self.refuse_cut(loads)
+        return ProgramAnswer(loads, approach, raw.iterations)
+
+    def refuse_cut(self, loads: Array) -> None:
+        """Raise TooDenseError if loads (n,) reach a face where the box was cut."""
+        problem = self.problem
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
             ratios = problem.shells[beyond] / problem.compliance(loads[beyond], beyond)
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
-        return ProgramAnswer(loads, approach, raw.iterations)
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:

@@ -60,7 +60,8 @@ def _mean_field(problem: NormalProblem) -> Array:
     approach = problem.approach_bound
     w = np.zeros(count)
     if problem.scene.curved:
-        w = hertz.surface_displacement(middle, *_smooth_contact(problem)) / problem.units.length
+        touching = smooth_contact_radius(problem), problem.scene.mean_radius
+        w = hertz.surface_displacement(middle, *touching) / problem.units.length
     for _ in range(30):
         indentation = approach + offsets - rings.between(w)
         loads = hertz.load(indentation, coefficients)
@@ -110,15 +111,15 @@ class _Rings:
         return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
 
 
-def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
-    """Contact radius and radius of a smooth sphere under the prescribed approach or load."""
-    scene = problem.scene
+def smooth_contact_radius(problem: NormalProblem) -> float:
+    """Contact radius a [length] of a smooth sphere at the approach or load; inf if it is flat."""
+    scene, units = problem.scene, problem.units
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
+    if radius == np.inf:
+        return np.inf
     if problem.load is None:
-        approach = max(problem.approach_bound, 0.0) * problem.units.length
-        return float(np.sqrt(radius * approach)), radius
-    load = problem.load * problem.units.force
-    return float(hertz.contact_radius(load, modulus, radius)), radius
+        return float(np.sqrt(radius * max(problem.approach_bound, 0.0) * units.length))
+    return float(hertz.contact_radius(problem.load * units.force, modulus, radius))
 
 
 def _disc(distance: Array, radius: Array) -> Array:

@@ -8,8 +8,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.mean_field import mean_field_indentation
-from convexrough.sphere import hertz
+from convexrough.solvers.mean_field import mean_field_indentation, smooth_contact_radius
 
 #: Largest number of candidates for which a product with A is used. It affects speed only.
 FEW = 1000
@@ -30,8 +29,9 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
 
     x follows from a prescribed load, or minimises the energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
     """
+    reach = smooth_contact_radius(problem) or 1.0
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
-    inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
+    inside = np.maximum(1.0 - squares / (WIDER * reach**2), 0.0)
     s = np.sqrt(inside)
     displacement = problem.influence.apply(s)
     prescribed = problem.approach_bound + problem.offsets
@@ -45,14 +45,3 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
     for _ in range(8):  # Newton's method from the right of the root
         x -= (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
-
-
-def _smooth_radius(problem: NormalProblem) -> float:
-    """Contact radius a [length] of a smooth sphere at the approach or load; inf if it is flat."""
-    radius, units = problem.scene.mean_radius, problem.units
-    if radius == math.inf:
-        return radius
-    if problem.load is None:
-        return float(np.sqrt(radius * max(problem.approach_bound, 0.0) * units.length)) or 1.0
-    modulus = problem.scene.material.contact_modulus
-    return float(hertz.contact_radius(problem.load * units.force, modulus, radius))

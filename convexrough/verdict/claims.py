@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ SMALL = 1e-3
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
+
+#: Largest number of unknown words of a column in a note.
+MOST = 3
 
 #: Words that are statuses of shear in a column of any name.
 OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
@@ -105,46 +109,35 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         mistakes.append(f"columns: found neither x nor y, expected {expected}")
     if mistakes:
         raise TableError(str(path), mistakes)
-    areas = None if name in columns else _areas(path, columns)
-    if areas is not None and "area" in columns:
-        wrong = (areas < 0) | ((areas == 0) & (columns["pressure"] != 0))
-        mistakes = [
-            table.mistake(int(i), f", column area: found {areas[i]:g}, expected a positive number")
-            for i in np.flatnonzero(wrong)
-        ]
-        if mistakes:
-            raise TableError(str(path), few(mistakes))
-    values = columns[name] if areas is None else columns["pressure"] * areas
-    if name == "load":
-        values = how.sign * values
     read = name if name in columns else "pressure"
+    areas = _areas(path, table) if read == "pressure" else 1.0
+    values = columns[read] * areas * (how.sign if name == "load" else 1)
     place = Placing(scene, table, read, how.tolerance, how.missing_open)
     owners = place.nearest(values) if summed else place.owners()
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
-    if summed:
-        place.mistakes += _negative(
-            forces, floor, how.sign, read, lambda i, what: f"load of asperity {i}{what}"
-        )
-    else:
-        said = f", column {name}"
-        place.mistakes += _negative(
-            values, floor, how.sign, name, lambda i, what: table.mistake(i, said + what)
-        )
-        if name == "load":
-            place.mistakes += _contradicted(columns, values, floor, table)
+
+    def mistake(i: int, what: str) -> str:
+        if summed:
+            return f"load of asperity {i}{what}"
+        return table.mistake(i, f", column {name}{what}")
+
+    place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
+    if name == "load" and not summed:
+        place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))
         status[owners] = columns["status"]
-    if areas is not None and "area" not in columns:
+    if read == "pressure" and "area" not in columns:
         place.how += f", each of area {areas:.5g}"
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
     if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
         units.append(f"column {name}, not pressure")
-    note = ", ".join(filter(None, [table.style, *units, place.how]))
-    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
+    read_how = [*(_not_compared(columns, values > floor) if name == "load" else ()), place.how]
+    note = ", ".join(filter(None, [table.style, *units, *read_how]))
+    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
 
 
 def _negative(
@@ -179,10 +172,27 @@ def _contradicted(
             yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
 
 
-def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
+def _not_compared(columns: dict[str, NDArray[Any]], loaded: NDArray[np.bool_]) -> Iterator[str]:
+    """A note for each column of statuses with other words: which occur with a load, and without."""
+    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
+        found = np.array([each.strip() for each in columns.get(name, [])], dtype=str)
+        other = np.array([each.lower() not in (*known, "", "undecided") for each in found])
+        if other.any():
+            here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
+            with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
+            yield f"column {name} not compared ({with_load} with a load, {without} without)"
+
+
+def _areas(path: Path, table: ReadTable) -> Any:
     """The areas of nodes, or the one area of a regular grid."""
+    columns = table.columns
     if "area" in columns:
-        return columns["area"]
+        areas = columns["area"]
+        wrong = np.flatnonzero((areas < 0) | ((areas == 0) & (columns["pressure"] != 0)))
+        said = ", column area: found {:g}, expected a positive number"
+        if mistakes := [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()]:
+            raise TableError(str(path), few(mistakes))
+        return areas
     try:
         (i, dx), (j, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
     except InputError as error:
@@ -208,6 +218,7 @@ def _unread_statuses(table: ReadTable) -> Iterator[str]:
         name, said = bare(header), {str(cell).strip().lower() for cell in cells.tolist()}
         known = {*WORDS, *OF_SHEAR}
         if said & known and said <= {*known, ""}:
-            yield f"column {name}: found statuses, expected them in a column called status"
+            named = f"--column status={quote(name)}"
+            yield f"column {name}: found statuses, expected them in a column called status: {named}"
         elif re.fullmatch("(?i)(stick|slip|slid).*", name) and said <= FLAGS.keys():
             yield f"column {name}: found flags, expected a column status with words such as sliding"

@@ -1,6 +1,7 @@
 """Tables as people have them: read where the meaning is certain, else every mistake is shown."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,24 @@ FILES = {
 @pytest.mark.parametrize("content", FILES.values(), ids=FILES)
 def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
     assert read_loads(written(tmp_path, content), small()).values.tolist() == LOADS
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("COC", "column status not compared (C with a load, O without)"),
+        ("CCO", "column status not compared (C or O with a load, C without)"),
+        (("contact", "open", "touches"), "(touches with a load, nothing without)"),
+        (("Closed", "OPEN", "undecided"), ""),
+    ],
+)
+def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: str) -> None:
+    """The loads decide; a user sees what her code calls what."""
+    lines = "".join(f"{it},{word}\n" for it, word in zip(LOADS, words, strict=True))
+    found = read_loads(written(tmp_path, "load,status\n" + lines), small())
+    assert said in found.note
+    assert any(said in line for line in found.explained)
+    assert ("not compared" in found.note) == bool(said)
 
 
 def test_a_line_of_numbers(tmp_path: Path) -> None:
