@@ -92,7 +92,7 @@ class Placing:
             self.mistakes = [total]
             return found
         advice = "" if by else unused(self.table)
-        if rows < count and (by or self.table.indices):
+        if rows < count and (by or self._indices()):
             advice = "; --missing-open takes the others for open"
         elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes adds up rows at their nearest asperity"
