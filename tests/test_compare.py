@@ -271,50 +271,46 @@ def test_command_on_a_contradiction(
 
 
 MINE = """
-from dataclasses import dataclass
-from convexrough.solvers import Newton
+from dataclasses import replace
+import numpy as np
+from convexrough.solvers import Newton, Solution
 
-@dataclass(frozen=True)
 class Mine:
-    name: str = "mine"
+    name = "mine"
     def solve(self, problem, start=None):
-        return Newton().solve(problem)
-
-@dataclass(frozen=True)
-class Zero:
-    name: str = "zero"
-    def solve(self, problem, start=None):
-        from dataclasses import replace
         found = Newton().solve(problem)
-        return replace(found, loads=0 * found.loads, refine=False, trial=None)
+        return replace(found, loads=self.changed(found.loads), refine=False, trial=None)
+    def changed(self, loads):
+        return loads
 
-@dataclass(frozen=True)
-class Spurious:
-    name: str = "spurious"
-    def solve(self, problem, start=None):
-        from dataclasses import replace
-        import numpy as np
-        found = Newton().solve(problem)
-        loads = np.where(found.loads > 0, found.loads, 1e-4 * found.loads.max())
-        return replace(found, loads=loads, refine=False, trial=None)
+class Zero(Mine):
+    name = "zero"
+    def changed(self, loads):
+        return 0 * loads
 
-class Exit:
+class Spurious(Mine):
+    name = "spurious"
+    def changed(self, loads):
+        return np.where(loads > 0, loads, 1e-4 * loads.max())
+
+class Exit(Mine):
     name = "exit"
-    def solve(self, problem, start=None):
+    def changed(self, loads):
         raise SystemExit(0)
+
+class Crash(Mine):
+    name = "crash"
+    def changed(self, loads):
+        return 1 / 0
+
+class Short(Mine):
+    name = "short"
+    def solve(self, problem, start=None):
+        return Solution.of(problem, np.ones(3), 1.0, 1)
+
 class NoSolver: ...
 class NoName:
     def solve(self, problem, start=None): ...
-class Short:
-    name = "short"
-    def solve(self, problem, start=None):
-        from convexrough.solvers import Solution
-        import numpy as np
-        return Solution.of(problem, np.ones(3), 1.0, 1)
-class Crash:
-    name = "crash"
-    def solve(self, problem, start=None):
-        return 1 / 0
 class Needs:
     def __init__(self, what): ...
 """

@@ -46,7 +46,7 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         return DenseInfluence.assemble(points, scale, error, tails)
     if kind != "scattered" and scene.lattice is not None:
         layout, lattice = scene.asperities.layout, scene.lattice
-        return LatticeInfluence.of(scene.contact_points, which, layout, lattice, scale, error)
+        return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
     if kind == "lattice":
         raise InputError(
             "influence", found="lattice", expected="asperities on a two-dimensional lattice"

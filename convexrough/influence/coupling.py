@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -144,6 +145,29 @@ class Influence(Coupling, Protocol):
         None if nothing better than the identity is known.
         """
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class JointCoupling:
+    """The map from loads on the last points of an operator to displacements of the first ones.
+
+    joint : the operator of all;  targets : number of points to which loads are mapped
+    """
+
+    joint: Influence
+    targets: int
+
+    def apply(self, loads: Array) -> Array:
+        return self.joint.apply(self._all(loads))[: self.targets]
+
+    def rounding(self, loads: Array) -> Rounding:
+        return self.joint.rounding(self._all(loads))
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        return self.joint.falloff(self._all(strengths), power)[: self.targets]
+
+    def _all(self, values: Array) -> Array:
+        return np.concatenate((np.zeros(self.targets, dtype=values.dtype), values))
 
 
 def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:

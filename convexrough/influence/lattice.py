@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
@@ -23,7 +23,14 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Kernel, SiteBox, neighbours, through_waves
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
+from convexrough.influence.coupling import (
+    Coupling,
+    JointCoupling,
+    Kind,
+    Rounding,
+    Smoother,
+    cubed,
+)
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
@@ -55,22 +62,67 @@ LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
-class LatticeCoupling:
-    """The operator from loads on some sites of a box to displacements at other sites.
+class LatticeInfluence:
+    """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
-    box     : the box of sites
-    sources, targets : (n,), (m,) indices of the sites in the box, row by row
-    scale   : A_ij r_ij, which is 1 / (pi E*)
-    spacing : [length] the shortest distance of two sites
-    site_error : [spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i
+    array       : (N, 2) [length] points, with errors of at most `point_error`
+    members     : (n,) indices of the operator's asperities in `array`
+    layout      : the exact points, before multiplication by `lattice.shrink` (most often 1)
+    lattice     : the lattice of the points
+    scale       : A_ij r_ij, which is 1 / (pi E*)
     """
 
-    box: SiteBox
-    sources: Indices
-    targets: Indices
+    array: Array
+    members: Indices
+    layout: Layout
+    lattice: Lattice
     scale: float
-    spacing: float
-    site_error: float
+    point_error: float = 0.0
+
+    name: ClassVar[Kind] = "lattice"
+    stored: ClassVar[bool] = False
+    cheap_sums: ClassVar[bool] = True
+
+    @classmethod
+    def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
+        """The operator of points (n, 2) [length]. Raises ValueError for points off the lattice."""
+        places = lattice.sites(points)
+        if places is None:
+            raise ValueError("points off the lattice")
+        layout = Layout(points, (lattice, places))
+        return cls(points, np.arange(len(points)), layout, lattice, scale)
+
+    @cached_property
+    def _boxed(self) -> tuple[SiteBox, Indices]:
+        """The box, and (n,) indices of the sites in rows as long as the transforms."""
+        basis, places = self.lattice.basis / self.spacing, self.places
+        if len(places) == 0:
+            return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
+        low, high = places.min(axis=0), places.max(axis=0)
+        rows, columns = (high - low + 1).tolist()
+        box = SiteBox((rows, columns), basis, _extent(places, (low + high) / 2.0, basis))
+        index = (places[:, 0] - low[0]) * np.intp(box.padded[1]) + (places[:, 1] - low[1])
+        return box, index
+
+    @property
+    def box(self) -> SiteBox:
+        """The smallest box of sites that holds the asperities."""
+        return self._boxed[0]
+
+    @property
+    def cells(self) -> Indices:
+        """(2, n) row and column of each asperity in the box."""
+        return np.stack(np.divmod(self._boxed[1], self.box.padded[1]))
+
+    @cached_property
+    def spacing(self) -> float:
+        """[length] the shortest distance of two sites."""
+        return self.lattice.spacing
+
+    @property
+    def site_error(self) -> float:
+        """[spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i."""
+        return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.spacing
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
@@ -122,81 +174,13 @@ class LatticeCoupling:
         return self._single if dtype == np.float32 else self._kernel.spectrum
 
     def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._padded[1]]
+        return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._boxed[1]]
 
     def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The values at the sources, zeros elsewhere, in rows as long as the transforms."""
+        """The values at the sites, zeros elsewhere, in rows as long as the transforms."""
         field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
-        field.ravel()[self._padded[0]] = values
+        field.ravel()[self._boxed[1]] = values  # the last one where points coincide
         return field
-
-    @cached_property
-    def _padded(self) -> tuple[Indices, Indices]:
-        """`sources` and `targets` as indices into rows as long as the transforms."""
-        (_, columns), (_, width) = self.box.shape, self.box.padded
-        sources = self.sources + self.sources // columns * (width - columns)
-        if self.targets is self.sources:
-            return sources, sources
-        return sources, self.targets + self.targets // columns * (width - columns)
-
-
-@dataclass(frozen=True, eq=False)
-class LatticeInfluence(LatticeCoupling):
-    """The compliance operator of asperities on a lattice.
-
-    array       : (N, 2) [length] points, with errors of at most `point_error`
-    members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact points, before multiplication by `lattice.shrink` (most often 1)
-    lattice     : the lattice of the points
-    """
-
-    array: Array
-    members: Indices
-    layout: Layout
-    lattice: Lattice
-    point_error: float
-
-    name: ClassVar[Kind] = "lattice"
-    stored: ClassVar[bool] = False
-    cheap_sums: ClassVar[bool] = True
-
-    @classmethod
-    def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """The operator of points (n, 2) [length]. Raises ValueError for points off the lattice."""
-        places = lattice.sites(points)
-        if places is None:
-            raise ValueError("points off the lattice")
-        layout = Layout(points, (lattice, places))
-        return cls.of(points, np.arange(len(points)), layout, lattice, scale)
-
-    @classmethod
-    def of(
-        cls,
-        array: Array,
-        members: Indices,
-        layout: Layout,
-        lattice: Lattice,
-        scale: float,
-        point_error: float = 0.0,
-    ) -> LatticeInfluence:
-        """The operator of the given members of a layout whose sites are known."""
-        assert layout.sites is not None
-        box, index = _boxed(lattice, layout.sites[members])
-        spacing = lattice.spacing
-        site_error = 2.0 * float(np.sqrt(2.0)) * lattice.site_error / spacing
-        return cls(
-            box,
-            index,
-            index,
-            scale,
-            spacing,
-            site_error,
-            array,
-            members,
-            layout,
-            lattice,
-            point_error,
-        )
 
     def __len__(self) -> int:
         return len(self.members)
@@ -226,8 +210,7 @@ class LatticeInfluence(LatticeCoupling):
         last: LatticeInfluence | None = self._spectra.get("restricted")
         if last is not None and np.array_equal(last.members, self.members[which]):
             return last
-        given = self.layout, self.lattice, self.scale, self.point_error
-        found = self.of(self.array, self.members[which], *given)
+        found = replace(self, members=self.members[which])
         if len(self) <= MOST_KEPT:
             self._spectra["restricted"] = found
         return found
@@ -236,9 +219,10 @@ class LatticeInfluence(LatticeCoupling):
         places = self.lattice.sites(points)
         if places is None:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
-        box, index = _boxed(self.lattice, np.concatenate((self.places, places)))
-        n = len(self)
-        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.spacing, self.site_error)
+        together = np.concatenate((points, self.points))
+        layout = Layout(together, (self.lattice, np.concatenate((places, self.places))))
+        joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
+        return JointCoupling(joint, len(points))
 
     @property
     def _filled(self) -> bool:
@@ -267,7 +251,7 @@ class LatticeInfluence(LatticeCoupling):
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
-        field.ravel()[self.sources] = radii
+        field[tuple(self.cells)] = radii
         most, worst = 2.0 * float(radii.max()), 0.0
         for distance, i, j in self._pairs():
             if most <= worst * distance:
@@ -299,7 +283,7 @@ class LatticeInfluence(LatticeCoupling):
         slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
         off_sites = self._off_sites(np.asarray(loads.high))
         sliced = self._cached(slices, lambda: self._slice(slices))
-        return sliced.sums(loads, self._padded[0], *off_sites)
+        return sliced.sums(loads, self._boxed[1], *off_sites)
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object of this name, cached unless it is too large."""
@@ -333,7 +317,7 @@ class LatticeInfluence(LatticeCoupling):
         if most + unknown == 0.0 or top == 0.0:
             return np.zeros(len(self)), 0.0
         shares, pulls = loads / top, self._pulls
-        targets = self._padded[1]
+        places = self._boxed[1]
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
@@ -342,9 +326,9 @@ class LatticeInfluence(LatticeCoupling):
 
         fields = [self._laid_out(values) for values in (shares, x * shares, y * shares)]
         fields = through_waves(fields, self.box.padded, self.box.workers, pull)
-        change = fields[2].ravel()[targets]
-        change -= x * fields[0].ravel()[targets]
-        change -= y * fields[1].ravel()[targets]
+        change = fields[2].ravel()[places]
+        change -= x * fields[0].ravel()[places]
+        change -= y * fields[1].ravel()[places]
         # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
@@ -355,8 +339,7 @@ class LatticeInfluence(LatticeCoupling):
         return change * unit, 1.01 * error * unit
 
     def smoother(self, root: Array) -> Smoother:
-        cells = np.stack(np.divmod(self.sources, self.box.shape[1]))
-        return block_smoother(cells, self.box.basis, self._unit, root)
+        return block_smoother(self.cells, self.box.basis, self._unit, root)
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:
@@ -405,17 +388,6 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
 
 def _least_symbol(lattice: Lattice) -> float:
     return least_symbol(lattice.basis / lattice.spacing)
-
-
-def _boxed(lattice: Lattice, places: Sites) -> tuple[SiteBox, Indices]:
-    """The smallest box that holds these sites, and the (n,) index of each site in it."""
-    basis = lattice.basis / lattice.spacing
-    if len(places) == 0:
-        return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
-    low, high = places.min(axis=0), places.max(axis=0)
-    rows, columns = (high - low + 1).tolist()
-    index = (places[:, 0] - low[0]) * np.intp(columns) + (places[:, 1] - low[1])
-    return SiteBox((rows, columns), basis, _extent(places, (low + high) / 2.0, basis)), index
 
 
 def _extent(places: Sites, middle: Array, basis: Array) -> float:

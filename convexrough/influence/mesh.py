@@ -1,6 +1,6 @@
-"""A square mesh with the softened kernel, and the interpolation between mesh nodes and points.
+"""Interpolation between the nodes of a square mesh and points.
 
-docs/theory/operators-mesh.md, "A mesh and near pairs", derives both.
+docs/theory/operators-mesh.md, "A mesh and near pairs", derives it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.pairs import Pair
-from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.near_pairs import Order
-from convexrough.influence.softened import Softened, twofold_lagrange
+from convexrough.influence.softened import twofold_lagrange
 from convexrough.influence.splitting import Splitting
 
 #: Largest number of points in a block: sums stay short, and a matrix product fits in the cache.
@@ -22,15 +21,6 @@ BLOCK = 256
 
 #: Number of points whose weights are computed together: they fit in the cache.
 PLACES = 2**12
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh(SiteBox):
-    """A box of square cells, with the softened kernel."""
-
-    def softened(self, kernel: Softened) -> Kernel:
-        """The softened kernel L for every difference of two nodes."""
-        return self.kernels(lambda i, j, squares: [kernel.smooth(squares)], np.float64)[0]
 
 
 @dataclass(frozen=True, eq=False)

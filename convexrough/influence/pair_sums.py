@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.influence.convolution import Kernel
+from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.coupling import Rounding
-from convexrough.influence.mesh import BLOCK, Interpolation, Mesh
+from convexrough.influence.mesh import BLOCK, Interpolation
 from convexrough.influence.near_pairs import NearPairs, Order
 from convexrough.influence.softened import WEIGHT_ROUNDOFFS, lebesgue
 from convexrough.influence.splitting import Splitting
@@ -34,7 +34,7 @@ class Product:
     order: Order
     near: NearPairs
     weights: Interpolation | None
-    mesh: Mesh
+    mesh: SiteBox
     kernel: Kernel
 
     @classmethod
@@ -45,13 +45,12 @@ class Product:
         near = NearPairs.assemble(order, splitting, dtype)
         if not splitting.meshed:
             nothing = Kernel(np.empty((0, 0)), 0.0)
-            return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing)
+            return cls(splitting, order, near, None, SiteBox((1, 1), np.eye(2)), nothing)
         weights = Interpolation.assemble(order, splitting, dtype)
-        rows, columns = weights.shape
-        mesh = Mesh((rows, columns), splitting.spacing * np.eye(2))
+        mesh = SiteBox(weights.shape, splitting.spacing * np.eye(2))
         size = float(mesh.padded[0]) * mesh.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        kernel = mesh.softened(splitting.kernel)
+        (kernel,) = mesh.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.norm)
         return cls(splitting, order, near, weights, mesh, kernel)
 

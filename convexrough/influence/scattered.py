@@ -16,7 +16,14 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Kernel
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, known
+from convexrough.influence.coupling import (
+    Coupling,
+    JointCoupling,
+    Kind,
+    Rounding,
+    Smoother,
+    known,
+)
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
@@ -79,7 +86,7 @@ class ScatteredInfluence:
         )
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        product = self._square if power == 2 else self._cube
+        product = self._product(power, FALLOFF_TOLERANCE, np.float64)
         return product.above(strengths) * self._stretched(power)
 
     @property
@@ -100,8 +107,8 @@ class ScatteredInfluence:
     def onto(self, points: Array) -> Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
-        together = np.concatenate((self.points, points))
-        return ScatteredCoupling(replace(self, points=together, tails=None), len(self))
+        together = np.concatenate((points, self.points))
+        return JointCoupling(replace(self, points=together, tails=None), len(points))
 
     def slopes(self, loads: Array) -> Array:
         return -self.scale * by_mesh(self._double, self._pulls, loads)
@@ -142,49 +149,26 @@ class ScatteredInfluence:
         moved = entry_error(self._unknown, self._double.near.nearest)
         return float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
-    @cached_property
+    @property
     def _double(self) -> Product:
         return self._product(1, self.tolerance, np.float64)
 
-    @cached_property
+    @property
     def _single(self) -> Product:
         return self._product(1, max(self.tolerance, SINGLE_TOLERANCE), np.float32)
 
     @cached_property
-    def _square(self) -> Product:
-        return self._product(2, FALLOFF_TOLERANCE, np.float64)
-
-    @cached_property
-    def _cube(self) -> Product:
-        return self._product(3, FALLOFF_TOLERANCE, np.float64)
+    def _products(self) -> dict[tuple[int, Any], Product]:
+        return {}
 
     def _product(self, power: int, tolerance: float, dtype: Any) -> Product:
-        splitting = Splitting.choose(self.points, power, tolerance)
-        return Product.assemble(self.points, splitting, dtype, self.tails)
+        if (power, dtype) not in self._products:
+            splitting = Splitting.choose(self.points, power, tolerance)
+            found = Product.assemble(self.points, splitting, dtype, self.tails)
+            self._products[power, dtype] = found
+        return self._products[power, dtype]
 
     @property
     def _unknown(self) -> float:
         """[length] bound on the error of each coordinate of the points with their tails."""
         return known(self.points, self.tails, self.point_error)[1]
-
-
-@dataclass(frozen=True, eq=False)
-class ScatteredCoupling:
-    """The map from loads on the first `sources` points of `joint` to displacements of others."""
-
-    joint: ScatteredInfluence
-    sources: int
-
-    def apply(self, loads: Array) -> Array:
-        return self.joint.apply(self._all(loads))[self.sources :]
-
-    def rounding(self, loads: Array) -> Rounding:
-        return self.joint.rounding(self._all(loads))
-
-    def falloff(self, strengths: Array, power: int) -> Array:
-        return self.joint.falloff(self._all(strengths), power)[self.sources :]
-
-    def _all(self, values: Array) -> Array:
-        everywhere = np.zeros(len(self.joint), dtype=values.dtype)
-        everywhere[: self.sources] = values
-        return everywhere

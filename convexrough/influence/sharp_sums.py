@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -160,7 +161,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
         charges = Slices.of(Pair(high, low), bits)
         factors = Slices.of(x, bits)
         for rows, i, j in patches:
-            first, second = in_slices(_transposed, factors.some(rows), charges.some(rows))
+            first, second = in_slices(lambda a, b: a.T @ b, factors.some(rows), charges.some(rows))
             exact[i, j] += first
             left[i, j] += second
     error = met * ((2 * met + 8) * ROUNDOFF * 2.0**-bits + 4 * TWOFOLD_WEIGHT)
@@ -182,7 +183,9 @@ def _from_nodes(
             nodes = Slices(values.first[i, j], values.second[i, j])
             lines = Slices.of(Pair(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
             here = slice(some.start + rows.start, some.start + rows.stop)
-            exact[here], left[here] = in_slices(_row_by_row, lines, along.some(rows))
+            exact[here], left[here] = in_slices(
+                partial(np.einsum, "ij,ij->i"), lines, along.some(rows)
+            )
     # Sums of |weights| are below 4; sums of the second slices of p weights are below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
@@ -221,11 +224,3 @@ def _relative(product: Product) -> float:
     """Relative error of distant pairs by interpolation and by rounding of positions in cells."""
     kernel, spacing = product.splitting.kernel, product.splitting.spacing
     return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)
-
-
-def _transposed(a: Array, b: Array) -> Array:
-    return np.asarray(a.T @ b)
-
-
-def _row_by_row(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -137,8 +137,12 @@ class Sliced:
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
         more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)
+
+        def kernels_with(more: int) -> list[Kernel]:
+            return box.kernels(lambda i, j, _: cut(values.at(i, j), bits, more, count), np.float64)
+
         while True:
-            kernels = _kernels(box, values, bits, more, count)
+            kernels = kernels_with(more)
             largest = max(each.norm for each in kernels[:-1])
             # For any loads, slices after the first are at most 2^(more - 1).
             if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
@@ -232,10 +236,3 @@ def each_loss(box: SiteBox, count: int) -> float:
     `count` products are added up before the inverse transform, and the last slices are rounded.
     """
     return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
-
-
-def _kernels(box: SiteBox, values: Values, bits: int, more: int, count: int) -> list[Kernel]:
-    def slices(i: Indices, j: Indices, _: Array) -> list[Array]:
-        return cut(values.at(i, j), bits, more, count)
-
-    return box.kernels(slices, np.float64)

@@ -202,7 +202,7 @@ class Result(Table, Plottable):
 
     def prepare(self, *, figures: bool) -> None:
         """Compute all that tables and figures need; while they are written nothing is solved."""
-        _ = self.known
+        self.tables()
 
     def lines(self) -> list[str]:
         """The printed table, one string per line."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from itertools import product
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import Discriminator, Field, Tag, ValidationError, create_model
@@ -37,6 +38,7 @@ from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
 #: [Pa] limits of moduli, below those of gels and above that of diamond.
 SOFTEST, HARDEST = 1e3, 1e13
+MODULI = ("contact_modulus", "youngs_modulus", "hardness")
 
 Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closest"')]
 Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
@@ -208,20 +210,15 @@ class Study(FileTable):
         material, unit = self.material, self.units.names.unit("pressure")
         if unit is None:
             return
-        given = {
-            "[material] contact_modulus": getattr(material, "contact_modulus", None),
-            "[material] youngs_modulus": getattr(material, "youngs_modulus", None),
-            "[material] hardness": getattr(material, "hardness", None),
-        }
+        tables: dict[str, Any] = {"material": material}
         if isinstance(material, BodiesTable):
-            for name, body in (("sphere", material.sphere), ("base", material.base)):
-                given[f"[material.{name}] youngs_modulus"] = body.youngs_modulus
-                given[f"[material.{name}] hardness"] = body.hardness
-        for name, value in given.items():
+            tables = {"material.sphere": material.sphere, "material.base": material.base}
+        for (name, table), key in product(tables.items(), MODULI):
+            value = getattr(table, key, None)
             if value and not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
                 found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"
                 solid = f"expected {SOFTEST:g} to {HARDEST:g} Pa, as solids have"
-                said = f"{name}: {found}, {solid}; without [units] no unit is checked"
+                said = f"[{name}] {key}: {found}, {solid}; without [units] no unit is checked"
                 yield "material", said
 
 
@@ -229,21 +226,14 @@ def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
     """A mistake if `within` is missing and the file does not limit the number of asperities."""
     if not isinstance(lattice, dict) or lattice.get("pattern") == "file" or "within" in lattice:
         return
+    missing = "[asperities] within: missing, needed with"
     radius = sphere.get("radius") if isinstance(sphere, dict) else None
     if math.inf in (radius if isinstance(radius, list) else [radius]):
-        yield (
-            "asperities",
-            ("[asperities] within: missing, needed with a flat or a cylinder (infinite)"),
-        )
-    elif (
-        isinstance(lattice.get("tip_radius"), list)
-        and isinstance(normal, dict)
-        and "load" in normal
-    ):
-        yield (
-            "asperities",
-            ("[asperities] within: missing, needed with a list of tip radii under a given load"),
-        )
+        yield "asperities", f"{missing} a flat or a cylinder (infinite)"
+    elif not isinstance(normal, dict) or "load" not in normal:
+        return
+    elif isinstance(lattice.get("tip_radius"), list):
+        yield "asperities", f"{missing} a list of tip radii under a given load"
 
 
 @lru_cache(4)

@@ -40,6 +40,12 @@ class Removed:
         paraboloid, that of the mean curvature."""
         return 1.0 / self.curvature if self.curvature else float("inf")
 
+    def scaled(self, scale: float) -> Removed:
+        """The same form with all lengths multiplied."""
+        first, second = self.curvatures
+        return Removed(self.kind, self.height * scale, self.slopes, self.curvature / scale,
+                       (first / scale, second / scale))  # fmt: skip
+
     def __repr__(self) -> str:
         tilt = f"slopes {self.slopes[0]:.3g} and {self.slopes[1]:.3g}"
         if self.kind == "plane":

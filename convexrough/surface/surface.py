@@ -213,13 +213,10 @@ class Surface(Record, Plottable):
             found = "none" if own is None else "none to convert to"
             raise InputError("unit", found=found, expected="a unit of length of the map")
         scale = own.into(into)
-        removed = [
-            replace(each, height=each.height * scale, curvature=each.curvature / scale)
-            for each in self.removed
-        ]
+        removed = tuple(each.scaled(scale) for each in self.removed)
         dx, dy = self.pixel
         return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
-                       unit=into.name, removed=tuple(removed))  # fmt: skip
+                       unit=into.name, removed=removed)  # fmt: skip
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
         """The summits of the map as asperities, in descending order of the heights of their maxima.

@@ -109,40 +109,28 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         mistakes.append(f"columns: found neither x nor y, expected {expected}")
     if mistakes:
         raise TableError(str(path), mistakes)
-    areas = None if name in columns else _areas(path, columns)
-    if areas is not None and "area" in columns:
-        wrong = (areas < 0) | ((areas == 0) & (columns["pressure"] != 0))
-        mistakes = [
-            table.mistake(int(i), f", column area: found {areas[i]:g}, expected a positive number")
-            for i in np.flatnonzero(wrong)
-        ]
-        if mistakes:
-            raise TableError(str(path), few(mistakes))
-    values = columns[name] if areas is None else columns["pressure"] * areas
-    if name == "load":
-        values = how.sign * values
     read = name if name in columns else "pressure"
+    areas = _areas(path, table) if read == "pressure" else 1.0
+    values = columns[read] * areas * (how.sign if name == "load" else 1)
     place = Placing(scene, table, read, how.tolerance, how.missing_open)
     owners = place.nearest(values) if summed else place.owners()
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
-    if summed:
-        place.mistakes += _negative(
-            forces, floor, how.sign, read, lambda i, what: f"load of asperity {i}{what}"
-        )
-    else:
-        said = f", column {name}"
-        place.mistakes += _negative(
-            values, floor, how.sign, name, lambda i, what: table.mistake(i, said + what)
-        )
-        if name == "load":
-            place.mistakes += _contradicted(columns, values, floor, table)
+
+    def mistake(i: int, what: str) -> str:
+        if summed:
+            return f"load of asperity {i}{what}"
+        return table.mistake(i, f", column {name}{what}")
+
+    place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
+    if name == "load" and not summed:
+        place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))
         status[owners] = columns["status"]
-    if areas is not None and "area" not in columns:
+    if read == "pressure" and "area" not in columns:
         place.how += f", each of area {areas:.5g}"
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
     if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
@@ -195,10 +183,16 @@ def _not_compared(columns: dict[str, NDArray[Any]], loaded: NDArray[np.bool_]) -
             yield f"column {name} not compared ({with_load} with a load, {without} without)"
 
 
-def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
+def _areas(path: Path, table: ReadTable) -> Any:
     """The areas of nodes, or the one area of a regular grid."""
+    columns = table.columns
     if "area" in columns:
-        return columns["area"]
+        areas = columns["area"]
+        wrong = np.flatnonzero((areas < 0) | ((areas == 0) & (columns["pressure"] != 0)))
+        said = ", column area: found {:g}, expected a positive number"
+        if mistakes := [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()]:
+            raise TableError(str(path), few(mistakes))
+        return areas
     try:
         (i, dx), (j, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
     except InputError as error:

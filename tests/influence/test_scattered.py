@@ -6,10 +6,10 @@ from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
 
-from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.coupling import JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
-from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
+from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened
 from convexrough.influence.splitting import Splitting
 
@@ -89,9 +89,8 @@ def test_among_and_onto() -> None:
     loads = rng.random(len(points))
     few = operator.onto(others)
     true, rest = inverse_sums(others, points, loads, SCALE)
-    joint = ScatteredCoupling(
-        ScatteredInfluence(np.concatenate((points, others)), SCALE), len(points)
-    )
+    together = ScatteredInfluence(np.concatenate((others, points)), SCALE)
+    joint = JointCoupling(together, len(others))
     for coupling in (few, joint):
         rounding = coupling.rounding(loads)
         error = np.abs(coupling.apply(loads) - true - rest)

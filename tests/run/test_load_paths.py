@@ -104,33 +104,24 @@ def test_factors_of_amplitudes_count_in_the_largest_load(tmp_path: Path) -> None
     assert cr.read_scene(file).stages["steady"].highest_load == pytest.approx(5e-7)
 
 
-@pytest.mark.parametrize(
-    ("kind", "amplitudes", "factor"),
-    [
-        ("elastic", "[1.0, -1.0]", 0.2571338521083),
-        ("vector", "[[0.0, 1.0], [0.0, -1.0]]", 0.2419789620),
-    ],
-)
-def test_limits_by_melan(command: Any, kind: str, amplitudes: str, factor: float) -> None:
-    table = f'''
+def test_a_limit_for_forces_along_x_and_y(command: Any) -> None:
+    table = """
 [shakedown]
 loads = 2.0
-force_amplitudes = {amplitudes}
-kind = "{kind}"
+force_amplitudes = [[0.0, 1.0], [0.0, -1.0]]
+kind = "vector"
 reference = 1.80426694373333e-07
-'''
+"""
     Path("scene.toml").write_text(SCENE + table)
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     limit = json.loads(Path("out/summary.json").read_text())["shakedown"]
-    assert limit["factor"] == pytest.approx(factor, rel=1e-9)
+    assert limit["factor"] == pytest.approx(0.2419789620, rel=1e-9)
     assert limit["lower"] < limit["factor"] < limit["upper"]
     assert limit["proved"] is True
-    assert f"shakedown  ({kind})" in outcome.out
-    with Path("out/shakedown.csv").open() as file:
-        columns = next(csv.reader(file))
-    slips = ["slip"] if kind == "elastic" else ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
-    assert [name for name in columns if name.startswith("slip")] == slips
+    assert "shakedown  (vector)" in outcome.out
+    columns = Path("out/shakedown.csv").read_text().splitlines()[0].split(",")
+    assert columns[-4:] == ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
 
 
 SHADED = scene_text(

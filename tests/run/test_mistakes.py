@@ -43,6 +43,7 @@ def bodies(material: str) -> str:
 
 VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
 LOOPS = "[cycle]\nmaximum_fraction = [0.5]\nloop_"
+PASCALS = '[units]\nlength = "m"\npressure = "Pa"\n'
 DEGREES = "expected a phase in radians, from -pi to pi; 90 degrees are 1.5708"
 ELLIPSE = "ellipse = {load = 1.0, force_amplitude = 0.1, phase = "
 
@@ -84,6 +85,10 @@ MISTAKES = [
     (bodies(f"sphere = 3\n{TWO[BASE:]}"), "[material] sphere: found 3, expected a table"),
     (bodies(TWO[:BASE]), "[material] base: missing"),
     (bodies(TWO.replace("poisson_ratio = 0.33\n", "")), "[material] base.poisson_ratio: missing"),
+    (layout("spacing = 1\ntip_radius = [1, 2]", "load = 1"),
+     "[asperities] within: missing, needed with a list of tip radii under a given load"),
+    (scene_text(more=PASCALS), "[material] contact_modulus: found 1 N/m², which is 1 Pa, expected"),
+    (bodies(TWO.replace("8e3", "8")) + PASCALS, "[material.sphere] hardness: found 8 N/m², which"),
     # [normal], [solver], [units], and which tables there are
     (scene_text(normal=""), "[normal] approach, load: found neither, expected exactly one of the"),
     (scene_text(normal="approach = 1\nload = 1"),

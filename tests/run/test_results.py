@@ -17,17 +17,22 @@ def named(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_force_leaves_nothing_of_the_run_before(command: Any, tmp_path: Path) -> None:
-    """And nothing else is touched: not what a user added."""
+def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
+    """It is refused; --force leaves nothing of the run before, and what a user added."""
     (tmp_path / "a.toml").write_text(scene_text(more=FRICTION + "[history]\nfractions = [0.5]"))
     (tmp_path / "b.toml").write_text(scene_text(normal="approach = 2e-5"))
     folder = tmp_path / "out"
     assert command("run", "a.toml", "--out", "out", "--no-figures").status == 0
     assert {"history.csv", "scene.toml", "files.json"} < named(folder)
     (folder / "notes.txt").write_text("mine")
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    refused = command("run", "b.toml", "--out", "out", "--no-figures")
+    assert (refused.status, "out: not empty; --force replaces" in refused.err) == (2, True)
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
     ran = command("run", "b.toml", "--out", "out", "--no-figures", "--force")
     expected = {"summary.json", "asperities.csv", "scene.toml", "files.json", "notes.txt"}
     assert (ran.status, named(folder)) == (0, expected)
+    assert (folder / "notes.txt").read_text() == "mine"
 
 
 def test_a_manifest_removes_nothing_outside_its_folder(command: Any, tmp_path: Path) -> None:

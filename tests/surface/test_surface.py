@@ -85,6 +85,10 @@ def test_a_paraboloid_of_a_turned_cylinder() -> None:
     (removed,) = surface.detrend("paraboloid").removed
     assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
     assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
+    metres = (
+        cr.surface.Surface(surface.heights, (0.5, 0.7), "mm").detrend("paraboloid").to_unit("m")
+    )
+    assert_allclose(metres.removed[0].curvatures, np.multiply(1e3, removed.curvatures))
 
 
 def test_a_trend_that_explains_most_is_named() -> None:

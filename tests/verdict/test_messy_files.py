@@ -328,6 +328,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                 "all are shifted by [0.0003, 0]"),
     "loaded nodes only": (lambda case: touching(case, case.table()), "",
                           "; --missing-open takes the others for open"),
+    "loaded nodes by id": (
+        lambda case: {"id": 1 + np.flatnonzero(case.loads), "load": case.loads[case.loads > 0]},
+        "", "rows: found 7, expected 12", "; --missing-open takes the others for open"),
     "negative loads": (lambda case: case.table(load=-case.loads[case.order]), "",
                        "no load is positive, expected compression to be: --sign -1"),
     "an index twice": (lambda case: {"index": [0, *range(COUNT - 1)], "load": case.loads}, "",

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -139,10 +139,6 @@ class CycleResult(Result):
         """Slip, losses and tractions of each asperity in each cycle."""
         return [fretting(each) for each in self.found]
 
-    def prepare(self, *, figures: bool) -> None:
-        super().prepare(figures=figures)
-        _ = self.loops, self.worn
-
     def tables(self) -> dict[str, Columns]:
         """The tables of cycles, of fretting by asperity, and of loops, in total and by asperity."""
         touching = int(np.count_nonzero(self.contact.loads))
@@ -152,21 +148,17 @@ class CycleResult(Result):
         }
         given = fretting_columns(self.worn)
         worn |= {name: it for name, it in given.items() if name not in ("maximum", "minimum")}
-        parts: list[tuple[float, float, str, Any, Any]] = []
+        parts: list[list[NDArray[Any]]] = []
         for row, loop in zip(self.known, self.loops, strict=True):
-            ends = (row["maximum_fraction"], row["minimum_fraction"])
-            parts.append((*ends, "total", loop.forces, loop.displacements))
-            own = zip(
-                loop.asperities, loop.asperity_forces.T, loop.asperity_displacements.T, strict=True
-            )
-            parts += [(*ends, str(i), forces, moved) for i, forces, moved in own]
+            forces, moved = loop.asperity_forces.T, loop.asperity_displacements.T
+            curves = [("total", loop.forces, loop.displacements)]
+            curves += zip(loop.asperities.astype(str), forces, moved, strict=True)
+            for curve, *values in curves:
+                same = [*(row[name] for name in self.stage.labels), curve]
+                parts.append([*(np.full(len(values[0]), each) for each in same), *values])
         names = (*self.stage.labels, "curve", "force", "displacement")
-        columns = dict(zip(names, zip(*parts, strict=True), strict=True))
-        sizes = [len(each) for each in columns["force"]]
-        loop_table = {
-            name: np.concatenate(it) if name in ("force", "displacement") else np.repeat(it, sizes)
-            for name, it in columns.items()
-        }
+        columns = map(np.concatenate, zip(*parts, strict=True))
+        loop_table = dict(zip(names, columns, strict=True))
         return {**super().tables(), "loop": loop_table, "fretting": worn}
 
     @property

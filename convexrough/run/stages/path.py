@@ -216,10 +216,6 @@ class SteadyResult(Single):
         """The slip, losses and tractions of each asperity in the steady cycle."""
         return fretting(self.found[0])
 
-    def prepare(self, *, figures: bool) -> None:
-        super().prepare(figures=figures)
-        _ = self.worn
-
     def tables(self) -> dict[str, Columns]:
         x, y = self.contact.scene.asperities.positions.T
         columns = self.found[0].columns("slips", "stick_radii", "status")
