@@ -215,7 +215,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
 def _unread_statuses(table: ReadTable) -> Iterator[str]:
     """A message for each column of statuses, or of flags of slip, that is not read."""
     for header, cells in table.others.items() if "status" not in table.columns else ():
-        name, said = bare(header), {str(cell).strip().lower() for cell in cells.tolist()}
+        name, said = bare(header)[:60], {str(cell).strip().lower() for cell in cells.tolist()}
         known = {*WORDS, *OF_SHEAR}
         if said & known and said <= {*known, ""}:
             named = f"--column status={quote(name)}"

@@ -37,7 +37,7 @@ TOTAL = 1e-4
 #: Part of loaded nodes that may be far from all asperities, if not all positions are wrong.
 FEW_FAR = 0.1
 
-#: At most this many unread columns are compared with the positions of asperities.
+#: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
 #: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
@@ -333,8 +333,10 @@ class Placing:
 
 
 def unused(table: ReadTable) -> str:
-    """The end of a message, with the names of columns that are not read."""
-    return f"; not used: {', '.join(names)}" if (names := [*filter(None, table.others)]) else ""
+    """The end of a message, with names of columns that are not read, some if they are many."""
+    names = [*filter(None, table.others)]
+    more = f" and {len(names) - MOST_UNREAD} more" if len(names) > MOST_UNREAD else ""
+    return f"; not used: {', '.join(names[:MOST_UNREAD])}{more}" if names else ""
 
 
 def _options(option: str, values: Mapping[str, str]) -> str:
