@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,10 @@ def read_grid(path: Path) -> HeightGrid:
             _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
             _refuse_numbers(path, "column 1", heights[1:, 0], heights[1:, 1])
         return _said(table.comments, heights)
+    if table.header and width > 3:
+        first = [table.style.number(cell) for cell in table.header.cells[1:]]
+        if len(first) > 2 and None not in first:
+            raise _not_heights(path, "row 1", first)
     if table.header and len(table.header.cells) < 3 < width:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
         where = f"{path}: row {table.header.number}"
@@ -63,12 +67,17 @@ def read_grid(path: Path) -> HeightGrid:
 def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
     """Raise InputError for coordinates or numbers of rows or columns, here without the first."""
     if _even(line) and not _even(second):
-        said = ", ".join(f"{each:g}" for each in line[:3])
-        expected = (
-            "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
-            "header=False, index=False"
-        )
-        raise InputError(place, found=f"numbers {said}, ...", expected=expected, where=str(path))
+        raise _not_heights(path, place, line.tolist())
+
+
+def _not_heights(path: Path, place: str, line: Sequence[Any]) -> InputError:
+    """The error for a row or column of coordinates or numbers beside the heights."""
+    said = ", ".join(f"{each:g}" for each in line[:3])
+    expected = (
+        "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
+        "header=False, index=False"
+    )
+    return InputError(place, found=f"numbers {said}, ...", expected=expected, where=str(path))
 
 
 def _even(line: Array) -> bool:

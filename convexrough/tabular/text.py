@@ -62,7 +62,7 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells and the decimal mark; the name of the sheet of a workbook."""
+    """The separator of cells and the decimal mark; the sheet of a workbook, in quotes."""
 
     separator: str
     decimal: str
@@ -70,7 +70,7 @@ class Style(NamedTuple):
 
     def __str__(self) -> str:
         if self.sheet:
-            return f'sheet "{self.sheet}"'
+            return f"sheet {self.sheet}"
         names = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
         comma = ", decimal comma" if self.decimal == "," else ""
         return f"separated by {names.get(self.separator, repr(self.separator))}{comma}"
@@ -260,7 +260,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
-    """Name and numbered rows, with tabs, of the first sheet with a known column, else the first."""
+    """Numbered rows, with tabs, of the first sheet with a known column, else the first; its name.
+
+    The name is in quotes, and followed by those of other sheets with known columns.
+    """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
@@ -273,8 +276,10 @@ def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[
     def wanted(page: list[list[str]]) -> bool:
         return any(bare(cell).lower() in known for row in page[:SAMPLE] for cell in row)
 
-    found = next((each for each in pages if wanted(each[1])), pages[0] if pages else ("", []))
-    return found[0], enumerate(map("\t".join, found[1]), 1)
+    found = [page for page in pages if wanted(page[1])] or pages[:1] or [("", [])]
+    (first, rows), others = found[0], [f'"{name}"' for name, _ in found[1:]]
+    name = f'"{first}"' + (f", not {' or '.join(others)}" if others else "")
+    return name, enumerate(map("\t".join, rows), 1)
 
 
 def _plain(cell: Any) -> str:

@@ -172,6 +172,11 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
             "row 1: found numbers 0.2, 0.4, 0.6, ..., expected heights alone: leave coordinates",
         ),
         (
+            "y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n",
+            {"pixel": 0.2},
+            "row 1: found numbers 0.2, 0.4, 0.6, ..., expected heights alone",
+        ),
+        (
             "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
             {"pixel": 1.0},
             "column 1: found numbers 1, 2, 3, ...",

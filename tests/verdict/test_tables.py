@@ -334,6 +334,10 @@ def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
     book.save(tmp_path / "loads.xlsx")
     note = read_loads(tmp_path / "loads.xlsx", small()).note
     assert 'loads.xlsx: sheet "Run 2", matched by position' in note
+    book.create_sheet("Run 3").append(["load"])
+    book.save(tmp_path / "loads.xlsx")
+    note = read_loads(tmp_path / "loads.xlsx", small()).note
+    assert 'loads.xlsx: sheet "Run 2", not "Run 3", matched by position' in note
 
 
 def test_a_column_z_holds_heights(tmp_path: Path) -> None:
