@@ -1,7 +1,7 @@
 """Press many scenes with equal numbers of asperities at once, and compute a cycle of each.
 
-Scenes with the same positions and tip radii share one matrix. Scenes whose solution is not proved
-in this way are pressed one by one.
+Scenes with the same positions and tip radii share one matrix. Where possible, the scenes are solved
+and proved together; the others are pressed one by one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Table):
-    """The contacts of m scenes with n asperities each. Errors are proved bounds.
+    """The contacts of m scenes with n asperities each. Fields ending in `errors` are proved bounds.
 
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 

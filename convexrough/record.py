@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """A dataclass that prints one line for each field; unpickled arrays are read-only again."""
+    """Base of dataclasses: prints a line for each field; unpickled arrays are read-only."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()

@@ -81,7 +81,7 @@ class Law(Protocol[Point]):
         ...
 
     def direction(self, state: Point, left: float) -> Array:
-        """The step d, with |F + F' d| at most about left |F| in the 2-norm."""
+        """The step d: the 2-norm of F + F' d is at most about `left` times that of F."""
         ...
 
     def gradient(self, state: Point) -> Array:
@@ -127,7 +127,8 @@ def solve(
 ) -> tuple[Point, int]:
     """The final state, and the number of steps.
 
-    before : 2-norm of an estimated defect one step before the start; it sets the first tolerance
+    before : 2-norm of an estimated defect one step before the start; it sets the tolerance of the
+        first linear system
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does

@@ -23,8 +23,8 @@ from convexrough.roundoff import SAFETY
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     """(n,) violations e for residuals F - beta.
 
-    inside : (n,) False where x is on a lower face of K. True is also valid on an upper face, where
-        the e of an interior point is at least as large
+    inside : (n,) False where x is on a lower face of K. True is also valid on an upper face: the e
+        of an interior point, |F - beta|, is at least as large as that of a point on an upper face
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)

@@ -1,10 +1,11 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
 The path is a closed curve of the load P and the shear force Q. With the coefficient of friction f,
-let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. From the second
-cycle on, every memory curve (docs/theory/paths.md) passes through the point L* = (m+ + m-) / 2,
-T* = (m+ - m-) / 2. The curve below L* never changes again. Above L* it repeats in each cycle and
-does not depend on the start. docs/theory/losses.md derives the loss.
+let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. The memory curve
+(docs/theory/paths.md) gives the shear force that the layers of the contact up to each normal load s
+carry, divided by f. From the second cycle on, it passes through the point L* = (m+ + m-) / 2,
+T* = (m+ - m-) / 2 at every moment. The curve below L* never changes again. Above L* it repeats in
+each cycle and does not depend on the start. docs/theory/losses.md derives the loss.
 """
 
 from __future__ import annotations
@@ -67,8 +68,8 @@ class Cycle(Table, Plottable):
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on their errors
-    level, force_level : [force] L* and f T* (docs/theory/paths.md): the part of the state that is
-        due to normal loads up to L* is the same in every cycle
+    level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
+        L* is the same at every moment from the second cycle on
     balance_defect   : relative difference between `loss` and a second formula for it, the error of
         the trapezoid rule (docs/theory/losses.md); a check of rounding; nan if P varies
         or order fails
@@ -205,8 +206,9 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative. In gross sliding this is so if several
-        asperities slide last, or if the approach is kept constant.
+        Raises InputError if the loss has no derivative. In gross sliding it has none if several
+        asperities start to slide at the same force, as the last ones, or if the approach is kept
+        constant.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -237,7 +239,8 @@ class Loop(Table):
 
     asperities    : (k,) indices of the asperities whose own loops are given
     forces        : (m,) [force] shear force
-    displacements : (m,) [length] displacement of distant points, both bodies
+    displacements : (m,) [length] relative tangential displacement of distant points of the two
+        bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
     asperity_displacements : (m, k) [length] local deflection plus slip of each asperity
 

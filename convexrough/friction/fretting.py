@@ -9,8 +9,9 @@ amplitude  f c_t [g + (r^2/R) h(c/r)]  with
 f c_t g is the amplitude of gross slip, which is 0 if a disc sticks. (r^2/R) h(c/r) is the gap of a
 Hertz contact of radius c at the distance r. The formula holds inside the contact disc at the lowest
 load of the cycle. Outside this disc contact is lost in each cycle, and the slip is not known. The
-shear traction is a sum of Hertz pressures over the levels s_k of the memory curve with its bends
-b_k and the contact radii a(s_k):
+shear traction is a sum over the loads s_k at which the slope of the memory curve
+(docs/theory/paths.md) changes. b_k is the slope below s_k minus the slope above it, and a(s_k) is
+the contact radius at the load s_k:
 
     q(r) = f (2 E* / pi R) sum_k b_k sqrt(a(s_k)^2 - r^2).
 

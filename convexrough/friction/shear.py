@@ -132,8 +132,9 @@ class ShearState(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if there is no derivative. In gross sliding this is so if several
-        asperities slide last, or if the approach is kept constant.
+        Raises InputError if there is no derivative. In gross sliding there is none if several
+        asperities start to slide at the same force, as the last ones, or if the approach is kept
+        constant.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -272,9 +273,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     force  : [force] the prescribed sum of the shear forces
 
     `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity gets the status that it has in the solution if its bound is small enough: for
-    "sliding", below 1 % of the friction limit f P_i; for "partial", below the f P_i - |Q_i| of the
-    solution. Otherwise it is "undecided". The rest of the certificate is that of the solution.
+    asperity gets the status that it has in the solution if its entry of `force_errors` is small
+    enough. For "sliding" it must be below 1 % of the friction limit f P_i; for "partial" it must be
+    below the margin f P_i - |Q_i|, with the force Q_i of the solution. Otherwise the asperity is
+    "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.

@@ -57,7 +57,7 @@ FILLED = 0.2
 MOST_KEPT = 2**21
 
 #: 2 log 2, rounded down. The minimum of the symbol is -2 log 2 for a row of points, and at most
-#: this for every lattice. The constant affects speed only.
+#: -2 log 2 for every lattice. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -67,7 +67,8 @@ class LatticeInfluence:
 
     array       : (N, 2) [length] points, with errors of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact points, before multiplication by `lattice.shrink` (most often 1)
+    layout      : the exact summits; `array` is these times `lattice.shrink`, rounded. The factor
+        is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
     lattice     : the lattice of the points
     scale       : A_ij r_ij, which is 1 / (pi E*)
     """

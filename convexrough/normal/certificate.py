@@ -38,9 +38,9 @@ STATUSES = np.array(["undecided", "contact", "open"])
 class Certificate(Table):
     """What is proved about given loads. Arrays are (n,), in the order of the loads.
 
-    scope : "global": the scene has exactly one solution; "local": it has exactly one solution with
-        contact radii near these (`meaning` describes the others that are possible); "none":
-        nothing is proved, every bound is infinite and every asperity is undecided
+    scope : "global": the scene has exactly one solution; "local": the bounds hold for one solution
+        near these loads, but others are not excluded (`meaning` describes which are possible);
+        "none": nothing is proved, every bound is infinite and every asperity is undecided
     convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
         the smallest eigenvalue of the Hessian, scaled by each asperity's local compliance, is at
         least 1 - convexity_number
@@ -57,9 +57,9 @@ class Certificate(Table):
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
         of them touches are not excluded
-    other_solutions_crowding : lower bound on the crowding of every other solution: on its largest
-        (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where there is no
-        other solution, and 0 where nothing is known
+    other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
+        the largest (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where
+        there is no other solution, and 0 where nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
     in_the_way : (m,) indices of asperities that prevent a proof; empty where there is one

@@ -50,8 +50,8 @@ class Program(Record):
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
     objective   : minimum of the objective, in energy_unit; for bristles as OSQP finds it, or nan
-    constant    : the energy is constant + objective, or constant - objective for the dual, in
-        energy_unit; 0 for bristles and if the approach is prescribed
+    constant    : the energy, in energy_unit, is constant + objective; for the dual it is constant -
+        objective. The constant is 0 for bristles, and if the approach is prescribed
     load_error_estimate : estimated error of the loads that minimise the objective exactly, as a
         fraction of the largest load
 
@@ -147,8 +147,9 @@ def program(
     >>> program.data.cones
     220
 
-    Raises TooDenseError if the solution lies outside the boxes in which the program is exact, and
-    SolverError if Newton's method, whose loads set the bounds and the minimum, finds no solution.
+    Raises TooDenseError if the solution lies outside the boxes in which the program is exact.
+    Raises SolverError if Newton's method finds no solution: its loads show whether the solution
+    lies in the boxes.
     """
     checks.instance("scene", scene, Scene)
     if not isinstance(bristles, int) or bristles < 1:

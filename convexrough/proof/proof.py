@@ -93,11 +93,12 @@ def prove(
     loads    : (n,) [force] not negative, in the order of the scene's asperities; or a `NearState`
     approach : [length] prescribed approach, if no load is given
     load     : [force] prescribed load P, if no approach is given
-    sheared  : friction states to prove, with the losses of cycles from -Q to Q; each is a pair of
-        the shear force Q [force] and the `NearState` at the load P - Q / f
+    sheared  : friction states to prove, with the losses of cycles from -Q to Q. Each is a pair: the
+        shear force Q [force], and the `NearState` of the contact without shear at the load P - Q/f,
+        with the coefficient of friction f (docs/theory/proof-file.md)
 
-    A proof takes as long as the check, which computes the bounds: about a minute for 3,000
-    asperities.
+    The function runs the checker, which computes the bounds, so it takes as long as a check: about
+    a minute for 3,000 asperities.
 
     Raises InputError for invalid values and for scenes too large for the checker; ProofError if no
     solution is proved, because the loads are too inaccurate or the contacts overlap too much.

@@ -47,8 +47,8 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: Loads of a stage further from that of [normal] than by this factor get a warning, and shear
-#: forces below this fraction of the friction limit.
+#: A stage gets a warning if its largest load differs from the load of [normal] by more than this
+#: factor, or if its largest shear force is below this fraction of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
 #: At most this many rows of a table of steps are printed, the last ones.
@@ -184,7 +184,7 @@ class Result(Table, Plottable):
 
     @property
     def orders(self) -> set[str]:
-        """What is proved about order, which results with friction need (docs/theory/states.md)."""
+        """What is proved about order (docs/theory/states.md), for each in `found`."""
         return {each.order for each in self.found if getattr(each, "order", None)}
 
     @property

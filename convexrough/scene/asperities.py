@@ -134,9 +134,10 @@ class Asperities(Record):
         within        : [length] largest distance of asperities from the axis
         height_std    : [length] standard deviation of heights, which are normal random numbers
         tip_radius_cv : coefficient of variation of tip radii, which are lognormal random numbers
-            with the mean `tip_radius`. Both are cut at 6 standard deviations
+            with the mean `tip_radius`
         seed          : of the random numbers; required with height_std or tip_radius_cv
 
+        The normal random numbers behind heights and tip radii are clipped at 6 standard deviations.
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities and leaves the others unchanged, with their random heights and radii.
         """

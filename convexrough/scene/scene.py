@@ -70,7 +70,7 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Each finite radius [length], with the axes (0 is x, 1 is y) that have it."""
+        """Pairs of a finite radius [length] and the axes (0 is x, 1 is y) along which it holds."""
         return base.curved(self.sphere_radius)
 
     @property
@@ -109,14 +109,17 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] R, or in the geometry "closest" R + rho_i, for a radius R of the sphere."""
+        """(n,) [length] the radius in `drops`: R, or in the geometry "closest" R + rho_i."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
 
     @cached_property
     def contact_tails(self) -> Array | None:
-        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96; None if all are 0."""
+        """(n, 2) [length] exact contact points minus `contact_points`; None if all are 0.
+
+        Each is known to 2^-96 of the contact point.
+        """
         points = self.asperities.positions
         if self.contact_points is points:
             return None
@@ -130,7 +133,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points if it is that of the summits, scaled; else None."""
+        """The lattice of the contact points, if it is a scaled copy of that of the summits."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -148,7 +151,7 @@ class Scene(Record):
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] distance of the undeformed sphere from its tangent plane on the axis.
+        """(n,) [length] gaps between the sphere and asperities of height 0, at the approach 0.
 
         It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
         r_i from the axis. With two radii it is the sum of such terms in x and y.
@@ -160,7 +163,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] offsets d_i = z_i - drop_i, with heights z_i: D0 + d_i is prescribed."""
+        """(n,) [length] offsets d_i: heights minus `drops`. Contact displaces by D0 + d_i."""
         return frozen(self.asperities.heights - self.drops)
 
     @property

@@ -1,4 +1,4 @@
-"""Newton's method for the normal problem: docs/theory/newton.md.
+"""Newton's method for the loads under normal pressure: docs/theory/newton.md.
 
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and

@@ -28,7 +28,7 @@ HEIGHTS = ("heights", "height", "z")
 SLOPES = (1e-5, 10.0)
 
 #: Numbers that mark holes, and the size from which any number does, if they differ from the median
-#: of all other heights by more than FAR times the range of these.
+#: of all other heights by more than FAR times the range of these; so may the extremes.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference up to which two pixel sizes count as equal.
@@ -105,17 +105,20 @@ def _pixel(
 
 
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
-    marks = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
-    if marks.any() and (rest := heights[~marks & ~np.isnan(heights)]).size:
-        marks &= np.abs(heights - np.median(rest)) > FAR * np.ptp(rest)
-        named = [f"{each:g}" for each in np.unique(heights[marks])]
-        heights = np.where(marks, np.nan, heights)
-    else:
-        named = []
-    holes = int(np.count_nonzero(np.isnan(heights)))
+    known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
+    marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
+    rest = heights[~marks & ~np.isnan(heights)]
+    span = np.ptp(rest) if rest.size else np.inf
+    marks &= (np.abs(heights - np.median(rest)) > FAR * span) & (known | (span > 0))
+    empty = np.isnan(heights) | marks
+    holes = int(np.count_nonzero(empty))
     if holes == 0:
         return heights, 0
-    found = f"{holes:,} holes ({', '.join(['nan', *named])}) in {heights.size:,} pixels"
+    named = [f"{each:g}" for each in np.unique(heights[empty])]
+    row, column = np.argwhere(empty)[0] + 1
+    found = f"{holes:,} holes ({', '.join(named)}) in {heights.size:,} pixels"
+    found += f", the first in row {row}, column {column}"
+    heights = np.where(marks, np.nan, heights)
     if holes == heights.size:
         raise InputError("heights", found=found, expected="some heights")
     if not fill:

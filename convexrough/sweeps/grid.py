@@ -1,7 +1,8 @@
 """The scenes of a sweep: combinations of listed values, random values and seeds.
 
-Scenes are numbered so that lists taken together change slowest, then the keys of the grid, the last
-key fastest, and seeds fastest of all. Memory does not grow with the number of scenes.
+Scenes are numbered as in nested loops. The outermost loop takes the k-th values of all lists in
+`together`. Inside it is one loop for each key in `over`, in their order. The innermost loop takes
+the seeds. Memory does not grow with the number of scenes.
 """
 
 from __future__ import annotations

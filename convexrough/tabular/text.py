@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -43,6 +43,12 @@ HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 COMMENT = re.compile("[#%]")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
+#: A number whose digits are in groups of three: certainly, and perhaps (or with three decimals).
+_GROUPED = re.compile(
+    r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
+    r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
+)
+_PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
@@ -178,6 +184,7 @@ def read_text_table(
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
     style = _sniffed([text for _, text in lines[:SAMPLE]], styles)
+    _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
     read = (_row(number, text, style) for number, text in lines)
     rows = [row for row in read if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
     if not rows:
@@ -316,6 +323,37 @@ def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)
 
     return max(styles, key=score)
+
+
+def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:
+    """Raise FileError for numbers with thousands separators.
+
+    Numbers such as 3,134 could have three decimals. They have thousands separators if a column
+    contains ten of them or more, and besides only whole numbers below 1000.
+    """
+    columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
+    for number, line in lines:
+        separator = next((each for each in ";\t" if each in line), style.separator)
+        if separator == "," and '"' not in line:
+            continue  # a comma separates
+        row = _row(number, line, Style(separator, "."))
+        for place, cell in enumerate(line.split() if separator == " " else row.cells):
+            if _GROUPED.fullmatch(cell):
+                _refuse_grouped(path, number, cell)
+            if cell:
+                columns[place].append((number, cell))
+    for column in columns.values():
+        perhaps = [each for each in column if _PERHAPS_GROUPED.fullmatch(each[1])]
+        whole = [each for each in column if re.fullmatch(r"[+-]?\d{1,3}", each[1])]
+        if whole and len(perhaps) >= 10 and len(perhaps) + len(whole) >= len(column) - 1:
+            _refuse_grouped(path, *perhaps[0], f", and {whole[0][1]} in row {whole[0][0]}")
+
+
+def _refuse_grouped(path: Path, row: int, cell: str, more: str = "") -> NoReturn:
+    expected = "numbers without thousands separators" + (
+        ", or with the same number of decimals" if more else ""
+    )
+    raise FileError(f"{path}: row {row}: found {cell}{more}, expected {expected}")
 
 
 def _row(number: int, text: str, style: Style) -> TextRow:
