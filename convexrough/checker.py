@@ -181,7 +181,7 @@ def number(text: Any, what: str) -> Fraction:
             return Fraction(value)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise Unreadable(f"{what}: {str(text)[:40]!r} is not a finite float64 in hexadecimal")
+    raise Unreadable(f"{what}: {str(text)[:40]!r} is not a finite float64, as float.hex writes it")
 
 
 def numbers(values: Any, what: str, n: int | None = None) -> list[Fraction]:

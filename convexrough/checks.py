@@ -60,6 +60,13 @@ def between(what: str, value: float | None, low: float, high: float) -> float:
     return number
 
 
+def whole(what: str, value: int, least: int = 1) -> int:
+    """The value as an int; raises InputError unless it is a whole number, at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InputError(what, found=repr(value), expected=f"a whole number, at least {least}")
+    return int(value)
+
+
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
     """A float64 copy, of any shape; raises InputError for text, dates and complex numbers."""
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
@@ -69,7 +76,7 @@ def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
         if np.asarray(values).dtype.kind not in "biufO":
             raise TypeError("no real numbers")
         return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(what, found=_short(values), expected=expected) from error
 
 
@@ -101,8 +108,10 @@ def array(
         good &= each >= 0
     if not good.all():
         first = int(np.argmin(good))
-        kind = f"{sign}, finite" if sign else "finite"
-        raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
+        kind = f", {sign}" if sign else ""
+        huge = f", at most {LARGEST:g}" if LARGEST < abs(vector[first]) < np.inf else ""
+        expected = f"a finite number{kind}{huge}"
+        raise InputError(f"{what}[{first}]", found=vector[first], expected=expected)
     if not (good := (each == 0) | (np.abs(each) >= smallest)).all():
         first = int(np.argmin(good))
         raise InputError(f"{what}[{first}]", found=vector[first], expected=SIZED)
@@ -204,5 +213,5 @@ def _number(what: str, value: float | None, expected: str) -> float:
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(what, found=repr(value), expected=expected) from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(what, found=_short(value), expected=expected) from error

@@ -113,7 +113,8 @@ class Contact(Cached, Table, Plottable):
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
-        sheared : shear states of this contact, which the proof includes with their cycle losses
+        sheared : shear states of this contact, which the proof includes with the losses of cycles
+            between +Q and -Q; the sign of their forces Q does not matter
 
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
@@ -123,9 +124,10 @@ class Contact(Cached, Table, Plottable):
         refuse_many(self.scene)
         given = sheared if isinstance(sheared, Iterable) else [sheared]
         for k, state in enumerate(given):
-            if not hasattr(state, "force"):
-                expected = "a shear state, a result of `shear`"
-                raise InputError(f"sheared[{k}]", found=repr(state)[:60], expected=expected)
+            if getattr(state, "contact", self) is not self or not hasattr(state, "force"):
+                found = "a state of another contact" if hasattr(state, "contact") else repr(state)
+                expected = "a shear state of this contact, a result of `shear`"
+                raise InputError(f"sheared[{k}]", found=found[:60], expected=expected)
         by_load, n = self.prescribed_load is not None, len(self.scene)
         levels, states = self.cached(levels_of), []
         for state in given:

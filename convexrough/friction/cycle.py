@@ -528,8 +528,7 @@ def loops(
     >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
     [23, 41]
     """
-    if not isinstance(points, int) or points < 4:
-        raise InputError("points", found=points, expected="a whole number, at least 4")
+    checks.whole("points", points, 4)
     checks.sequence("cycles", cycles, "a list of cycles; `Cycle.loop` is for one")
     if not cycles:
         return []

@@ -255,7 +255,7 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     'proved'
     """
     checks.instance("contact", contact, Contact)
-    return contact.cached(FrictionLevels).order([Fraction(0)], most)
+    return contact.cached(FrictionLevels).order([Fraction(0)], checks.whole("most", most, 0))
 
 
 class Snapshot(NamedTuple):

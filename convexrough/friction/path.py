@@ -190,9 +190,8 @@ def walk(
 ) -> LoadPath:
     """The result of `load_path`, with a choice of the solver of general steps."""
     points = points_of(scene, loads, forces)
-    if general_steps is not None and (not isinstance(general_steps, int) or general_steps < 1):
-        expected = "a whole number, at least 1"
-        raise InputError("general_steps", found=general_steps, expected=expected)
+    if general_steps is not None:
+        checks.whole("general_steps", general_steps)
     curve = MemoryCurve()
     if start is not None:
         checks.instance("start", start, Contact)

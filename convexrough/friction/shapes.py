@@ -8,7 +8,6 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.errors import InputError
 
 
 def elliptic_path(
@@ -37,8 +36,7 @@ def elliptic_path(
     >>> len(loads), float(loads.max())
     (12, 1.5)
     """
-    if not isinstance(chords, int) or chords < 6:
-        raise InputError("chords", found=chords, expected="a whole number, at least 6")
+    checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200)
     p, q = (
         checks.finite("load_amplitude", load_amplitude),
         checks.finite("force_amplitude", force_amplitude),

@@ -8,7 +8,6 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.errors import InputError
 from convexrough.gallery.cases import FRICTION, MATERIAL
 from convexrough.influence.choice import couple
 from convexrough.record import Record
@@ -45,8 +44,7 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
     >>> proof.holds, bool(proof.load_errors.max() < 1e-9 * made.loads.max())
     (True, True)
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise InputError("count", found=repr(count), expected="a positive whole number")
+    checks.whole("count", count)
     part = checks.between("touching", touching, 0.0, 1.0)
     random = np.random.default_rng(checked_seed(seed))
     patch = Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=0.6 * np.sqrt(count) + 1)

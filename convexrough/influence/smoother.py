@@ -36,16 +36,44 @@ LEAST_WINDOW = 2 * FINE
 #: Side of the windows on which the scatter of W^2 is measured.
 WINDOW = 8
 
+#: Mean number of points in the cell of a point above which cells are made smaller, most cells per
+#: point, and largest difference between the numbers of rows or columns that contain points.
+MOST_COMPANY, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
+
 #: Lower limit of 1 + d A, as the spectrum of A is negative at short waves.
 LEAST = 0.2
 
 
 def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
-    """M for asperities anywhere, on square cells that hold about one asperity on average."""
-    away = points - points.min(axis=0)
+    """M for asperities anywhere, on square cells that hold about one asperity on average.
+
+    Where points are in clusters, cells are smaller, and wide empty strips between them are left out.
+    """
+    away, n = points - points.min(axis=0), len(points)
     width, height = away.max(axis=0).tolist()
-    side = max(np.sqrt(width * height / len(points)), (width + height) / len(points))
-    return block_smoother((away / side).astype(np.intp).T, np.eye(2), scale / side, root)
+    side = max(np.sqrt(width * height / n), (width + height) / n)
+    cells = _packed_cells(away / side)
+    while _company(cells) > MOST_COMPANY:
+        finer = _packed_cells(away / (0.5 * side))
+        if np.prod(finer.max(axis=1) + 1) > MOST_CELLS * n:
+            break
+        side, cells = 0.5 * side, finer
+    return block_smoother(cells, np.eye(2), scale / side, root)
+
+
+def _packed_cells(places: Array) -> Indices:
+    """(2, n) cells of places (n, 2) [cell], without most of the empty rows and columns."""
+    cells = []
+    for axis in places.T:
+        used, which = np.unique(axis.astype(np.int64), return_inverse=True)
+        cells.append(np.minimum(np.diff(used, prepend=used[0]), WIDEST_GAP).cumsum()[which])
+    return np.array(cells)
+
+
+def _company(cells: Indices) -> float:
+    """The mean number of points in the cell of a point."""
+    counts = np.bincount(cells[0] * (cells[1].max() + 1) + cells[1])
+    return float(counts @ counts) / cells.shape[1]
 
 
 def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:
@@ -67,7 +95,10 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
 
     total = sums(root * root)  # D^2
     touching = total > 0
-    count = float(sums(root > 0)[touching].mean())
+    counts = sums(root > 0)[touching].astype(np.float64)
+    count, crowd = float(counts.mean()), float(counts @ counts / counts.sum())
+    # Where blocks hold many asperities: A W r within a block, as if signs were random.
+    rough = scale / m * np.sqrt(np.pi * crowd * np.log(max(0.5 * crowd / (m * m), 1.0)))
     size, spectrum = _block_spectrum(shape, basis, m, count, workers)
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)
@@ -98,7 +129,8 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
         averages *= q
         np.subtract(values, averages, out=averages)
         averages *= touched
-        return averages, float(np.sqrt(left.sum()))
+        waves, inner = np.sqrt(left.sum()), rough * np.linalg.norm(w * values) if rough else 0.0
+        return averages, float(np.hypot(waves, inner))
 
     return smooth
 

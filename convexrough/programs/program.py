@@ -152,8 +152,7 @@ def program(
     lies in the boxes.
     """
     checks.instance("scene", scene, Scene)
-    if not isinstance(bristles, int) or bristles < 1:
-        raise InputError("bristles", found=bristles, expected="a whole number, at least 1")
+    checks.whole("bristles", bristles)
     return stated(*solved(scene, approach, load), form, bristles)
 
 

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
-from convexrough.errors import InputError, SolverError
+from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
@@ -90,9 +90,7 @@ class BristleQP:
 
     def __post_init__(self) -> None:
         for name in ("bristles", "max_iterations"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InputError(name, found=repr(value), expected="a positive whole number")
+            checks.whole(name, getattr(self, name))
         checks.positive("tolerance", self.tolerance)
 
     @property

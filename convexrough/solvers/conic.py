@@ -42,6 +42,10 @@ class Conic(ConeSolver):
 
     max_iterations: int = 200
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.whole("max_iterations", self.max_iterations)
+
     @property
     def formulation(self) -> str:
         return "conic"

@@ -71,6 +71,8 @@ class ConicCVXPY(ConeSolver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.max_iterations is not None:
+            checks.whole("max_iterations", self.max_iterations)
         if not isinstance(self.solver, str):
             raise InputError("solver", found=repr(self.solver), expected="a name that CVXPY knows")
         object.__setattr__(self, "solver", self.solver.upper())

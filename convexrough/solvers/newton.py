@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
 from convexrough.errors import SolverError
@@ -48,6 +49,10 @@ class Newton:
     tolerance: float = 0.0
     max_iterations: int = 100
     name: str = field(default="newton", init=False)
+
+    def __post_init__(self) -> None:
+        checks.non_negative("tolerance", self.tolerance)
+        checks.whole("max_iterations", self.max_iterations)
 
     def solve(
         self,

@@ -107,9 +107,11 @@ def _pixel(
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
-    rest = heights[~marks & ~np.isnan(heights)]
-    span = np.ptp(rest) if rest.size else np.inf
-    marks &= (np.abs(heights - np.median(rest)) > FAR * span) & (known | (span > 0))
+    if (rest := heights[~marks & ~np.isnan(heights)]).size:
+        span = np.ptp(rest)
+        marks &= (np.abs(heights - np.median(rest)) > FAR * span) & (known | (span > 0))
+    else:
+        marks = known
     empty = np.isnan(heights) | marks
     holes = int(np.count_nonzero(empty))
     if holes == 0:

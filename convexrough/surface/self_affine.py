@@ -102,9 +102,7 @@ def _waves(
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)
     rolloff, pixel = checks.positive("rolloff", rolloff), checks.positive("pixel", pixel)
-    if not isinstance(pixels, (int, np.integer)) or isinstance(pixels, bool) or pixels < 8:
-        raise InputError("pixels", found=repr(pixels), expected="a whole number, at least 8")
-    checks.fits_in_memory("pixels", pixels, 64, power=2)
+    checks.fits_in_memory("pixels", checks.whole("pixels", pixels, 8), 64, power=2)
     shortest = RESOLVED * pixel if cutoff is None else checks.positive("cutoff", cutoff)
     size = pixels * pixel
     if shortest <= 2 * pixel * (1 + 1e-12):

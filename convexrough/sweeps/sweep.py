@@ -93,8 +93,8 @@ def sweep(
     if executor is not None:
         checks.instance("executor", executor, Executor)
         return run(plan, executor, **asked).table
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise InputError("workers", found=repr(workers), expected="at least one process")
+    if workers is not None:
+        checks.whole("workers", workers)
     with Processes(workers) as mine:
         return run(plan, mine, **asked).table
 
