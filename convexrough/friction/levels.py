@@ -191,10 +191,9 @@ class FrictionLevels:
 
     def indentations(self, level: Level) -> Ball:
         """(N,) indentations n_i in scaled units; in float64 for asperities that cannot touch."""
-        known, others = level.indentation, self._others
+        known, others = of_rows(self.to_scene, level.indentation), self._others
         if len(others) == 0:
             return known
-        known = of_rows(self.to_scene, known)
         (high, low), radius = known.mid, known.radius
         approach = float(level.approach.value)
         high[others] = approach + self.scene.offsets[others] / self.units.length

@@ -81,13 +81,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
     """The onsets of asperities that touch at P; a bound that is not proved is 0 or P."""
-    depths = levels.top.indentation.value[np.searchsorted(levels.candidates, which)]
+    depths = levels.top.indentation.value[levels.top.problem.places[which]]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
     """The onset of one asperity, enclosed by levels near the root: known or else new ones."""
-    place = int(np.searchsorted(levels.candidates, asperity))
+    place = int(levels.top.problem.places[asperity])
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
     near = [s for s in levels.known if around[0] <= abs(s - found) <= around[ENOUGH]]
@@ -104,7 +104,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
 
-    if depth(Fraction(0)) >= 0.0:  # no asperity is higher
+    if not levels.at(Fraction(0)).open[place]:  # no asperity is known to be higher
         return Fraction(0)
     known = [load for load in levels.known if depth(load) > 0]
     low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)

@@ -155,7 +155,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     if contact.loads[which] == 0.0:
         expected = "an asperity that carries a load: others never slide"
         raise InputError("asperity", found=asperity, expected=expected)
-    place = int(np.searchsorted(top.problem.candidates, which))
+    place = int(top.problem.places[which])
     offsets, parts = top.problem.exact.offsets, []
     first = offsets.upper >= offsets.lower.max()
     total = top.load * f * unit

@@ -47,7 +47,7 @@ LEAST = 0.2
 def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
     """M for asperities anywhere, on square cells that hold about one asperity on average.
 
-    Where points are in clusters, cells are smaller, and wide empty strips between them are left out.
+    Where points are in clusters, cells are smaller, and wide empty strips are left out.
     """
     away, n = points - points.min(axis=0), len(points)
     width, height = away.max(axis=0).tolist()

@@ -150,6 +150,13 @@ class NormalProblem:
         return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
 
     @cached_property
+    def places(self) -> Indices:
+        """(N,) index of each asperity among the candidates, whose order is any; -1 for others."""
+        places = np.full(len(self.scene), -1)
+        places[self.candidates] = np.arange(len(self))
+        return places
+
+    @cached_property
     def exact_depths(self) -> Ball:
         """(n,) D, at a prescribed approach."""
         return self.exact.offsets + self.depth

@@ -165,7 +165,8 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
         return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + missing.loads)
 
     _, at_first = theorem(box.compliance, 1.0 - box.convexity_number)
-    inside = ((trial + at_first < box.faces) & np.isfinite(at_first)).all(axis=-1)
+    within_faces = (trial + at_first < box.faces) & np.isfinite(at_first)
+    inside = (within_faces & ~(box.fixed_open & (trial > 0))).all(axis=-1)
     h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
     number = np.minimum(box.convexity_number, box.problem.convexity_at(h))
     within, errors = theorem(h, 1.0 - number)

@@ -39,8 +39,11 @@ SAMPLE = 200
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
-#: The beginning of a line that is a comment.
-COMMENT = re.compile("[#%]")
+#: The sign before a comment: not that of #N/A or -1.#IND.
+_SIGN = r"#(?![A-Z]+[/!?])"
+
+#: The beginning of a line that is a comment, and of one behind cells.
+COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 #: A number whose digits are in groups of three: certainly, and perhaps (or with three decimals).
@@ -177,8 +180,8 @@ def read_text_table(
         elif comment.match(inner):
             comments.append(inner)
             title = title if lines else inner.lstrip("#%")
-        elif inner and not _RULE.fullmatch(inner):
-            text = text if '"' in text else text.partition("#")[0]
+        elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
+            text = text if '"' in text else _BEHIND.split(text, maxsplit=1)[0]
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
         raise FileError(f"{path}: empty")
@@ -186,10 +189,14 @@ def read_text_table(
     style = _sniffed([text for _, text in lines[:SAMPLE]], styles)
     _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
     read = (_row(number, text, style) for number, text in lines)
-    rows = [row for row in read if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
+    every = list(read)
+    filled = [row for row in every if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
+    rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
         raise FileError(f"{path}: empty")
     header, rows = _headed(rows, title, style, known)
+    if header is None and len(rows[0].cells) > 3:  # a matrix, in which rows can be holes
+        rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
 
 
@@ -203,7 +210,8 @@ def _headed(
 
     if _numeric(rows[0].cells, style):
         named = _header(title, style)
-        found = len(named) == len(rows[0].cells) and wanted(named)
+        width = len(rows[0].cells)
+        found = len(named) == width and (wanted(named) >= 2 or 2 * wanted(named) >= width)
         return (TextRow(0, title, named) if found else None), rows
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
@@ -323,6 +331,10 @@ def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)
 
     return max(styles, key=score)
+
+
+def _are_holes(cells: Sequence[str]) -> bool:
+    return len(cells) > 1 and all(cell.lower() in HOLES for cell in cells)
 
 
 def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:

@@ -159,7 +159,7 @@ class Loaded:
     @property
     def places(self) -> Indices:
         """(n,) indices of the loaded asperities among the candidates."""
-        return np.searchsorted(self.levels.candidates, self.touching)
+        return self.levels.top.problem.places[self.touching]
 
     @cached_property
     def elastic(self) -> Ball:
