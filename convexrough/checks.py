@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sized
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -108,15 +108,34 @@ def array(
         good &= each >= 0
     if not good.all():
         first = int(np.argmin(good))
-        kind = f", {sign}" if sign else ""
+        kind = {"": "a finite number", "positive": "a positive, finite number"}
         huge = f", at most {LARGEST:g}" if LARGEST < abs(vector[first]) < np.inf else ""
-        expected = f"a finite number{kind}{huge}"
+        expected = kind.get(sign, "a finite number that is not negative") + huge
         raise InputError(f"{what}[{first}]", found=vector[first], expected=expected)
     if not (good := (each == 0) | (np.abs(each) >= smallest)).all():
         first = int(np.argmin(good))
         raise InputError(f"{what}[{first}]", found=vector[first], expected=SIZED)
     vector.flags.writeable = False
     return vector
+
+
+def same_index(**given: Any) -> None:
+    """Raise InputError if pandas objects have different indices."""
+    frames = {name: each for name, each in given.items() if hasattr(each, "iloc")}
+    for name, each in frames.items():
+        first, other = next(iter(frames.items()))
+        if not each.index.equals(other.index):
+            expected = f"that of {first}: the same rows in the same order"
+            raise InputError(name, found="another index", expected=expected)
+
+
+def in_order(what: str, values: Any) -> None:
+    """Raise InputError for a pandas object that is sorted otherwise than its index 0, 1, ..."""
+    if hasattr(values, "iloc"):
+        index = np.asarray(values.index)
+        if (np.sort(index) == np.arange(len(index))).all() and (np.diff(index) < 0).any():
+            expected = "the order of the asperities: .sort_index(), or .to_numpy() if they have it"
+            raise InputError(what, found="an index in another order", expected=expected)
 
 
 def some(what: str, values: Sized) -> None:

@@ -41,7 +41,9 @@ def test_every_public_name_is_there() -> None:
 def wrong(call: str) -> Any:
     scene = replace(paper(), friction=0.5)
     contact = cr.press(scene, approach=PAPER_APPROACH)
-    return eval(call, {"cr": cr, "np": np, "pd": pd, "scene": scene, "contact": contact})
+    two = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "z": 0.0})
+    named = {"cr": cr, "np": np, "pd": pd, "TWO": two, "scene": scene, "contact": contact}
+    return eval(call, named)
 
 
 @pytest.mark.parametrize(
@@ -91,6 +93,19 @@ def wrong(call: str) -> Any:
         ("cr.sweep([scene], load=1.0, measure=['load'], cycle=0.4)", "cycle: found 0.4, expected"),
         ("cr.read_scene(5)", "path: found 5, expected the name of a scene file"),
         ("contact.proof(sheared=[1e-8])", r"sheared\[0\]: found 1e-08, expected a shear state"),
+        (
+            "contact.proof(sheared=[cr.shear(cr.press(scene, load=1e-7), force=0)])",
+            "another contact",
+        ),
+        ("cr.solvers.Newton(max_iterations=1.5)", "max_iterations: found 1.5, expected a whole"),
+        ("cr.solvers.Newton(tolerance=-1.0)", "tolerance: found -1.0, expected a number that is"),
+        ("cr.solvers.Conic(max_iterations=-3)", "max_iterations: found -3, expected a whole"),
+        ("cr.prove_order(contact, most='a')", "most: found 'a', expected a whole number"),
+        ("cr.certify(scene, [1e99] * 61, load=1.0)", r"found 1e\+99, expected .*, at most 1e\+60"),
+        ("cr.Asperities(pd.DataFrame({'Y [mm]': [0.0], 'X [mm]': [1.0]}), 1.0)", "columns Y "),
+        ("cr.Asperities(pd.DataFrame({'x': [0.0], 'height': [1.0]}), 1.0)", "columns x, height"),
+        ("cr.Asperities(TWO[['x', 'y']], 1.0, TWO['z'][::-1])", "heights: found another index"),
+        ("cr.certify(scene, pd.Series(np.ones(61))[::-1], load=1.0)", "index in another order"),
     ],
 )
 def test_wrong_types_are_said(call: str, said: str) -> None:

@@ -43,7 +43,7 @@ def export(
     folder = out or Path(f"{scene.stem}-programs")
     control: dict[str, Any] = {"approach": file.approach, "load": file.load}
     stating = progress(f"stating {len(file.scene):,} asperities")
-    with results_folder(folder, force=force) as new, blamed_on(scene), stating:
+    with results_folder(folder, force=force, reads=file.inputs) as new, blamed_on(scene), stating:
         files, index = write_programs(
             new,
             scene.stem,

@@ -56,7 +56,7 @@ def run(
 
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
-    with results_folder(folder, force=force, **origin(file)) as new:
+    with results_folder(folder, force=force, reads=file.inputs, **origin(file)) as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
         for caution in file.cautions(contact):  # before work that may be long, or fail

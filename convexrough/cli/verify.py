@@ -27,7 +27,7 @@ from convexrough.cli.speech import (
     say_aside,
     written,
 )
-from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on
+from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on, file_errors
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof
@@ -129,7 +129,8 @@ def verify(
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
             raise FileError(f"{each}: exists already; --force replaces it")
-        each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
+        with file_errors(each, "be written"):
+            each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
     with ExitStack() as stack:
         stack.enter_context(_reported(junit))
         file = read_scene(scene)
@@ -145,7 +146,9 @@ def verify(
             lines += report.describe_scene(file.scene)
             echo({"read": lines}, lines, as_json)
             return DONE
-        new = stack.enter_context(results_folder(out, force=force)) if out is not None else None
+        inputs: list[str | Path] = [*file.inputs, loads, *([shear] if shear else [])]
+        made = results_folder(out, force=force, reads=inputs) if out is not None else None
+        new = stack.enter_context(made) if made else None
         with progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()

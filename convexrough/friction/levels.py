@@ -191,7 +191,8 @@ class FrictionLevels:
 
     def indentations(self, level: Level) -> Ball:
         """(N,) indentations n_i in scaled units; in float64 for asperities that cannot touch."""
-        known, others = of_rows(self.to_scene, level.indentation), self._others
+        known: Ball = of_rows(self.to_scene, level.indentation)
+        others = self._others
         if len(others) == 0:
             return known
         (high, low), radius = known.mid, known.radius

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError
+from convexrough.errors import InputError, SolverError
 from convexrough.friction.levels import FrictionLevels
 
 #: The largest number of onsets in one call if no compliance matrix is stored.
@@ -48,7 +48,8 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
     In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds this
-    force. The result is nan for an asperity without load.
+    force. The result is nan for an asperity without load, and for one that is dragged back before:
+    where an indentation falls as the load rises from that at which the asperity touches first.
 
     which : indices of the asperities, in the order of the result; default all. Each asperity needs
         several normal solutions
@@ -75,7 +76,11 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
             expected=f"at most {MOST_ONSETS} of them, each of which takes some normal solutions",
         )
     found = enclosed(levels, asked[loaded].tolist())
-    onsets[loaded] = [float(f * (levels.load - found[i].load)) for i in asked[loaded].tolist()]
+    lowest = min(each.load for each in found.values())
+    ordered = levels.order([lowest]) != "fails"
+    for k, i in zip(loaded.tolist(), asked[loaded].tolist(), strict=True):
+        if ordered or levels.order([found[i].load]) != "fails":
+            onsets[k] = float(f * (levels.load - found[i].load))
     return frozen(onsets)
 
 
@@ -115,8 +120,11 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
             high = min(high, here)
         else:
             low = max(low, here)
-        rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
-        step = Fraction(value / rate)
+        try:
+            rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
+            step = Fraction(value / rate)
+        except SolverError:  # happens near the load 0
+            step = here - (low + high) / 2
         following = here - step
         if abs(step) <= Fraction(SETTLED) * levels.load or value == 0:
             return min(max(following, low), high)

@@ -196,7 +196,7 @@ def walk(
     if start is not None:
         checks.instance("start", start, Contact)
         if start.scene is not scene:
-            expected = "one of this scene"
+            expected = "a contact whose scene is this very object: pass start.scene"
             raise InputError("start", found="a contact of another scene", expected=expected)
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
         influence = influence or start.influence

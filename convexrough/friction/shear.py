@@ -287,6 +287,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     True
     """
     checks.instance("contact", contact, Contact)
+    checks.in_order("forces", forces)
     given = checks.array("forces", forces, length=len(contact.scene))
     return against(shear(contact, force=checks.finite("force", force)), given)
 

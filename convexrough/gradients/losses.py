@@ -11,11 +11,15 @@ from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
+from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath
 from convexrough.gradients.along import NONE, Along
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
+
+#: The number 1 of which nothing is proved.
+UNKNOWN = Ball.around(1.0, np.inf)
 
 
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
@@ -32,7 +36,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         given = cycle.loads, cycle.forces
         asked = Along.of(sheared.known, Fraction(0), first + again, *given)
-        return _gradient(sheared, asked, holding, paths=True)
+        return _gradient(sheared, asked, holding, paths=True, order=cycle.order)
     amplitude = (Fraction(cycle.maximum) - Fraction(cycle.minimum)) / 2
     top, low = sheared.known.top, sheared.below("maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
@@ -51,7 +55,12 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         "friction": by_T["friction"] + W * 2.0 / sheared.f,
         "poisson_ratio": W * sheared.by_ratio,
     }
-    return Gradient.of(Number.of(contact, top, parts, explicit), holding)
+    return Gradient.of(_loss(Number.of(contact, top, parts, explicit), cycle.order), holding)
+
+
+def _loss(number: Number, order: Order) -> Number:
+    """The number, a loss, with infinite error bounds unless order is proved."""
+    return number if order == "proved" else number.times(UNKNOWN, {})
 
 
 def path_gradient(
@@ -77,10 +86,13 @@ def path_gradient(
     if path.load_constant and any(sliding):
         expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
-    return _gradient(sheared, along, holding, paths=not path.load_constant)
+    order = path.order if spent.any() else "proved"
+    return _gradient(sheared, along, holding, paths=not path.load_constant, order=order)
 
 
-def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: bool) -> Gradient:
+def _gradient(
+    sheared: Frictional, along: Along, holding: Holding, *, paths: bool, order: Order
+) -> Gradient:
     """The gradient of a weighted sum along a path; if `paths`, with derivatives by all loads."""
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
@@ -103,4 +115,4 @@ def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: boo
         directions = [(one, nothing) for one in each]
         explicit["loads"], sides["loads"] = along.slopes(directions, Ball.exact(1.0))
     number = Number.of(sheared.contact, sheared.known.top, parts, explicit)
-    return Gradient.of(number._replace(sides=sides), holding)
+    return Gradient.of(_loss(number._replace(sides=sides), order), holding)

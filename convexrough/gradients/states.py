@@ -157,15 +157,18 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         raise InputError("asperity", found=asperity, expected=expected)
     place = int(top.problem.places[which])
     offsets, parts = top.problem.exact.offsets, []
-    first = offsets.upper >= offsets.lower.max()
+    first = ~sheared.known.at(Fraction(0)).open
     total = top.load * f * unit
-    if not first[place]:
+    start = root(sheared.known, place)
+    if start > 0:
         low, slope = _just_touching(sheared, place)
+        if sheared.known.order([start]) == "fails":
+            raise ProofError("an indentation falls as the load rises: no onset is known")
         only = Ball.exact(among_zeros(np.ones(1), np.array([place]), len(offsets)))
         # n(L) = 0, so that -f dL = f dn / (dn/dL)
         parts = [Part(low, indentations=only * (f * unit / slope))]
         total = (top.load - low.load) * f * unit
-    elif np.count_nonzero(first) > 1:  # all of these slide at f P
+    elif np.count_nonzero(first) > 1 or not first[place]:  # all of these slide at f P
         expected = "one that slides before another, or last and alone"
         found = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=found, expected=expected)

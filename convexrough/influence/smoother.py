@@ -73,7 +73,7 @@ def _packed_cells(places: Array) -> Indices:
 def _company(cells: Indices) -> float:
     """The mean number of points in the cell of a point."""
     counts = np.bincount(cells[0] * (cells[1].max() + 1) + cells[1])
-    return float(counts @ counts) / cells.shape[1]
+    return float(counts @ counts / cells.shape[1])
 
 
 def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from typing import ClassVar, Literal, TypeAlias, cast
 
@@ -48,8 +49,8 @@ class Shakedown(Table, Plottable):
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
         asperities that stick until they slide as a whole, with the scalar kernel or the full one;
         the load must be constant
-    factor  : the largest factor at which, after some cycles, no asperity that touches at P0 slides
-        as a whole or opens; `limited_by` says which of the two happens above it
+    factor  : the largest factor, at most `gross`, at which after some cycles no asperity that
+        touches at P0 slides as a whole or opens; `limited_by` says which of the two happens above
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
     factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
         is not computed or the asperity does not touch at P0; for "vector" all are equal
@@ -94,9 +95,14 @@ class Shakedown(Table, Plottable):
         return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
 
     @property
-    def limited_by(self) -> Literal["sliding", "opening"]:
-        """What an asperity does above the factor; one that opens in every cycle need not slide."""
-        if not self.load_amplitudes.any():
+    def limited_by(self) -> Literal["sliding", "opening"] | None:
+        """What asperities do above the factor; one that opens in every cycle need not slide.
+
+        It is None if there is no limit.
+        """
+        if self.factor == np.inf:
+            return None
+        if not self.load_amplitudes.any() or self.factor == self.gross:
             return "sliding"
         p, t = self.load_amplitudes, self.force_amplitudes / checks.friction(self.scene.friction)
         fall, opens = _fall(p, t), float((-p).max())
@@ -197,17 +203,20 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
     found = {last: worst}
+
+    def factor(onset: Fraction) -> float:
+        """The factor at which L* reaches an onset, or at which all slide if that is smaller."""
+        return min(float(levels.load - onset) / fall if fall > 0 else np.inf, gross)
+
     if len(touching) <= MOST_ONSETS:
         found |= enclosed(levels, touching.tolist())
     factors = np.full(len(scene), np.nan)
     for asperity, onset in found.items():
-        factors[asperity] = float(levels.load - onset.load) / fall if fall > 0 else np.inf
+        factors[asperity] = factor(onset.load)
     sure, beyond = levels.snapshot(worst.upper), levels.snapshot(worst.lower)
     order = levels.order({worst.lower, worst.upper})
     proved = order == "proved" and bool(sure.touching[touching].all())
-    lower, upper = (
-        float(levels.load - s) / fall if fall > 0 else np.inf for s in (worst.upper, worst.lower)
-    )
+    lower, upper = factor(worst.upper), factor(worst.lower)
     height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
     gaps = np.maximum(-beyond.indentations, 0.0) * (contact.loads > 0)
     return limit(

@@ -11,7 +11,7 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -40,10 +40,13 @@ NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
 
 @contextmanager
-def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
+def results_folder(
+    folder: Path, *, force: bool, reads: Iterable[str | Path] = (), **said: Any
+) -> Iterator[Path]:
     """A temporary folder, which becomes `folder` if the body succeeds and is removed otherwise.
 
     force : accept a folder with contents
+    reads : files that the body reads; none of them may be in `folder`
     said  : entries of `files.json` besides the names of files
 
     Raises FileError, before the body runs, if `folder` cannot be written or replaced.
@@ -54,6 +57,9 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
         remove_unfinished(folder if folder.is_dir() else folder.parent)
         if folder.exists() and not folder.is_dir():
             raise FileExistsError(17, "File exists")
+        for each in reads:
+            if Path(each).resolve().parent == folder.resolve():
+                raise FileError(f"{folder}: holds {Path(each).name}, an input; name another folder")
         if folder.is_dir() and any(folder.iterdir()) and not force:
             advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")

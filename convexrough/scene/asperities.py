@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,6 +47,7 @@ class Asperities(Record):
     ) -> None:
         points = _points(positions)
         object.__setattr__(self, "positions", points)
+        checks.same_index(positions=positions, tip_radii=tip_radii, heights=heights)
         self._wear(tip_radii, heights)
         self.layout  # noqa: B018, refuses two asperities at one place
 
@@ -90,9 +92,9 @@ class Asperities(Record):
             radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
         return self.with_tips(radii, heights)
 
-    @classmethod
-    def _on(cls, layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
-        asperities = object.__new__(cls)
+    @staticmethod
+    def _on(layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
+        asperities = object.__new__(Asperities)
         object.__setattr__(asperities, "positions", layout.points)
         object.__setattr__(asperities, "layout", layout)
         asperities._wear(tip_radii, heights)
@@ -189,9 +191,12 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 
 def _points(positions: ArrayLike) -> Array:
-    names = [str(each) for each in getattr(positions, "columns", ("x", "y"))]  # a data frame
-    if sorted(names) == ["x", "y"] and names != ["x", "y"]:
-        raise InputError("positions", found="columns y, x", expected="columns x, y")
+    names = getattr(positions, "columns", ())  # of a data frame
+    if any(isinstance(name, str) for name in names):
+        bare = [re.split(r"[\s\[(]", str(name).strip().lower())[0] for name in names]
+        if bare != ["x", "y"]:
+            found = f"columns {', '.join(map(str, names))}"
+            raise InputError("positions", found=found, expected="columns x, y, or an array")
     points = checks.numbers("positions", positions)
     if points.size == 0:
         raise InputError("positions", found="no asperity", expected="at least one")

@@ -20,7 +20,7 @@ from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import MANY
 from convexrough.scene.material import Material
 from convexrough.scene.neighbours import refuse_coincident
-from convexrough.tabular.units import NAMELESS, UnitNames
+from convexrough.tabular.units import NAMELESS, UnitNames, parsed
 
 Geometry = Literal["summit", "closest"]
 
@@ -62,6 +62,11 @@ class Scene(Record):
                 "geometry", found=repr(self.geometry), expected='"summit" or "closest"'
             )
         object.__setattr__(self, "units", UnitNames.of(self.units))
+        unit = getattr(getattr(self.asperities, "origin", None), "unit", "")  # of a map
+        own, named = parsed(unit), self.units.unit("length")
+        if own and named and own.into(named) != 1:
+            expected = f'units=("{unit}", ...), or Surface.to_unit("{self.units.length}")'
+            raise InputError("units", found=f"summits in {unit}", expected=expected)
         if self.geometry == "closest" and (len(self) <= MANY or self.lattice is None):
             refuse_coincident(self.contact_points)
 

@@ -154,6 +154,11 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     """
     checks.instance("surface", surface, Surface)
     checks.instance("contact", contact, Contact)
+    origin = getattr(contact.scene.asperities, "origin", None)
+    if origin and (origin.unit, origin.level) != (surface.unit, float(surface.heights.mean())):
+        found = f"summits of another map (in {origin.unit or 'no unit'})"
+        expected = f"those of this map (in {surface.unit or 'no unit'})"
+        raise InputError("contact", found=found, expected=expected)
     pressures, load = _pressed(surface, contact, 1)
     touching = pressures > 0
     edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])

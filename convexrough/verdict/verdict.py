@@ -164,6 +164,7 @@ def verify_on(
     """The verdict of `verify`, for an assembled problem."""
     floor = checks.non_negative("floor", floor)
     within = tolerance("within", within)
+    checks.in_order("loads", loads)
     given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))

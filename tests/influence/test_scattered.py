@@ -6,6 +6,7 @@ from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
 
+import convexrough as cr
 from convexrough.influence.coupling import JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
@@ -155,6 +156,17 @@ def test_few_points(count: int) -> None:
     assert (operator.falloff(loads, 2) >= inverse_sums(points, points, loads, power=2)[0]).all()
     assert len(operator.separations()) == count
     assert operator.crowding(np.ones(count)) >= 0
+
+
+def test_presses_of_points_in_distant_clusters() -> None:
+    """Newton's method takes as few steps as for one cluster."""
+    rng = np.random.default_rng(10)
+    patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
+    patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
+    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+    for points in (np.vstack((patch, patch + [2e4, 1e4])), np.vstack((patch, [[1e4, 1e4]]))):
+        scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
+        assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
 
 
 @pytest.mark.parametrize("layout", ["disc", "clustered", "jittered"])

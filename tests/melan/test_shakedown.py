@@ -92,6 +92,17 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     assert limit.limited_by == "sliding"
 
 
+def test_a_limit_is_at_most_gross_sliding() -> None:
+    """No part of the contact lets go on these paths; the first leaves |Q| <= f P."""
+    rises = np.array([0.0, 1.3 * P])
+    limit = cr.shakedown(PAPER, loads=P, load_amplitudes=rises, force_amplitudes=[0.03 * P] * 2)
+    assert limit.factor == limit.gross == pytest.approx(0.5 / 0.03)
+    assert limit.lower <= limit.factor <= limit.upper
+    assert limit.limited_by == "sliding"
+    limit = cr.shakedown(PAPER, loads=P, load_amplitudes=rises, force_amplitudes=[0.0, 0.0])
+    assert (limit.factor, limit.limited_by) == (np.inf, None)
+
+
 def test_an_asperity_that_only_opens_is_told() -> None:
     """In phase and flatter than friction: above the limit a ring opens, and nothing slides."""
     for part, what in ((0.2, "opening"), (0.05, "sliding")):

@@ -29,6 +29,13 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     refused = command("run", "b.toml", "--out", "out", "--no-figures")
     assert (refused.status, "out: not empty; --force replaces" in refused.err) == (2, True)
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+    for inputs in (
+        ("run", "a.toml"),
+        ("export", "a.toml"),
+        ("verify", "a.toml", "out/asperities.csv"),
+    ):
+        refused = command(*inputs, "--out", "out" if "verify" in inputs else ".", "--force")
+        assert (refused.status, "an input; name another folder" in refused.err) == (2, True)
     ran = command("run", "b.toml", "--out", "out", "--no-figures", "--force")
     expected = {"summary.json", "asperities.csv", "scene.toml", "files.json", "notes.txt"}
     assert (ran.status, named(folder)) == (0, expected)

@@ -89,7 +89,7 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A"])
+@pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A", "#N/A", "77777"])
 @pytest.mark.parametrize("listed", [False, True])
 def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], dtype=object)
@@ -106,6 +106,23 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
 
 
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
+
+
+#: Heights of about 1000, with a comma between groups of three digits.
+THOUSANDS = "1,003;1,021;997;1,040\n" * 6 + "1,011;990;1,007;1,002\n" * 6
+
+
+def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
+    for mark in ("#N/A", "---", "***", "nan", ""):
+        for separator in (",", ";", "\t", " ")[: 4 if mark else 3]:
+            for place in (np.s_[3], np.s_[:, 3], np.s_[:, -1], np.s_[0]):
+                if mark or place == np.s_[3]:  # else separators at the end, or empty lines
+                    cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], object)
+                    cells[place] = mark
+                    path = text(tmp_path, "\n".join(map(separator.join, cells)))
+                    found = raw(path, pixel=1.0, fill=True)
+                    assert found.heights.shape == HEIGHTS.shape
+                    assert found.filled == (cells == mark).sum()
 
 
 @pytest.mark.sample(10)
@@ -181,6 +198,11 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
             {"pixel": 1.0},
             "column 1: found numbers 1, 2, 3, ...",
         ),
+        (THOUSANDS, {"pixel": 1.0}, "row 1: found 1,003, and 997 in row 1, expected .* thousands"),
+        (THOUSANDS.replace(",", "."), {"pixel": 1.0}, "found 1.003, and 997 in row 1"),
+        (THOUSANDS.replace("1,0", "1,000,0"), {"pixel": 1.0}, "row 1: found 1,000,003, expected"),
+        (THOUSANDS.replace(",", "'"), {"pixel": 1.0}, "row 1: found 1'003, expected numbers w"),
+        (matrix().replace(" ", ";", 3).replace(" ", ";-1.#IND;", 1), {"pixel": 1.0}, "IND"),
     ],
 )
 def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:

@@ -105,10 +105,12 @@ class ShakedownResult(Single):
     def lines(self) -> list[str]:
         _, *table = super().lines()
         (found,) = self.found
-        above = "an asperity slides in every cycle"
-        if found.limited_by == "opening":
-            above = "an asperity opens in every cycle, and need not slide"
-        return [f"shakedown  ({self.stage.kind}), above the factor {above}", *table]
+        above = {
+            "sliding": "above the factor an asperity slides in every cycle",
+            "opening": "above the factor an asperity opens in every cycle, and need not slide",
+            None: "sliding dies out at every factor",
+        }
+        return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
 
     def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
