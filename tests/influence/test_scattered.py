@@ -164,7 +164,8 @@ def test_presses_of_points_in_distant_clusters() -> None:
     patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
     patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-    for points in (np.vstack((patch, patch + [2e4, 1e4])), np.vstack((patch, [[1e4, 1e4]]))):
+    far = np.array([[2e4, 1e4]])
+    for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
         scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
 
