@@ -19,7 +19,6 @@ from scenes import (
     random_cases,
     reference,
     rough,
-    scattered,
 )
 
 import convexrough as cr
@@ -115,23 +114,6 @@ def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
             assert (judged.status == first.status).all()
 
 
-def test_which_operator() -> None:
-    """A matrix for few; one may be asked for by name, where the scene allows it."""
-    assert cr.press(paper(), approach=PAPER_APPROACH).influence == "dense"
-    with pytest.raises(cr.InputError, match="influence: found lattice, expected asperities on a"):
-        cr.press(rough("closest"), approach=PAPER_APPROACH, influence="lattice")
-    wrong: Any = "fft"
-    with pytest.raises(cr.InputError, match="influence: found 'fft', expected one of dense"):
-        cr.press(paper(), approach=PAPER_APPROACH, influence=wrong)
-    many = cr.Asperities.hexagonal(spacing=0.0008, tip_radius=0.005, within=0.0102)
-    assert (
-        cr.press(
-            cr.Scene(1.0, many, MATERIAL, geometry="summit"), approach=PAPER_APPROACH
-        ).influence
-        == "lattice"
-    )
-
-
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_a_single_asperity_is_hertz(control: str) -> None:
     scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL, geometry="summit")
@@ -209,10 +191,3 @@ def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> 
     assert np.abs(error.iterate - contact.loads).max() < 0.01 * contact.loads.max()
     again = cr.press(scene, approach=PAPER_APPROACH, start=error.iterate)
     assert again.iterations < contact.iterations
-
-
-def test_a_crowded_contact_is_named_as_the_reason() -> None:
-    """Newton's method that fails beyond the convex range says so."""
-    scene, approach = scattered(1, 20, 4.0, 0.5)
-    with pytest.raises(cr.SolverError, match=r"so crowded .* \(convexity number \d"):
-        cr.press(scene, approach=approach, solver=cr.solvers.Newton(max_iterations=2))

@@ -68,12 +68,6 @@ def test_superpose_is_the_plain_sum_also_where_discs_overlap(decades: float) -> 
     assert_allclose(fields.superpose(points, centres, radii, peaks), plain, rtol=1e-12)
 
 
-@pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [["x", "y"]], [[0.0, np.nan]]])
-def test_points_that_are_none(bad: Any) -> None:
-    with pytest.raises(cr.InputError, match=r"points.*x and y of each"):
-        fields.pressure(pressed("paper"), bad)
-
-
 @pytest.mark.parametrize(
     ("asperities", "cell"),
     [

@@ -8,7 +8,6 @@ import pytest
 from scenes import PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
-from convexrough.friction.verdict import verify_shear
 
 KINDS = ("dropped", "added", "scaled", "swapped")
 
@@ -141,27 +140,6 @@ def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     assert cr.verify(scene, loads, **control, within=1.0).holds
 
 
-def test_loads_a_thousand_times_too_large_do_not_hold_with_any_tolerance() -> None:
-    """Errors are fractions of the solution's largest load, where the given loads are larger."""
-    loads = 1e3 * cr.press(paper(), approach=PAPER_APPROACH).loads
-    verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, within=1.0)
-    assert not verdict.holds
-    assert verdict.error == pytest.approx(999, rel=1e-6)
-
-
-@pytest.mark.parametrize("noise", [1e-17, -1e-17])
-def test_noise_up_to_the_floor_is_open(noise: float) -> None:
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    loads = np.where(contact.loads > 0, contact.loads, noise)
-    assert cr.verify(paper(), loads, approach=PAPER_APPROACH, floor=1e-16).holds
-    if noise < 0:
-        with pytest.raises(cr.InputError, match=r"loads\[\d+\]: .*a floor lets noise"):
-            cr.verify(paper(), loads, approach=PAPER_APPROACH)
-    else:
-        verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH)
-        assert len(verdict.wrongly_loaded) == 24
-
-
 def test_where_nothing_can_be_proved_nothing_holds() -> None:
     scene, load = twins()
     contact = cr.press(scene, load=load)
@@ -169,32 +147,3 @@ def test_where_nothing_can_be_proved_nothing_holds() -> None:
     assert contact.certificate.scope == "none"
     assert len(verdict.undecided) == len(scene)
     assert not verdict.holds
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("moved", "said"),
-    [
-        (lambda points: points[:, ::-1], "x and y exchanged"),
-        (lambda points: points * [-1, 1], "the other sign of x"),
-        (lambda points: points * [1, -1], "the other sign of y"),
-        (lambda points: -points, "the other sign of x and y"),
-    ],
-)
-def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
-    """Positions match all the same; only the loads tell."""
-    asperities = cr.Asperities.square(
-        spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-6, seed=3
-    )
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
-    contact = cr.press(scene, approach=PAPER_APPROACH)
-    points = asperities.positions
-    partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved(points)]
-    verdict = cr.verify(scene, contact.loads[partners], approach=PAPER_APPROACH)
-    assert not verdict.holds
-    assert f"the loads are right with {said}" in list(verdict.hints())
-    state = cr.shear(contact, force=0.1 * contact.load)
-    sheared = verify_shear(contact, state.forces[partners], force=0.1 * contact.load)
-    assert f"the shear forces are right with {said}" in list(sheared.hints())
-    unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
-    assert not any("the loads are right" in hint for hint in unlike.hints())
