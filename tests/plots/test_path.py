@@ -1,7 +1,6 @@
 """Figures of load paths: they show the numbers of the results, and nothing in them collides."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,19 +34,6 @@ def limit(name: str) -> cr.Shakedown:
     return cr.shakedown(NAMED, loads=P, **given)
 
 
-@cache
-def losses() -> cr.PhaseLosses:
-    return cr.phase_losses(
-        NAMED,
-        load=0.7 * P,
-        load_amplitude=0.2 * P,
-        force_amplitude=0.14 * P,
-        phases=np.linspace(0, np.pi, 3),
-        factors=[0.5, 1.0],
-        chords=6,
-    )
-
-
 def test_the_path_and_its_memory_are_drawn() -> None:
     path = follow("paper", ONE)
     figures = plots.path_figures(path)
@@ -76,16 +62,6 @@ def test_what_a_closed_path_settles_to() -> None:
     assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
     for status in LOOKS:
         assert discs(place, status) == int((found.status == status).sum())
-
-
-def test_losses_against_phase_are_drawn() -> None:
-    found = losses()
-    figure = plots.phase_figures(found)["phase_losses"]
-    fits(figure)
-    (axes,) = figure.axes
-    half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
-    assert_allclose(half / whole, found.losses[:3] * 8 / found.losses[3:])
-    assert axes.get_ylabel().endswith("J]")
 
 
 @pytest.mark.sample(1)

@@ -44,20 +44,6 @@ def test_figures_fit(load: float) -> None:
     assert named <= said(figures["map"])
 
 
-def test_a_map_alone() -> None:
-    figures = surface_figures(MAP, MAXIMA, MAXIMA.pruned(0.05))
-    assert set(figures) == {"map", "histograms"}
-    for figure in figures.values():
-        fits(figure)
-    chart = figures["map"].axes[0]
-    assert chart.get_xlabel() == "$x$  [µm]"
-    assert_allclose(chart.get_xlim(), (-192, 192))
-    shown = chart.images[0].get_array()
-    np.testing.assert_array_equal(shown, MAP.heights)
-    dots = chart.lines[0].get_xydata()
-    np.testing.assert_array_equal(dots, MAXIMA.pruned(0.05).positions)
-
-
 def test_the_curve_is_drawn_where_it_is() -> None:
     curve = cr.surface.provability(MAXIMA, press)
     figure = provability_figure(curve, 0.05, "µm")
