@@ -41,19 +41,3 @@ def test_it_is_computed_written_and_printed(command: Any, tmp_path: Path) -> Non
     (*_, result) = file.compute(contact)
     assert result.certified
     assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        (MORE + "quantils = [1]", '[onset] quantils: unknown key, did you mean "quantiles"?'),
-        (MORE + "quantiles = [2.0]", "[onset] quantiles[0]: found 2.0, expected a number from 0"),
-        (MORE.replace("onset", "onst"), '[onst]: unknown table, did you mean "onset"?'),
-        ("[onset]", "[friction]: missing table, needed with [onset]"),
-    ],
-)
-def test_its_mistakes_are_told(command: Any, tmp_path: Path, more: str, said: str) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(more=more))
-    ran = command("run", "a.toml")
-    assert (ran.status, ran.err) == (2, ran.err)
-    assert said in ran.err

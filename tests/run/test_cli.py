@@ -11,18 +11,7 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
-from convexrough import plots
-from convexrough.run import results
 from convexrough.run.scene_file import read_scene
-
-
-def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text("precious")
-    outcome = command("new", "mine.toml")
-    assert outcome.status == 2
-    assert "mine.toml: exists already; name another" in outcome.err
-    assert (tmp_path / "mine.toml").read_text() == "precious"
-    assert command("new", "no/such/folder.toml").status == 2
 
 
 def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
@@ -92,15 +81,6 @@ def test_the_folder_is_refused_before_computing(
     assert command("run", "a.toml", "--out", "file/sub").status == 2
 
 
-def test_nothing_touches(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(normal="approach = -1e-6"))
-    outcome = command("run", "a.toml", "--json")
-    assert outcome.status == 0
-    normal = json.loads(outcome.out)["normal"]
-    assert (normal["contact"], normal["open"], normal["load"]) == (0, 1, 0.0)
-    assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
-
-
 #: Summits so close that both may touch, but at no least of the energy.
 TWINS = "x,y\n-5e-5,0\n5e-5,0\n"
 
@@ -133,18 +113,6 @@ maximum_fraction = [0.37, 0.5]
 minimum_fraction = [-0.37, 0.1]
 [history]
 fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
-"""
-
-
-PATHS = """
-[path]
-loads = [3e-7, 3e-7]
-forces = [0.0, 1e-7]
-[steady]
-ellipse = { load = 3e-7, load_amplitude = 5e-8, force_amplitude = 5e-8, chords = 6 }
-[shakedown]
-loads = 3e-7
-force_amplitudes = [1e-7, -1e-7]
 """
 
 
@@ -211,44 +179,9 @@ def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
     assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
 
 
-def test_nothing_is_solved_while_writing_or_drawing(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """All presses, levels and states are found when the first table is written."""
-    (tmp_path / "a.toml").write_text(scene_text(more=SHEAR + PATHS))
-    write = results.write_results
-
-    def after(*given: Any, **options: Any) -> Any:
-        for solves in ("normal.problem.NormalProblem.assemble", "normal.level.Levels.at",
-                       "friction.levels.FrictionLevels.rows"):  # fmt: skip
-            monkeypatch.setattr(f"convexrough.{solves}", never)
-        return write(*given, **options)
-
-    def never(*_: Any, **__: Any) -> None:
-        raise AssertionError("solved")
-
-    monkeypatch.setattr(results, "write_results", after)
-    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
-    ran = command("run", "a.toml")
-    assert (ran.status, ran.err) == (0, "")
-    assert (tmp_path / "a-results" / "hysteresis.png").exists()
-
-
 # Bad input
 
 SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
-
-
-def test_bad_loads(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
-    for loads, expected in (
-        ("load\n" + "1e-9\n" * 36, "rows: found 36, expected 61"),
-        ("", "empty"),
-    ):
-        (tmp_path / "loads.csv").write_text(loads)
-        outcome = command("verify", "a.toml", "loads.csv")
-        assert (outcome.status, outcome.out) == (2, "")
-        assert outcome.err.startswith(f"convexrough: error: loads.csv: {expected}")
 
 
 def test_usage_errors(command: Any) -> None:
@@ -275,3 +208,24 @@ def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> Non
     outcome = command("run", "all.toml", "--no-figures")
     assert outcome.status == 0
     assert "approach          5e-05 mm\n" in outcome.out
+
+
+def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("precious")
+    outcome = command("new", "mine.toml")
+    assert outcome.status == 2
+    assert "mine.toml: exists already; name another" in outcome.err
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+    assert command("new", "no/such/folder.toml").status == 2
+
+
+def test_bad_loads(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    for loads, expected in (
+        ("load\n" + "1e-9\n" * 36, "rows: found 36, expected 61"),
+        ("", "empty"),
+    ):
+        (tmp_path / "loads.csv").write_text(loads)
+        outcome = command("verify", "a.toml", "loads.csv")
+        assert (outcome.status, outcome.out) == (2, "")
+        assert outcome.err.startswith(f"convexrough: error: loads.csv: {expected}")

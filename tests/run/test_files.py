@@ -9,7 +9,7 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
-from convexrough.atomic import replacing, to_json
+from convexrough.atomic import replacing
 from convexrough.run import results
 from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
@@ -132,11 +132,6 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
     assert (folder / "one.csv").read_text() == "1"
 
 
-def test_json_has_no_infinities() -> None:
-    summary: Any = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
-    assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}
-
-
 def test_many_asperities_go_to_npz(
     tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,8 +142,3 @@ def test_many_asperities_go_to_npz(
         assert tuple(arrays) == COLUMNS
         assert arrays["status"].tolist() == contact.status.tolist()
     assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
-
-
-def test_one_fraction_is_a_list_of_one(tmp_path: Path) -> None:
-    more = "[friction]\ncoefficient = 0.5\n[cycle]\nmaximum_fraction = 0.5\n"
-    assert read(tmp_path, more=more).stages["cycle"].maximum_fraction == [0.5]

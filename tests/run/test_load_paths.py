@@ -96,34 +96,6 @@ def test_loads_that_do_not_fit_those_of_normal(tmp_path: Path, table: str, messa
     assert any(each.startswith(message) for each in scene.cautions(scene.press()))
 
 
-def test_factors_of_amplitudes_count_in_the_largest_load(tmp_path: Path) -> None:
-    ellipse = "{ load = 3e-7, load_amplitude = 1e-7, force_amplitude = 1e-8 }"
-    steady = f"[steady]\nellipse = {ellipse}\nphases = [0.5]\nfactors = [0.5, 2.0]\n"
-    file = tmp_path / "scene.toml"
-    file.write_text(scene_text(HEXAGONAL, normal="load = 3e-7", more=FRICTION + steady))
-    assert cr.read_scene(file).stages["steady"].highest_load == pytest.approx(5e-7)
-
-
-def test_a_limit_for_forces_along_x_and_y(command: Any) -> None:
-    table = """
-[shakedown]
-loads = 2.0
-force_amplitudes = [[0.0, 1.0], [0.0, -1.0]]
-kind = "vector"
-reference = 1.80426694373333e-07
-"""
-    Path("scene.toml").write_text(SCENE + table)
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 0, outcome.err
-    limit = json.loads(Path("out/summary.json").read_text())["shakedown"]
-    assert limit["factor"] == pytest.approx(0.2419789620, rel=1e-9)
-    assert limit["lower"] < limit["factor"] < limit["upper"]
-    assert limit["proved"] is True
-    assert "shakedown  (vector)" in outcome.out
-    columns = Path("out/shakedown.csv").read_text().splitlines()[0].split(",")
-    assert columns[-4:] == ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
-
-
 SHADED = scene_text(
     'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION
 ).replace("radius = 1.0", "radius = 1e6")

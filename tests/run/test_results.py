@@ -64,50 +64,6 @@ def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) 
 # Plausibility: a warning with its numbers, never an error.
 
 
-def warned(command: Any, tmp_path: Path, text: str) -> Any:
-    (tmp_path / "a.toml").write_text(text)
-    outcome = command("run", "a.toml", "--no-figures", "--force")
-    assert outcome.status in (0, 3)
-    return outcome
-
-
-def test_an_ordinary_scene_is_not_warned_of(command: Any, tmp_path: Path) -> None:
-    closest = HEXAGONAL.replace("summit", "closest")
-    outcome = warned(command, tmp_path, scene_text(closest))
-    assert outcome.err == ""
-    assert 'with "closest"' not in outcome.out
-
-
-def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
-    blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
-    outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
-    assert (
-        "1.09 of the sphere's radius from the axis: from 0.2 on, the paraboloid of the model"
-        in outcome.err
-    )
-    assert "of the tip radius: from 0.2 on, the paraboloid of the model" in outcome.err
-    claimed = command("verify", "a.toml", "a-results/asperities.csv")  # the same loads: also told
-    assert "of the tip radius: from 0.2 on, the paraboloid of the model" in claimed.err
-
-
-def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
-    """A radius in the wrong unit, of a sphere or along one axis; a flat base has no such limit."""
-    array = HEXAGONAL + "within = 0.0102"
-    said = "contact reaches the rim of the array, which ends at 0."
-    for radius, warns in (
-        ("1.0", False),
-        ("1e3", True),
-        ("[1.0, 2e3]", True),
-        ("[1.0, 2.0]", False),
-        ("inf", False),
-    ):
-        text = scene_text(array).replace("radius = 1.0", f"radius = {radius}", 1)
-        assert (said in warned(command, tmp_path, text).err) == warns, radius
-    for within, warns in (("0.004", True), ("0.002", False)):  # 7 asperities, and one
-        few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", within)
-        assert (said in warned(command, tmp_path, few).err) == warns
-
-
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     """Every asperity touches; on a flat base that is meant."""
     wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)

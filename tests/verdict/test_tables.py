@@ -244,3 +244,16 @@ def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
         read_summits(path, tip_radius=None if "neither" in expected else 1.0)
     assert str(caught.value).startswith(str(path))
     assert expected in str(caught.value)
+
+
+def test_all_mistakes_at_once_with_their_lines(tmp_path: Path) -> None:
+    content = "x,y,load\n0,0,one\n1,0\n0.5,?,2\n7,7,nan\n"
+    assert refused(tmp_path, content) == [
+        "row 2, column load: found 'one', expected a finite number: 0,0,one",
+        "row 5, column load: found nan, expected a finite number: 7,7,nan",
+        "row 4, column y: found '?', expected a finite number: 0.5,?,2",
+        "row 3: found 2 cells, expected 3, as in the header: 1,0",
+    ]
+    many = refused(tmp_path, "load\n" + "x\n" * 1000)
+    assert len(many) == 11
+    assert many[-1] == "and 990 more mistakes"
