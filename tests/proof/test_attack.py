@@ -90,13 +90,7 @@ def leaves(tree: Any, at: Place = ()) -> list[Place]:
     """Where the strings are."""
     if isinstance(tree, str):
         return [at]
-    items = (
-        tree.items()
-        if isinstance(tree, dict)
-        else enumerate(tree)
-        if isinstance(tree, list)
-        else ()
-    )
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree or ())
     return [path for key, value in items for path in leaves(value, (*at, key))]
 
 
@@ -115,16 +109,14 @@ def a_number(rng: random.Random, document: Any, *under: str) -> Place:
     return rng.choice([(*under, *p) for p in leaves(start) if "0x" in look(start, p)])
 
 
-def one_digit(rng: random.Random, document: Any) -> Any:
-    path = a_number(rng, document)
-    text = look(document, path)
-    place = rng.randrange(len(text))
-    put(document, path, text[:place] + rng.choice("0123456789abcdef-+px.") + text[place + 1 :])
-    return document
-
-
-def one_number(rng: random.Random, document: Any, *under: str) -> Any:
-    path = a_number(rng, document, *under)
+def one_number(rng: random.Random, document: Any) -> Any:
+    part = rng.choice([(), ("claims",), ("scene",), ("prescribed",)])
+    path = a_number(rng, document, *part)
+    if rng.random() < 0.2:
+        odd = ["nan", "inf", "0x1.8p+99999", "1e-3", "", " 0x1.0000000000000p+0", None, 1, [], {}]
+        huge = [value.hex() for value in (1.7e308, 5e-324, 1e150, 0.0, -0.0, -1.0)]
+        put(document, path, rng.choice([*odd, *huge]))
+        return document
     value = float.fromhex(look(document, path))
     change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
     changed = value * (1 + change) if value else change * 1e-9
@@ -132,10 +124,6 @@ def one_number(rng: random.Random, document: Any, *under: str) -> Any:
         changed = float(np.nextafter(value, rng.choice([-np.inf, np.inf])))
     put(document, path, changed.hex())
     return document
-
-
-def one_claim(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "claims")
 
 
 def tighter_bound(rng: random.Random, document: Any) -> Any:
@@ -157,12 +145,6 @@ def one_status(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def several_statuses(rng: random.Random, document: Any) -> Any:
-    statuses = document["claims"]["status"]
-    rng.shuffle(statuses)
-    return document
-
-
 def swapped_part(rng: random.Random, document: Any) -> Any:
     """All that another proof claims, or its scene, what it prescribes, its friction."""
     other = deepcopy(rng.choice(honest()))
@@ -171,14 +153,6 @@ def swapped_part(rng: random.Random, document: Any) -> Any:
     if part == "sheared":
         document["claims"]["shear"] = other["claims"]["shear"]
     return document
-
-
-def changed_scene(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "scene")
-
-
-def changed_control(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "prescribed")
 
 
 def changed_box(rng: random.Random, document: Any) -> Any:
@@ -215,23 +189,9 @@ def changed_friction(rng: random.Random, document: Any) -> Any:
     elif what == "fewer":
         entries.pop()
     elif what == "force":
-        return one_number(rng, document, "sheared", rng.randrange(len(entries)), "force")
+        rng.choice(entries)["force"] = rng.choice(entries)["force"]
     else:
         entries[0]["held"]["radii"] = document["pressed"]["radii"]
-    return document
-
-
-def no_number(rng: random.Random, document: Any) -> Any:
-    values: list[Any] = ["nan", "inf", "-inf", "0x1.8p+99999", "0x1p-5000", "1e-3", "0X1.8P+1"]
-    values += ["", " 0x1.0000000000000p+0", "0x1p+0"]
-    values += [None, 1, 0.5, True, [], {}, float("nan"), 10**400]
-    put(document, a_number(rng, document), rng.choice(values))
-    return document
-
-
-def huge_number(rng: random.Random, document: Any) -> Any:
-    value = rng.choice([1.7e308, 5e-324, 1e150, 1e-150, 0.0, -0.0, -1.0])
-    put(document, a_number(rng, document), value.hex())
     return document
 
 
@@ -251,20 +211,13 @@ def missing_or_more(rng: random.Random, document: Any) -> Any:
 
 
 FORGED: tuple[Forgery, ...] = (
-    one_digit,
     one_number,
-    one_claim,
     tighter_bound,
     one_status,
-    several_statuses,
     swapped_part,
-    changed_scene,
-    changed_control,
     changed_box,
     changed_radii,
     changed_friction,
-    no_number,
-    huge_number,
     missing_or_more,
 )
 
@@ -285,23 +238,9 @@ def forged(rng: random.Random) -> tuple[str, bytes]:
     contents = json.dumps(document).encode()
     if rng.random() < 0.1:
         names.append("torn")
-        contents = torn(rng, contents)
+        place = rng.randrange(len(contents))
+        contents = rng.choice([contents[:place], contents[:place] + contents[place + 1 :]])
     return "+".join(names), contents
-
-
-def torn(rng: random.Random, contents: bytes) -> bytes:
-    place = rng.randrange(len(contents))
-    return rng.choice(
-        [
-            contents[:place],
-            contents[:place] + bytes([rng.randrange(256)]) + contents[place + 1 :],
-            contents[:place] + contents[place + 1 :],
-            contents + b"{}",
-            b"\xef\xbb\xbf" + contents,
-            contents[:-1] + b', "claims": {}}',
-            b"[" * 100000,
-        ]
-    )
 
 
 def judge(seed: int, folder: Path) -> str:

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
-from flint import arb, ctx, fmpq
 from path_scenes import shaded
 
 import convexrough as cr
@@ -117,24 +116,12 @@ def test_unreadable(
     assert reason in capsys.readouterr().err
 
 
-def test_more_than_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert checker.main(["a", "b"]) == 2
-    assert "usage" in capsys.readouterr().err
-
-
 def test_larger_scenes_are_refused(document: Any) -> None:
     scene = deepcopy(document["scene"])
     for name in ("x", "y", "heights", "tip_radii"):
         scene[name] = [scene[name][0]] * (checker.MOST_ASPERITIES + 1)
     with pytest.raises(Refused, match="3001 asperities"):
         checker.read_scene(scene)
-
-
-def test_a_hash_that_was_kept_is_refused(document: Any) -> None:
-    document = deepcopy(document)
-    document["scene"]["heights"][0] = (1e-30).hex()
-    with pytest.raises(Refused, match="sha256"):
-        checker.check(document, lambda line: None)
 
 
 def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
@@ -189,11 +176,6 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     refused(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
 
 
-def test_a_local_proof_is_not_a_global_one() -> None:
-    document = proof_of(*scenes.scattered(9, 6, 2.2, 0.1))
-    refused(document, "claimed 'global', proved 'local'", claims__scope="global")
-
-
 def test_each_end_of_each_bound_counts(few: Any) -> None:
     claims = few["claims"]
     for key in ("load", "loads__1", "gaps__5"):
@@ -226,29 +208,6 @@ def test_numbers_are_written_one_way_and_nothing_is_left_unread(few: Any) -> Non
         changed = deepcopy(where) | {"note": "believe me"}
         with pytest.raises(checker.Unreadable, match="expected a table"):
             checker.table(changed, *where)
-
-
-@pytest.mark.parametrize(
-    ("place", "what"),
-    [
-        (("scene", "tip_radii"), "tip_radii"),
-        (("scene", "contact_modulus"), "contact_modulus"),
-        (("argument", "box"), "box"),
-        (("argument", "convexity_number"), "convexity_number"),
-        (("argument", "shells"), "shells"),
-        (("pressed", "radii"), "radii"),
-        (("sheared",), "sheared"),
-        (("claims", "gaps"), "claims gaps"),
-    ],
-)
-def test_what_is_damaged_is_named(few: Any, place: tuple[str, ...], what: str) -> None:
-    changed = deepcopy(few)
-    *outer, key = place
-    damaged = changed[outer[0]] if outer else changed
-    damaged[key] = "0x1.8"
-    changed["sha256"] = checker.digest(changed["scene"], changed["prescribed"])
-    with pytest.raises(checker.Unreadable, match=f"^{what}: "):
-        checker.check(changed, lambda line: None)
 
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:
@@ -332,10 +291,6 @@ def test_a_base_with_two_radii(document: Any) -> None:
     assert checker.check(both, lambda line: None).startswith("proved")
 
 
-def exact(x: Fraction) -> arb:
-    return arb(fmpq(x.numerator, x.denominator))
-
-
 def test_intervals_hold_what_they_should() -> None:
     rng = random.Random(1)
 
@@ -355,29 +310,6 @@ def test_intervals_hold_what_they_should() -> None:
         assert root.high - root.low <= root.high / 2**120
     with pytest.raises(Refused, match="may be 0"):
         Interval(1) / Interval(-1, 1)
-
-
-def test_pi() -> None:
-    with ctx.workdps(60):
-        assert exact(checker.PI.low) < arb.pi() < exact(checker.PI.high)
-
-
-def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
-    scene, _ = scenes.scattered(11, 12, 0.5, 0.5)
-    read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
-    radii = np.random.default_rng(0).uniform(0.1, 1, 12)
-    points = scene.contact_points
-    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
-    np.fill_diagonal(apart, np.inf)
-    root = np.sqrt(2 * radii)
-    end = -1 / np.linalg.eigvalsh(root[:, None] / (np.pi * apart) * root).min()
-    for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
-        given = [Fraction(float(radius * end * factor)) for radius in radii]
-        try:
-            checker.prove_definite(read, given, list(range(12)), lambda line: None)
-            assert definite
-        except Refused:
-            assert not definite
 
 
 def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
