@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from friction_scenes import FRICTION, KINDS, pressed
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
 
@@ -23,31 +22,12 @@ def test_the_force_of_a_displacement(influence: str, share: float) -> None:
     assert list(found.status) == list(known.status)
 
 
-@pytest.mark.parametrize("influence", KINDS)
-def test_cycles_by_displacement(influence: str) -> None:
-    contact = pressed("paper", influence)
-    limit = FRICTION * contact.load
-    known = cr.cycles(contact, np.array([0.1, 0.6]) * limit)
-    found = cr.cycles(contact, displacement=[each.displacement_amplitude for each in known])
-    for one, other in zip(known, found, strict=True):
-        assert other.maximum == -other.minimum == pytest.approx(one.maximum, rel=1e-11)
-        assert other.loss == pytest.approx(one.loss, rel=1e-10)
-    one = cr.cycle(contact, displacement=known[0].displacement_amplitude)
-    assert one.loss == pytest.approx(known[0].loss, rel=1e-10)
-
-
 def test_a_displacement_beyond_gross_sliding() -> None:
     contact = pressed("paper")
     last = cr.shear(contact, force=FRICTION * contact.load).displacement
     for wrong in (1.01 * last, np.nan):
         with pytest.raises(cr.InputError, match="displacement"):
             cr.shear(contact, displacement=wrong)
-    with pytest.raises(cr.InputError, match="gross sliding"):
-        cr.cycle(contact, displacement=1.01 * last)
-    with pytest.raises(cr.InputError, match="force, displacement: found both"):
-        cr.shear(contact, force=0.0, displacement=0.0)
-    with pytest.raises(cr.InputError, match=r"minimum: .*symmetric"):
-        cr.cycle(contact, displacement=0.5 * last, minimum=0.0)
     light = cr.press(contact.scene, approach=-1e-6)
     assert cr.shear(light, displacement=0.0).force == 0.0
 
@@ -64,9 +44,6 @@ def test_stiffness_and_loss_factor() -> None:
     # The area of the loop over 2 pi times that of the triangle under its tip.
     stored = 0.3 * limit * half / 2
     assert cycle.loss_factor == pytest.approx(loop.area / (2 * np.pi * stored), rel=1e-3)
-    still = cr.cycle(contact, maximum=0.0)
-    assert np.isnan(still.loss_factor)
-    assert np.isnan(still.secant_stiffness)
 
 
 @pytest.mark.sample(3)
@@ -88,16 +65,3 @@ def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, 
     theirs = np.where(loaded, past.asperity_displacements[body][:, chosen], 0.0)
     assert_allclose(loop.asperity_displacements, theirs, atol=1e-11 * scale)
     assert loop.asperities.tolist() == chosen
-
-
-def test_bad_loops() -> None:
-    cycle = cr.cycle(pressed("paper"), maximum=0.0)
-    with pytest.raises(cr.InputError, match="points: found 3"):
-        cycle.loop(3)
-    with pytest.raises(cr.InputError, match=r"asperities: .*from 0 to 60"):
-        cycle.loop(asperities=[61])
-    assert cr.loops([]) == []
-    light = cr.press(pressed("paper").scene, approach=-1e-6)
-    assert not cr.cycle(light, maximum=0.0).loop(10).displacements.any()
-    with pytest.raises(cr.InputError, match="coefficient of friction"):
-        cr.shear(cr.press(paper(), approach=PAPER_APPROACH), displacement=0.0)

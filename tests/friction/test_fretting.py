@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.friction.fretting import fretting_columns, rim_gap
+from convexrough.friction.fretting import rim_gap
 from convexrough.sphere import mindlin
 
 
@@ -67,19 +67,6 @@ def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None
         assert cycle.asperity_losses[i] == pytest.approx(lost, rel=1e-4)
         assert found.slip_amplitudes[i] == pytest.approx(slip[0], rel=1e-12)
     assert_array_equal(found.losses, cycle.asperity_losses)
-
-
-def test_open_asperities_and_no_shear() -> None:
-    cycle, found = worn("paper", 0.0, 0.0)
-    for values in (found.slip_amplitudes, found.mean_tractions, found.largest_tractions):
-        assert_array_equal(values, 0.0)
-    _, found = worn("paper", 0.5, -0.5)
-    assert_array_equal(found.slip_amplitudes[cycle.contact.loads == 0], 0.0)
-    slides = found.status == "sliding"
-    assert_array_equal(found.gross_slip_amplitudes > 0, slides)
-    f_p0 = 0.5 * fields.peak_pressures(found.contact)
-    assert_allclose(found.largest_tractions[slides], f_p0[slides], rtol=1e-15)
-    assert_allclose(found.mean_tractions[slides], 2 / 3 * f_p0[slides], rtol=1e-12)
 
 
 def bristles(
@@ -155,21 +142,3 @@ def test_a_varying_load_of_many() -> None:
     assert_allclose(found.gross_slip_amplitudes[slides], drifts[slides], rtol=1e-9)
     assert_array_equal(np.isnan(found.slip_amplitudes), gone)
     assert np.isfinite(found.largest_tractions).all()
-
-
-def test_a_constant_load_as_a_path() -> None:
-    P, (_, found) = contact("rough").load, worn("rough", 0.6, -0.6)
-    as_a_path = cr.steady(contact("rough").scene, loads=[P] * 3, forces=[0.0, 0.3 * P, -0.3 * P])
-    for name, values in cr.fretting(as_a_path).columns().items():
-        if name != "status":
-            assert_allclose(values, getattr(found, name), rtol=1e-6, atol=1e-12 * values.max())
-
-
-def test_columns_have_a_row_for_each_touching_asperity() -> None:
-    several = [worn("paper", share, -share)[1] for share in (0.2, 0.5)]
-    columns = fretting_columns(several)
-    assert {len(values) for values in columns.values()} == {2 * 37}
-    last = columns["maximum"] == several[1].maximum
-    touching = np.flatnonzero(several[1].contact.loads)
-    assert_array_equal(columns["asperity"][last], touching)
-    assert_array_equal(columns["largest_traction"][last], several[1].largest_tractions[touching])

@@ -1,6 +1,5 @@
 """Many scenes at once against the same ones one by one: status by status, digit by digit."""
 
-import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -135,46 +134,3 @@ def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
         assert cycles.order[k] == one.order
         assert cycles.losses[k] == one.loss
         assert_array_equal(cycles.status[k], one.status)
-
-
-def test_one_asperity_near_gross_sliding() -> None:
-    """One row of one asperity, whose load at the end is poorly known."""
-    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, F, geometry="summit")
-    contacts = cr.press_many([scene], load=3e-7)
-    cycles = contacts.cycles((1 - 1e-12) * F * contacts.loads)
-    assert cycles.order.tolist() == ["proved"]
-    assert abs(cycles.losses[0] - cycles[0].loss) <= cycles.loss_errors[0] + cycles[0].loss_error
-
-
-def test_results_are_tables_and_sequences() -> None:
-    contacts = cr.press_many(rough(3), approach=5e-5)
-    assert len(contacts) == 3
-    assert contacts[-1] is contacts[2]
-    assert_array_equal(contacts[1].loads, contacts.asperity_loads[1])
-    cycles = contacts.cycles([1e-8, 2e-8, 3e-8])
-    assert cycles[1].loss == cycles.losses[1]
-    assert cycles.to_xarray()["status"].dims == ("scene", "asperity")
-    assert len(contacts.to_dataframe()) == 3
-    again = pickle.loads(pickle.dumps(contacts))
-    assert_array_equal(again.cycles([1e-8, 2e-8, 3e-8]).losses, cycles.losses)
-    with pytest.raises(IndexError):
-        contacts[3]
-    assert len(cr.press_many([], approach=5e-5)) == 0
-
-
-def test_bad_input() -> None:
-    scenes = rough(2)
-    with pytest.raises(cr.InputError, match=r"scenes\[1\]: found 1 asperities"):
-        cr.press_many([scenes[0], cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL)], load=1.0)
-    with pytest.raises(cr.InputError, match="approach"):
-        cr.press_many(scenes)
-    with pytest.raises(cr.InputError, match="2 values, one per scene"):
-        cr.press_many(scenes, load=[1e-7] * 3)
-    contacts = cr.press_many(scenes, approach=5e-5)
-    with pytest.raises(cr.InputError, match=r"maximum\[1\].*gross sliding"):
-        contacts.cycles([1e-8, 1.0])
-    with pytest.raises(cr.InputError, match=r"maximum\[0\].*at least the minimum"):
-        contacts.cycles(0.0, 1e-8)
-    bare = cr.press_many([replace(each, friction=None) for each in scenes], approach=5e-5)
-    with pytest.raises(cr.InputError, match="friction"):
-        bare.cycles(1e-8)

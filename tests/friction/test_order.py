@@ -9,8 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_scenes import with_friction
-from levels_reference import SCENES
 from path_scenes import shaded
 from scenes import MATERIAL
 
@@ -73,15 +71,6 @@ def falls(contact: cr.Contact, low: float = 0.0) -> bool:
     rising = ~levels.top.open
     down = any(((b.indentation - a.indentation).negative & rising).any() for a, b in pairwise(here))
     return down or any((level.indentation.positive & ~rising).any() for level in here)
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("influence", ["dense", "scattered"])
-def test_order_is_proved(name: str, influence: cr.influence.Kind) -> None:
-    scene, approach = SCENES[name]
-    contact = cr.press(with_friction(scene), approach=approach, influence=influence)
-    assert levels_of(contact).order([NOTHING]) == "proved"
 
 
 @pytest.mark.sample(1)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed, with_friction
+from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed
 from levels_reference import reference as exact
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper
+from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
 
@@ -110,21 +110,3 @@ def test_gross_sliding_is_refused() -> None:
     frictionless = cr.press(paper(), approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match="coefficient of friction"):
         cr.shear(frictionless, force=1e-9)
-
-
-def test_nothing_loaded() -> None:
-    scene = with_friction(
-        cr.Scene(1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL, geometry="summit")
-    )
-    contact = cr.press(scene, approach=1e-7)
-    state = cr.shear(contact, force=0.0)
-    assert (state.forces == 0).all()
-    assert (state.status == "open").all()
-    with pytest.raises(cr.InputError, match="at most f P = 0"):
-        cr.shear(contact, force=1e-9)
-
-
-@pytest.mark.parametrize("force", [[1e-8, 2e-8], "a", None, 1 + 1j])
-def test_a_force_is_a_number(force: object) -> None:
-    with pytest.raises(cr.InputError):
-        cr.shear(pressed("paper"), force=force)  # type: ignore[arg-type]
