@@ -61,12 +61,6 @@ def test_bounds_are_honest_where_they_are_not_sharp(fraction: float) -> None:
     assert_both(contact, state, fraction * FRICTION * contact.load, "load", None)
 
 
-def test_what_is_held_need_not_be_prescribed() -> None:
-    contact = pressed("rough", "load")
-    force = 0.3 * FRICTION * contact.load
-    assert_both(contact, friction_state(contact, force, "load"), force, "approach", SHARP)
-
-
 def random_scene(rng: np.random.Generator) -> tuple[cr.Scene, float]:
     """One to eight asperities anywhere, of any sizes, and an approach that presses some."""
     n = int(rng.integers(1, 9))
@@ -98,23 +92,6 @@ def test_no_bound_is_too_small(seed: int) -> None:
     fraction = float(rng.choice([1e-3, 0.1, 0.9, rng.uniform()]))
     force = fraction * (scene.friction or 0.0) * contact.load
     assert_both(contact, friction_state(contact, force, holding), force, holding, None)
-
-
-def test_a_cycle_that_does_not_move_costs_nothing_and_changes_nothing() -> None:
-    contact = pressed("rough", "load")
-    still = cr.cycle(contact, maximum=0.1 * contact.load, minimum=0.1 * contact.load).gradient()
-    assert not still.heights.any()
-    assert still.maximum == still.load == still.friction == still.balance_defect == 0.0
-    assert (np.abs(still.positions) <= still.position_errors).all()
-
-
-def test_only_the_range_matters() -> None:
-    contact = pressed("rough", "load")
-    P = contact.load
-    one = cr.cycle(contact, maximum=0.125 * P).gradient()
-    other = cr.cycle(contact, maximum=0.25 * P, minimum=0.0).gradient()
-    np.testing.assert_array_equal(one.heights, other.heights)
-    assert other.minimum == -other.maximum  # type: ignore[operator]
 
 
 def test_gross_sliding_from_one_side() -> None:

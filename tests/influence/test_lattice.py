@@ -122,13 +122,6 @@ def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> N
     assert_spans(lattice, basis)
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(5, 200))
-def test_scattered_points_are_refused(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    assert Lattice.through(rng.uniform(-1, 1, (count, 2))) is None
-
-
 @pytest.mark.parametrize("name", BASES)
 def test_what_is_nearly_a_lattice_is_refused(name: str) -> None:
     points = patch(np.array(BASES[name]), 500)

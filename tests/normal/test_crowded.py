@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scenes import MATERIAL, OPERATORS, operators, solve_exactly
 
 import convexrough as cr
-from convexrough.bench.scenes import scene as bench
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
@@ -165,14 +164,6 @@ def test_overlapping_shells(seed: int, count: int, width: float) -> None:
     assert overlapping_margin(A, lengths, CROWDED_MARGINS) <= max(least, 0.0)
 
 
-def test_an_isolated_pair_is_proved_up_to_pi() -> None:
-    points = np.array([[0.0, 0.0], [1.0, 0.0]])
-    A = DenseInfluence.assemble(points, 1.0)
-    for crowding, proved in ((1.6, True), (3.0, True), (3.13, True), (np.pi, False), (3.2, False)):
-        lengths = np.full(2, crowding / np.pi)
-        assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(-0.2, 0.6))
 def test_sparse_elimination_proves_no_more_than_is_true(seed: int, count: int, lift: float) -> None:
@@ -236,12 +227,3 @@ def test_lattices_exclude_more_other_solutions() -> None:
             secant = problem.coefficients * (np.cbrt(Q) ** 2 - np.cbrt(loads) ** 2) / (Q - loads)
             assert np.linalg.eigvalsh(np.diag(secant) + A.matrix)[0] > 0
     assert 2 <= by_lattice < 11
-
-
-def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
-    """Shells that do not overlap show it of a third as many; three times as many are too many."""
-    smaller = cr.press(bench("lattice", 12.0), approach=5e-5)
-    assert smaller.certificate.scope == "global"
-    assert smaller.certificate.meaning == "the only solution"
-    larger = cr.press(bench("lattice", 20.0), approach=5e-5)
-    assert larger.certificate.scope == "local"

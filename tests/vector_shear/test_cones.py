@@ -1,9 +1,7 @@
 """The cone program of vector friction: against Newton's method, and its cones by themselves."""
 
 import re
-import sys
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from friction_scenes import (
     VECTOR_FRACTIONS,
     found,
     lengths,
-    pressed,
 )
 from numpy.testing import assert_allclose
 from scenes import PAPER_APPROACH
@@ -76,28 +73,3 @@ def test_too_dense_for_a_convex_program() -> None:
     numbers = contact.contact_radii / (np.pi / 4 * 0.0025)
     assert_allclose([float(number) for _, number in named], numbers[worst], rtol=1e-3)
     assert numbers[worst[0]] == numbers.max()
-
-
-def test_an_answer_is_judged_and_not_the_word_of_its_solver(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    import clarabel
-
-    class Boastful:
-        def __init__(self, *data: object) -> None:
-            self.real = clarabel.DefaultSolver(*data)
-            self.set_termination_callback = self.real.set_termination_callback
-
-        def solve(self) -> SimpleNamespace:
-            answer = self.real.solve()
-            x = np.array(answer.x) * 1.01
-            return SimpleNamespace(x=x, z=answer.z, status="Solved", iterations=1)
-
-    names = ("DefaultSettings", "ZeroConeT", "SecondOrderConeT")
-    fake = SimpleNamespace(
-        DefaultSolver=Boastful, **{each: getattr(clarabel, each) for each in names}
-    )
-    monkeypatch.setitem(sys.modules, "clarabel", fake)
-    contact = pressed("paper")
-    with pytest.raises(cr.SolverError, match="with Solved"):
-        shear_vector(contact, force=0.5 * FRICTION * contact.load, solver=FrictionConic())
