@@ -1,19 +1,14 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
-import os
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import convexrough as cr
 from convexrough.progress import logged
-from convexrough.run.scene_file import Task
-from convexrough.sweeps.scenes import Ask, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -91,20 +86,3 @@ def reported_to(call: Callable[[str], None]) -> Iterator[None]:
 def numbers(table: cr.SweepTable, *names: str) -> list[Any]:
     columns = table.read(names)
     return [np.asarray(columns[name]).tolist() for name in names]
-
-
-@dataclass(frozen=True)
-class Deadly(Tables):
-    """Scenes of which one kills the process that computes it."""
-
-    worst: int = 0
-
-    def opened(self) -> Ask:
-        ask = super().opened()
-
-        def ask_one(number: int) -> Task:
-            if number == self.worst:
-                os.kill(os.getpid(), signal.SIGKILL)
-            return ask(number)
-
-        return ask_one

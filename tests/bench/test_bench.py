@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import convexrough as cr
-from convexrough.bench import measure, page, suite
+from convexrough.bench import measure, suite
 from convexrough.bench.measure import Attempt, reference
-from convexrough.bench.profile import Profile, profile_of
+from convexrough.bench.profile import profile_of
 from convexrough.bench.rows import Bench, Row, better_than_default
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton
@@ -141,49 +141,6 @@ def test_command(command: Any, tmp_path: Path) -> None:
     said = command("bench", "--quick", "--force", "--no-figures")
     assert said.status == 0
     assert f"in products on {tiny().machine['cores']} cores" in said.out
-
-
-PAGE = f"# Title\n\nBefore.\n\n{page.BEGIN}\nold\n{page.END}\n\nAfter.\n"
-
-
-def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> None:
-    path = tmp_path / "docs" / "page.md"
-    path.parent.mkdir()
-    path.write_text(PAGE)
-    assert command("bench", "--quick", "--page", "docs/page.md", "--no-figures").status == 0
-    text = path.read_text()
-    assert page.split_page(path) == ("# Title\n\nBefore.\n\n", "\n\nAfter.\n")
-    assert "old" not in text
-    assert "| lattice " in text
-    assert "(figures/work-precision.png)" in text
-    assert (tmp_path / "docs" / "figures" / "work-precision.png").exists()
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["nothing", PAGE.replace(page.END, ""), PAGE.replace(page.BEGIN, ""), PAGE + PAGE],
-    ids=["no block", "no end", "no beginning", "two blocks"],
-)
-def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path, text: str) -> None:
-    (tmp_path / "page.md").write_text(text)
-    ran = command("bench", "--quick", "--page", "page.md")
-    assert ran.status == 2
-    assert "page.md: expected one line <!-- bench: begin -->" in ran.err
-    assert (tmp_path / "page.md").read_text() == text
-    assert not (tmp_path / "bench-results").exists()
-
-
-def test_a_performance_profile() -> None:
-    """Parts of the cases by time over the least; nothing that is not right counts."""
-    seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
-    texts = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
-    sets = np.array([[True, True, True, False]] * 2)
-    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts, sets)
-    assert found.part(1.0).tolist() == [0.25, 0.5]
-    assert found.part(2.0).tolist() == [0.5, 0.5]
-    assert found.part(4.0).tolist() == [0.5, 0.75]
-    assert list(found.rows()[0].values())[:7] == ["a", 2, 1, 0, 1, 3, 0.25]
-    assert [len(line.get_xdata()) for line in found.plot().lines] == [4, 4]
 
 
 def test_answers_are_judged_before_they_are_timed() -> None:

@@ -239,12 +239,3 @@ def test_a_manufactured_contact_is_its_answer() -> None:
     assert np.abs(off).max() < 1e-14 * made.loads.max()
     assert np.array_equal(made.loads > 0, [load > 0 for load in exact.loads])
     assert np.abs(multiprecision.errors(made.gaps, exact.gaps)).max() < 1e-14
-
-
-def test_names() -> None:
-    assert len(NAMES) == len(set(NAMES)) > 50
-    assert gallery.names("few") == ("one", "one-under-load", "two-equal")
-    with pytest.raises(cr.InputError, match='the name of a case; did you mean "two-equal"'):
-        gallery.case("two-equals")
-    with pytest.raises(cr.InputError, match='of a case or a family; did you mean "grazing"'):
-        gallery.names("grasing")

@@ -92,17 +92,6 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     assert limit.limited_by == "sliding"
 
 
-def test_an_asperity_that_only_opens_is_told() -> None:
-    """In phase and flatter than friction: above the limit a ring opens, and nothing slides."""
-    for part, what in ((0.2, "opening"), (0.05, "sliding")):
-        p, q = part * P * np.array([1.0, -1.0]), 0.05 * P * np.array([1.0, -1.0])
-        limit = cr.shakedown(PAPER, loads=P, load_amplitudes=p, force_amplitudes=q)
-        assert limit.limited_by == what
-        above = 1.01 * limit.factor
-        found = cr.steady(PAPER, loads=P + above * p, forces=above * q)
-        assert (found.loss > 0) == ((found.status == "sliding").any()) == (what == "sliding")
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ratio", "along", "across"),
@@ -121,13 +110,6 @@ def test_vector_limits(ratio: float, along: float, across: float) -> None:
         assert found.factor == pytest.approx(limit, rel=1e-9)
         assert found.lower <= found.upper
         assert found.gap < 1e-8
-
-
-def test_a_path_that_follows_never_slides() -> None:
-    found = cr.shakedown(
-        PAPER, loads=P, load_amplitudes=[0.1 * P, 0.0], force_amplitudes=[0.02 * P, 0.0]
-    )
-    assert found.factor == np.inf
 
 
 #: What interior-point answers leave of a slip that has died out, over one that has not.

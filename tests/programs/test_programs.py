@@ -123,14 +123,6 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
     )
 
 
-def test_what_is_said_of_a_program() -> None:
-    made = cr.program(SCENE, approach=PAPER_APPROACH)
-    assert "ConeProgram: 114 variables, 19 equations, 76 second-order cones" in repr(made)
-    assert len(repr(made).splitlines()) < 15
-    rows = cr.program(SCENE, "bristles", approach=PAPER_APPROACH)
-    assert repr(rows.data).startswith("QuadraticProgram: ")
-
-
 def test_programs_that_are_not_made(tmp_path: Path) -> None:
     made = cr.program(SCENE, approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match=r"the ending '\.mps', expected one of \.cbf, \.json"):

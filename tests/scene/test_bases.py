@@ -142,32 +142,6 @@ def test_gradients(base: Any, geometry: Any) -> None:
     assert np.isfinite(gradient.height_errors).all()
 
 
-def test_no_gradient_by_the_radius_of_what_is_no_sphere() -> None:
-    scene = on(INF)
-    contact = cr.press(scene, load=3e-7)
-    with pytest.raises(InputError, match="sphere_radius: found a flat, expected a sphere"):
-        contact.change(cr.Direction(sphere_radius=1e-3))
-    with pytest.raises(InputError, match="by sphere_radius: found an ellipsoid"):
-        cr.Objective(scene=on((1.0, 2.0)), of="load", by=["sphere_radius"], approach=4e-5)
-    objective = cr.Objective(scene=scene, of="load", by=["heights"], approach=4e-5)
-    assert objective(objective.start)[0] == pytest.approx(cr.press(scene, approach=4e-5).load)
-
-
-@pytest.mark.sample(2)
-@each_base
-def test_change_to_closest(base: Any) -> None:
-    """The estimate of what the geometry does, against what it does."""
-    from convexrough.contact import closest_changes
-
-    scene = on(base)
-    contact = cr.press(scene, approach=4e-5)
-    there = cr.press(replace(scene, geometry="closest"), approach=4e-5)
-    heavy = contact.loads > 0.1 * contact.loads.max()
-    changes = (there.loads - contact.loads)[heavy] / contact.loads[heavy]
-    estimated = closest_changes(contact)[heavy] / contact.loads[heavy]
-    assert_allclose(estimated, changes, atol=0.15 * np.abs(changes).max() + 1e-14)
-
-
 BAD = [
     ((1.0, -2.0), r"sphere_radius\[1\]: found -2.0, expected a positive number"),
     ((1.0, 2.0, 3.0), "sphere_radius: found .*, expected a number, or the two radii"),

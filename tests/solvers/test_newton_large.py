@@ -177,26 +177,6 @@ def test_manufactured_contacts(
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("above", [1e-7, 4e-6])
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
-    """Well outside the contact, where the surface hardly sinks."""
-    whole = scene(6, within=0.02)
-    far = int(np.argmin(np.abs(whole.asperities.distances - 0.018)))
-    raised = np.zeros(len(whole))
-    sinks = 4 / 3 * PAPER_APPROACH**1.5 / (np.pi * 0.018)
-    raised[far] = whole.drops[far] - PAPER_APPROACH + sinks + above
-    pressed = edited(whole, raised=raised)
-    known = cr.press(pressed, approach=PAPER_APPROACH, influence="dense")
-    assert known.candidates > ALL_ITERATED
-    assert known.status[far] == "contact"
-    prescribed: Any = {control: getattr(known, control)}
-    found = cr.press(pressed, **prescribed, influence="lattice")
-    assert (found.status == known.status).all()
-    assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
-
-
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_those_left_out_at_first_are_found(control: str) -> None:
     """The contact lies beside the axis, and across from it there are peaks. In rings about the axis

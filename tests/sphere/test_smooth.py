@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper
+from scenes import MATERIAL, PAPER_APPROACH
 
 import convexrough as cr
 from convexrough import fields
@@ -52,18 +52,6 @@ def test_one_asperity_is_a_smooth_sphere_under_shear(nu: float, sign: int) -> No
         )
 
 
-@pytest.mark.parametrize("t", [0.6, -0.6, 1.0])
-def test_branches_are_those_of_a_history(t: float) -> None:
-    contact, hertz = one_asperity(), sphere()
-    turning = t * hertz.largest_force
-    back = turning * np.linspace(1, -1, 9)
-    past = cr.history(contact, forces=back)
-    X = hertz.branch(back, turning)
-    assert_allclose(X, past.displacements, rtol=1e-12, atol=1e-13 * abs(X[0]))
-    assert X[0] == pytest.approx(hertz.displacement(turning), rel=1e-14)
-    assert X[-1] == pytest.approx(-X[0], rel=1e-13)
-
-
 def exact(t: Any, nu: Any) -> dict[str, Any]:
     """The formulas of Cattaneo, Mindlin and Deresiewicz as printed, in 60 digits."""
     with ctx.workdps(60):
@@ -101,36 +89,6 @@ def test_sixty_digits(t: float, nu: float) -> None:
         assert value == pytest.approx(true[name], rel=tolerance), name
     r = np.array([0, a / 4, a / 2])
     assert_allclose(hertz.traction(r, Q), true["traction"], rtol=1e-13)
-
-
-def test_gross_sliding_is_refused() -> None:
-    hertz = sphere()
-    limit = hertz.largest_force
-    for law in (hertz.displacement, hertz.stick_radius, hertz.energy, lambda Q: hertz.branch(0, Q)):
-        with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding.*at most f P"):
-            law(1.01 * limit)
-    with pytest.raises(cr.InputError, match=r"force\[1\].*gross sliding"):
-        hertz.traction(0.0, [0.0, -1.01 * limit, 2 * limit])
-    with pytest.raises(cr.InputError, match=r"minimum: found.*gross sliding"):
-        hertz.energy(0.0, -2 * limit)
-
-
-def test_bad_input() -> None:
-    hertz = sphere()
-    Q = hertz.largest_force / 2
-    with pytest.raises(cr.InputError, match=r"maximum: found 0.*at least the minimum"):
-        hertz.energy(0.0, Q)
-    with pytest.raises(cr.InputError, match=r"maximum.*at least the minimum"):
-        hertz.energy([Q, -Q])
-    with pytest.raises(cr.InputError, match=r"force: found.*at most the turning force"):
-        hertz.branch([0.0, 1.1 * Q], Q)
-    with pytest.raises(cr.InputError, match=r"force: found nan"):
-        hertz.displacement(np.nan)
-    with pytest.raises(cr.InputError, match=r"force.*numbers"):
-        hertz.displacement("much")
-    for load in (0.0, -1.0, np.nan):
-        with pytest.raises(cr.InputError, match=r"load.*positive"):
-            smooth(paper(), load=load)
 
 
 def differences(spacing: float) -> list[float]:

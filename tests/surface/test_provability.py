@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
-from convexrough.errors import SolverError
 from convexrough.surface import Provability, crowded, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
@@ -38,18 +37,6 @@ def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
             assert curve.undecided[i] == 0
 
 
-def test_stronger_pruning_leaves_the_model_room() -> None:
-    """Here the weakest pruning overlaps, and the default is the other way."""
-    curve = provability(MAP.summits(0.0), press)
-    assert curve.crowding[0] > 1
-    assert not curve.trusted[0]
-    assert curve.trusted[-1]
-    first = curve.prune.tolist().index(curve.trusted_from)
-    assert curve.trusted[first:].all()
-    assert not curve.trusted[first - 1]
-    assert (np.diff(curve.summits) < 0).all()
-
-
 def test_what_trust_needs() -> None:
     good = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
                 crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0)  # fmt: skip
@@ -60,22 +47,6 @@ def test_what_trust_needs() -> None:
         trusted = change in fine
         curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})
         assert (curve.trusted.tolist(), curve.trusted_from == 0.1) == ([trusted], trusted)
-
-
-def test_a_solver_that_fails_is_a_level_without_trust() -> None:
-    def fails(asperities: cr.Asperities) -> cr.Contact:
-        if len(asperities) > 100:
-            raise SolverError("no step", solver="newton")
-        return press(asperities)
-
-    curve = provability(MAP.summits(0.0), fails, levels=[0.0, 0.2])
-    assert curve.scope.tolist() == ["failed", "global"]
-    assert curve.trusted.tolist() == [False, True]
-    assert np.isnan(curve.crowding[0])
-    assert curve.trusted_from == 0.2
-    curve.plot().figure.canvas.draw()
-    never = provability(MAP.summits(0.0), fails, levels=[0.0])
-    assert np.isnan(never.trusted_from)
 
 
 def test_crowded_pairs_are_all_of_them() -> None:

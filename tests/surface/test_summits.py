@@ -37,15 +37,6 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert not again.prominences.flags.writeable
 
 
-@pytest.mark.parametrize("prune", [0.02, 0.05, 0.3, 1.0])
-def test_pruning_later_is_pruning_at_once(prune: float) -> None:
-    later, once = MAP.summits(0.0).pruned(prune), MAP.summits(prune)
-    for name in ("positions", "tip_radii", "heights", "prominences", "deviations", "pixels"):
-        assert_allclose(getattr(later, name), getattr(once, name), rtol=1e-12, atol=1e-12)
-    assert later.origin.threshold == once.origin.threshold == prune * MAP.max_height
-    assert later.origin.maxima == once.origin.maxima
-
-
 def test_a_map_turned_or_scaled_has_the_same_summits() -> None:
     first = MAP.summits()
     turned = cr.surface.Surface(MAP.heights.T, 1.0).summits()
@@ -92,14 +83,10 @@ def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     ("options", "message"),
     [
         ({"hurst": 1.5}, "hurst"),
-        ({"rms_slope": 0.0}, "rms_slope"),
-        ({"rolloff": -1.0}, "rolloff"),
-        ({"seed": -1}, "seed"),
         ({"seed": None}, "seed"),
         ({"pixels": 4}, "pixels: found 4, expected a whole number, at least 8"),
         ({"pixels": 10**7}, "GiB"),
         ({"cutoff": 2.0}, "cutoff: found 2, expected more than two pixels of 1"),
-        ({"cutoff": 300.0}, "cutoff: found 300, expected at most the size, 256"),
     ],
 )
 def test_no_self_affine_map(options: dict[str, object], message: str) -> None:

@@ -47,21 +47,6 @@ def test_a_sphere_is_removed_and_said(radius: float) -> None:
     assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
 
 
-def test_another_unit_is_the_same_surface() -> None:
-    x, y = grid()
-    cap = np.sqrt(50**2 - x**2 - y**2) + NOISE
-    scan = cr.surface.Surface(cap, (0.5, 0.7), unit="mm").detrend("sphere")
-    metres = scan.to_unit("m")
-    assert_allclose(metres.heights, 1e-3 * scan.heights, rtol=1e-15)
-    assert_allclose(metres.pixel, (0.5e-3, 0.7e-3), rtol=1e-15)
-    one, other = scan.removed[0], metres.removed[0]
-    assert_allclose((other.radius, other.height), (1e-3 * one.radius, 1e-3 * one.height))
-    assert other.slopes == one.slopes
-    assert_allclose(metres.to_unit("um").summits(0.1).tip_radii, 1e3 * scan.summits(0.1).tip_radii)
-    with pytest.raises(cr.InputError, match="unit: found none, expected a unit of length of the"):
-        cr.surface.Surface(cap, 1.0).to_unit("m")
-
-
 @pytest.mark.parametrize(
     ("heights", "message"),
     [
@@ -76,19 +61,6 @@ def test_another_unit_is_the_same_surface() -> None:
 def test_no_map(heights: object, message: str) -> None:
     with pytest.raises(cr.InputError, match=message):
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
-
-
-def test_a_paraboloid_of_a_turned_cylinder() -> None:
-    x, y = grid()
-    across = 0.8 * x + 0.6 * y
-    surface = cr.surface.Surface(0.1 * x - across**2 / 500 + NOISE, (0.5, 0.7))
-    (removed,) = surface.detrend("paraboloid").removed
-    assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
-    assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
-    metres = (
-        cr.surface.Surface(surface.heights, (0.5, 0.7), "mm").detrend("paraboloid").to_unit("m")
-    )
-    assert_allclose(metres.removed[0].curvatures, np.multiply(1e3, removed.curvatures))
 
 
 def test_a_trend_that_explains_most_is_named() -> None:
@@ -173,14 +145,3 @@ def test_spikes_and_drop_outs_are_named() -> None:
     (said,) = cr.surface.Surface(grooved, 10.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
     assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said
-
-
-def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
-    """Also after a plane is subtracted from its flat tops."""
-    heights = NOISE + 0.01 * np.arange(NOISE.shape[1])
-    cut = np.minimum(heights, np.quantile(heights, 0.97))
-    for surface in (cr.surface.Surface(cut, 1.0), cr.surface.Surface(cut, 1.0).detrend("plane")):
-        assert any("exactly the same height" in each for each in surface.warnings)
-    levels = np.round(heights * 20)  # as of a byte for each pixel
-    for whole in (heights, levels):
-        assert cr.surface.Surface(whole, 1.0).clipped == 0

@@ -6,19 +6,16 @@ import random
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from sweep_files import Deadly, reported_to, same, sweeping, tables
+from sweep_files import reported_to, same, tables
 
 import convexrough as cr
 from convexrough.sweeps import plan
 from convexrough.sweeps.file import plan_of
-from convexrough.sweeps.plan import Plan
-from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.scenes import Tables
+from convexrough.sweeps.pool import dask
 from convexrough.sweeps.sweep import run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
@@ -62,33 +59,6 @@ def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "MOST_SCENES", most)
     with ThreadPoolExecutor(1) as here:
         assert same(cr.sweep(MANY, executor=here), WHOLE)
-
-
-def deadly(whole: Plan, worst: int) -> Plan:
-    assert isinstance(whole.source, Tables)
-    return replace(whole, source=Deadly(whole.source.grid, whole.source.path, worst=worst))
-
-
-@pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
-def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
-    contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
-    whole = plan_of(contents, Path("sweep"))
-    said = "the process that computed scenes 17 to 17 died twice"
-    with Processes(1) as mine, pytest.raises(cr.WorkerError, match=said):
-        run(deadly(whole, 17), mine, out=tmp_path / "a")
-    assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
-    with ThreadPoolExecutor(1) as here:
-        table = run(whole, here, out=tmp_path / "a", resume=True).table
-        assert same(table, cr.sweep(contents, executor=here))
-
-
-@pytest.mark.sample(0)
-def test_an_executor_that_broke_is_said_to_be() -> None:
-    with (
-        ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
-        pytest.raises(cr.WorkerError, match="executor is broken"),
-    ):
-        run(deadly(PLAN, 3), mine)
 
 
 def test_threads_of_linear_algebra_do_not_matter() -> None:
@@ -140,22 +110,6 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
     with ThreadPoolExecutor(1) as here:
         assert same(table, cr.sweep(contents, executor=here))
     assert set(table.read(["status"])["status"]) == {"certified"}
-
-
-def test_a_scheduler_that_does_not_answer() -> None:
-    """It is refused, and does not stay the client of all later work with Dask, which would wait."""
-    distributed = pytest.importorskip("distributed")
-    config = pytest.importorskip("dask").config
-    with (
-        config.set({"distributed.comm.timeouts.connect": "1s"}),
-        pytest.raises(cr.InputError, match=r"scheduler: found tcp://127\.0\.0\.1:9"),
-        dask("tcp://127.0.0.1:9"),
-    ):
-        pass
-    with pytest.raises(cr.InputError, match="scheduler: found nonsense"), dask("nonsense"):
-        pass
-    with pytest.raises(ValueError, match="No client"):
-        distributed.default_client()
 
 
 @pytest.mark.parametrize("influence", ["dense", "lattice"])

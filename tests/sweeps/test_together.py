@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sweep_files import sweeping, toml
+from sweep_files import sweeping
 
 import convexrough as cr
 from convexrough import plausibility
 from convexrough.sweeps import batch, together
 from convexrough.sweeps.batch import Columns, compute
 from convexrough.sweeps.file import plan_of
-from convexrough.sweeps.report import cautions
 
 #: Numbers that rows know, but for errors, which are bounds of their own.
 KNOWN = [f"normal.{name}" for name in together.NORMAL if "error" not in name]
@@ -91,22 +90,3 @@ def test_scenes_that_are_clear_of_cautions_have_none() -> None:
         none += not found
     assert 0.8 * none <= clear
     assert 0 < none < 20
-
-
-@pytest.mark.usefixtures("no_processes")
-def test_cautions_are_messages_of_certified_scenes(tmp_path: Path) -> None:
-    crowded = tables(SCENES["crowded"], ["normal.load"])
-    (tmp_path / "a.toml").write_text(toml(crowded))
-    table = cr.sweep(tmp_path / "a.toml", workers=1)
-    found = table.read()
-    assert all("contact discs overlap" in each for each in found["message"])
-    (line,) = cautions(table)
-    assert line.startswith("2 certified scenes of 2 have warnings, the first scene 0: ")
-
-
-def test_where_rows_fail_each_scene_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(*_: Any) -> Any:
-        raise np.linalg.LinAlgError
-
-    monkeypatch.setattr(together, "in_rows", failing)
-    assert set(rows({}, ["load", "loss"])["status"].tolist()) == {"certified"}
