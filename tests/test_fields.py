@@ -66,17 +66,3 @@ def test_superpose_is_the_plain_sum_also_where_discs_overlap(decades: float) -> 
     plain = (peaks * np.sqrt(np.maximum(1 - (r / radii) ** 2, 0))).sum(axis=1)
     assert np.count_nonzero(plain) > 100
     assert_allclose(fields.superpose(points, centres, radii, peaks), plain, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("asperities", "cell"),
-    [
-        (cr.Asperities.hexagonal(spacing=0.3, tip_radius=1.0, within=2.0), np.sqrt(0.75) * 0.09),
-        (cr.Asperities.square(spacing=0.3, tip_radius=1.0, within=2.0), 0.09),
-    ],
-)
-def test_the_cells_of_a_lattice(asperities: cr.Asperities, cell: float) -> None:
-    areas = fields.cell_areas(asperities.positions)
-    inside = asperities.distances < 1.4
-    assert np.isnan(areas).any()
-    assert_allclose(areas[inside], cell, rtol=1e-9)

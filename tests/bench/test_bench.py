@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,10 @@ import multiprecision
 import numpy as np
 import pytest
 
-import convexrough as cr
 from convexrough.bench import measure, suite
-from convexrough.bench.measure import Attempt, reference
-from convexrough.bench.profile import profile_of
-from convexrough.bench.rows import Bench, Row, better_than_default
+from convexrough.bench.measure import reference
+from convexrough.bench.rows import Bench
 from convexrough.bench.scenes import APPROACH, scene
-from convexrough.solvers import BristleQP, Conic, Newton
 
 SMALL = (("lattice", 61),)
 
@@ -57,38 +53,6 @@ def test_reference_against_50_digits(family: Any) -> None:
 
 
 # What is measured, and what is said of it.
-
-
-def test_rows_of_those_that_do_not_answer() -> None:
-    small = scene("lattice", 1.0)
-    dense = cr.Scene(1.0, cr.Asperities.hexagonal(spacing=0.0025, tip_radius=5.0, within=0.01),
-                     cr.Material(1.0, 0.3), geometry="summit")  # fmt: skip
-    for each, attempt, outcome, message in (
-        (small, Attempt("newton", "", Newton(max_iterations=1)), "failed", "residual"),
-        (dense, Attempt("conic", "", Conic()), "refused", "asperities too dense for a"),
-        (scene("scattered", 1.0), Attempt("", "", Newton(), "lattice"), "refused", "lattice"),
-    ):
-        row = measure.measure_attempt("lattice", each, attempt, None, 0.0)
-        assert (row.outcome, message in row.message) == (outcome, True)
-
-
-def row(name: str, seconds: float, error: float, setting: str = "default") -> Row:
-    return Row("solve", "lattice", 61, solver=name, setting=setting, seconds=seconds, error=error)
-
-
-def test_who_is_better_than_the_default() -> None:
-    others = [
-        row("within noise", 0.95, 1e-12),
-        row("less accurate", 0.5, 1.1e-12),
-        row("slower", 1.2, 1e-15),
-        row("better", 0.85, 1e-12),
-    ]
-    rows = [row("newton", 1.0, 1e-12), *others]
-    assert [each.solver for each in better_than_default(rows)] == ["better"]
-    assert better_than_default(others) == others
-    (line,) = replace(tiny(), rows=tuple(rows)).verdicts()
-    assert line.endswith("61 asperities (lattice): the default solver is not on the frontier: "
-                         "better, default.")  # fmt: skip
 
 
 def test_every_task_is_timed_on_the_scene_that_it_names() -> None:
@@ -141,10 +105,3 @@ def test_command(command: Any, tmp_path: Path) -> None:
     said = command("bench", "--quick", "--force", "--no-figures")
     assert said.status == 0
     assert f"in products on {tiny().machine['cores']} cores" in said.out
-
-
-def test_answers_are_judged_before_they_are_timed() -> None:
-    found = profile_of([BristleQP(newton_step=False)], cases=["two-equal"], within=1e-9)
-    assert found.solvers == ("newton", "bristles")
-    assert found.outcomes == (("right",), ("wrong",))
-    assert found.ratios.tolist() == [[1.0], [np.inf]]

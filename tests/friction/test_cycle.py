@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, KINDS, pressed, with_friction
+from friction_scenes import FRICTION, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -67,24 +67,6 @@ def test_three_ways_to_the_energy(name: str) -> None:
         assert 0 < errors[0] < 0.05
         assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.03)
         assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.03)
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("influence", KINDS)
-def test_sliding_shakes_down(influence: str) -> None:
-    """An asperity that slides on first loading does not in a cycle of less range than its onset."""
-    contact = pressed("paper", influence)
-    limit = limit_of(contact)
-    onsets = cr.onset_of_sliding(contact)
-    first = cr.shear(contact, force=0.6 * limit)
-    assert (first.status == "sliding").sum() == 6
-    amplitude = np.nanmin(onsets)
-    still = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 1.999 * amplitude)
-    again = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 2.001 * amplitude)
-    assert (still.status == "sliding").sum() == 0
-    assert still.sliding_losses.sum() == 0
-    assert (again.status == "sliding").sum() == 6
-    assert again.sliding_losses.sum() > 0
 
 
 def plain_history(contact: cr.Contact, forces: list[float]) -> list[float]:

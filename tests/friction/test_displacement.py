@@ -8,20 +8,6 @@ from numpy.testing import assert_allclose
 import convexrough as cr
 
 
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("influence", KINDS)
-@pytest.mark.parametrize("share", [1e-6, 0.3, -0.7, 0.999, 1.0])
-def test_the_force_of_a_displacement(influence: str, share: float) -> None:
-    contact = pressed("rough", influence)
-    limit = FRICTION * contact.load
-    known = cr.shear(contact, force=share * limit)
-    found = cr.shear(contact, displacement=known.displacement)
-    error = known.certificate.displacement_error + found.certificate.displacement_error
-    assert abs(found.displacement - known.displacement) <= error + 1e-14 * abs(known.displacement)
-    assert found.force == pytest.approx(known.force, rel=1e-9)
-    assert list(found.status) == list(known.status)
-
-
 def test_a_displacement_beyond_gross_sliding() -> None:
     contact = pressed("paper")
     last = cr.shear(contact, force=FRICTION * contact.load).displacement

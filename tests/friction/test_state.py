@@ -43,22 +43,6 @@ def test_eighty_digits(influence: str, name: str, fraction: float) -> None:
         assert cycle.balance_defect < 1e-10
 
 
-def test_the_paper_at_half_the_limit() -> None:
-    """Exactly the six asperities of ring A slide; A starts near 0.352, B near 0.616."""
-    contact = pressed("paper")
-    ring = np.round((contact.scene.asperities.distances / 0.0025) ** 2)
-    limit = FRICTION * contact.load
-    state = cr.shear(contact, force=0.5 * limit)
-    assert set(ring[state.status == "sliding"]) == {9}
-    assert (state.status == "sliding").sum() == 6
-    onsets = cr.onset_of_sliding(contact) / limit
-    assert_allclose(onsets[ring == 9], 0.352, atol=5e-4)
-    assert_allclose(onsets[ring == 7], 0.616, atol=1e-3)
-    assert np.ptp(onsets[ring == 7]) < 1e-13  # symmetric rings slide together
-    assert np.nanmax(onsets) == pytest.approx(1.0, abs=1e-12)
-    assert np.isnan(onsets[contact.loads == 0]).all()
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("influence", KINDS)

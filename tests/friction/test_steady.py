@@ -1,7 +1,6 @@
 """Closed paths: values of the prototypes, closed forms, and today's cycles as the special case."""
 
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.arrays import Array
-from convexrough.friction.levels import FrictionLevels
 
 
 def octagon(name: str) -> tuple[cr.Scene, Array, Array]:
@@ -45,26 +43,6 @@ def test_the_octagon() -> None:
         "sliding": 12,
     }
     assert settled(octagon("rough")).loss == pytest.approx(1.9572569969746e-13, rel=1e-12, abs=0.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "loss"), [("paper", 1.4398575935045e-13), ("rough", 1.3935046228750e-13)]
-)
-def test_a_straight_line(name: str, loss: float) -> None:
-    """Against its closed form, a divided difference of V, too."""
-    found = settled(path_of(name, [(0.9, 0.4), (0.5, -0.4)]))
-    assert found.loss == pytest.approx(loss, rel=1e-12, abs=0.0)
-    assert found.level / LARGEST[name] == pytest.approx(0.3)
-    P, p, q = 0.7, 0.2, 0.4
-    levels = cr.press(SCENES[name], load=LARGEST[name]).cached(FrictionLevels)
-    points = [levels.at(Fraction(x) * levels.load) for x in (P - q, P - p, P + p)]
-    unit = levels.units.force * levels.units.length
-    V = [float(each.energy.value) * unit / LARGEST[name] for each in points]
-    still, low, high = V
-    bracket = (high - still) / (p + q) + (low - still) / (q - p) - (high - low) / (2 * p)
-    bracket -= float(points[0].approach.value) * levels.units.length
-    travel = (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2
-    assert found.loss == pytest.approx(4 * travel * q * LARGEST[name] * bracket, rel=1e-10, abs=0.0)
 
 
 @pytest.mark.parametrize("name", ["paper", "rough"])

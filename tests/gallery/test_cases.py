@@ -91,23 +91,6 @@ def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
         assert (contact.status != "undecided").all()
 
 
-@pytest.mark.parametrize(
-    ("threshold", "below", "above"),
-    [("bound-1", "global", "global"), ("fitted", "local", "local"), ("end", "global", "local")],
-)
-def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) -> None:
-    """By shells, which is all that is known without a matrix: of secants, and such as overlap.
-
-    The last by Cholesky. On this side of each case a proof of what is near still exists.
-    """
-    operator = "dense" if threshold == "end" else "scattered"
-    scopes = [
-        pressed(f"convexity-{threshold}-{side}", operator).certificate.scope
-        for side in ("below", "above")
-    ]
-    assert scopes == [below, above]
-
-
 @pytest.mark.sample(8)
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)

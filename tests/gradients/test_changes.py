@@ -110,11 +110,3 @@ def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
     assert abs(by_load.change(raised).load) < 1e-12 * by_approach.change(raised).load
     same = by_load.change(replace(raised, approach=0.0))
     np.testing.assert_allclose(same.loads, by_approach.change(raised).loads, rtol=1e-10, atol=1e-25)
-
-
-def test_positions_are_finite_pairs() -> None:
-    contact = pressed("paper", "load")
-    n = len(contact.scene)
-    for positions in ("here", [["x", "y"]] * n, np.full((n, 2), np.nan), [[1.0], [1.0, 2.0]]):
-        with pytest.raises(cr.InputError, match=r"positions: found .*\(61, 2\) finite numbers"):
-            contact.change(cr.Direction(positions=positions))

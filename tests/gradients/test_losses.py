@@ -127,43 +127,6 @@ def test_no_derivative_in_gross_sliding() -> None:
         cr.onset_gradient(together, 1)
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("holding", ["load", "approach"])
-@pytest.mark.parametrize("name", ["rough", "rough, closest"])
-def test_normalised(name: str, holding: Any) -> None:
-    """J = W / W0, by d log J = d log W - d log W0."""
-    contact = pressed(name, holding)
-    plain = cr.cycle(contact, maximum=0.3 * contact.load).gradient()
-    g, E, R, f = plain.normalised, contact.scene.material.contact_modulus, 1.0, FRICTION
-    assert g.holding == holding
-    assert g.poisson_ratio == pytest.approx(0.0, abs=1e-15)
-    assert (plain.maximum, g.maximum) == pytest.approx(
-        (plain.maximum, plain.maximum * g.value / plain.value)
-    )  # type: ignore[operator]
-    follows = contact.gradient(load=1.0, holding=holding)
-
-    def check(of: str, explicit: float) -> None:
-        W, J = getattr(plain, of) / plain.value, getattr(g, of) / g.value
-        P = getattr(follows, of) / contact.load if getattr(follows, of) is not None else 0.0
-        expected = W - 5 / 3 * P - explicit
-        np.testing.assert_allclose(J, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-
-    for of, explicit in (
-        ("heights", 0.0),
-        ("tip_radii", 0.0),
-        ("positions", 0.0),
-        ("sphere_radius", -1 / 3 / R),
-        ("contact_modulus", -2 / 3 / E),
-        ("friction", 2 / f),
-        (holding, 0.0),
-    ):
-        check(of, explicit)
-    errors = np.abs(g.height_errors).max()
-    assert 0 < errors <= SHARP * np.abs(g.heights).max()
-    with pytest.raises(cr.InputError, match="the gradient of the loss of a cycle"):
-        _ = contact.gradient(load=1.0).normalised
-
-
 def test_many_asperities_by_every_operator() -> None:
     asperities = cr.Asperities.hexagonal(
         spacing=2.5e-4, tip_radius=2e-3, within=2.5e-3, height_std=3e-8, seed=1

@@ -61,17 +61,6 @@ def of_state(
     return Judge(Setup.of(contact, holding, [force]), value)
 
 
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_the_approach_and_the_load(geometry: str) -> None:
-    contact = small(geometry)
-    gradient = contact.gradient(approach=1.0)
-    assert_slopes(of_contact(contact, "load", lambda o: o.approach), gradient, sharp=SHARP)
-    assert gradient.heights.sum() == pytest.approx(-1.0, abs=1e-15)
-    contact = small(geometry, "approach")
-    gradient = contact.gradient(load=1.0)
-    assert_slopes(of_contact(contact, "approach", lambda o: o.P.sum()), gradient, sharp=SHARP)
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("holding", ["load", "approach"])

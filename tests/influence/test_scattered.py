@@ -79,20 +79,6 @@ def test_among_and_onto() -> None:
         assert ((above >= exactly) & (above <= 1.05 * exactly + 0.01 * exactly.max())).all()
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_matrix_separations_and_crowding(layout: str) -> None:
-    rng = np.random.default_rng(7)
-    points = LAYOUTS[layout](rng)[rng.permutation(3000)]
-    dense = DenseInfluence.assemble(points, SCALE)
-    operator = ScatteredInfluence(points, SCALE)
-    assert_allclose(operator.separations(), dense.separations(), rtol=1e-14)
-    assert_allclose(operator.matrix, dense.matrix)
-    assert operator.entry_error == pytest.approx(dense.entry_error)
-    for radii in (rng.random(3000), 10.0 ** rng.uniform(-6, 0, 3000), np.zeros(3000)):
-        assert operator.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
-
-
 def test_point_error_is_counted() -> None:
     rng = np.random.default_rng(8)
     points = jittered(rng)
@@ -112,24 +98,3 @@ def test_point_error_is_counted() -> None:
         above = rough.falloff(loads, power)[:60]
         assert (above >= inverse_sums(far[:60], far, loads, power=power)[0]).all()
     assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("layout", ["disc", "clustered", "jittered"])
-@pytest.mark.parametrize("rough", [0.0, 1.0])
-def test_the_preconditioner(layout: str, rough: float) -> None:
-    """It is symmetric and positive definite, and makes I + W A W better conditioned."""
-    rng = np.random.default_rng(9)
-    points = LAYOUTS[layout](rng)[rng.permutation(3900)[:700]]
-    operator = ScatteredInfluence(points, SCALE)
-    root = np.sqrt(operator.separations() / (3 * SCALE))  # so that I + W A W is definite
-    root *= np.exp(-rough * rng.random(700))
-    smooth = operator.smoother(root)
-    M = np.stack([smooth(column)[0] for column in np.eye(700, dtype=np.float32)])
-    M = M.astype(np.float64)
-    assert_allclose(M, M.T, atol=1e-5)
-    assert np.linalg.eigvalsh(M)[0] > 0
-    whole = np.eye(700) + operator.matrix * root * root[:, None]
-    assert np.linalg.cond(np.linalg.cholesky(M).T @ np.linalg.cholesky(whole)) ** 2 < (
-        0.9 if layout == "clustered" else 0.4
-    ) * np.linalg.cond(whole)

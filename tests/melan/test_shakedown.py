@@ -1,6 +1,5 @@
 """Limits of shakedown: values of the prototypes, and histories a little below and above each."""
 
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -90,26 +89,6 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
         assert np.ptp(drift) == pytest.approx(slip, abs=1e-12 * path.displacements.max())
         assert (slip > 0) == slides
     assert limit.limited_by == "sliding"
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("ratio", "along", "across"),
-    [
-        (0.0, 0.2571338521, 0.2571338521),
-        (0.3, 0.2492494516, 0.2419789620),
-        (0.5, 0.2429058344, 0.2305870527),
-    ],
-)
-def test_vector_limits(ratio: float, along: float, across: float) -> None:
-    scene = replace(PAPER, material=cr.Material(1.0, ratio))
-    for direction, limit in ((0, along), (1, across)):
-        swing = np.zeros((2, 2))
-        swing[:, direction] = SWING
-        found = cr.shakedown(scene, loads=P, force_amplitudes=swing, kind="vector")
-        assert found.factor == pytest.approx(limit, rel=1e-9)
-        assert found.lower <= found.upper
-        assert found.gap < 1e-8
 
 
 #: What interior-point answers leave of a slip that has died out, over one that has not.
@@ -301,19 +280,6 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: str) -> None:
     found = cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
     assert found.factor > 0
-
-
-@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
-def test_one_asperity_slides_on_only_as_all_do(kind: str) -> None:
-    alone = cr.Asperities([[0.0, 0.0]], 1.0)
-    scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
-    swing = np.array([1e-7, -1e-7])
-    amplitudes = np.column_stack((swing, 0 * swing)) if kind == "vector" else swing
-    found = cr.shakedown(scene, loads=1e-6, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
-    assert found.factor == pytest.approx(5.0)
-    assert found.gross == pytest.approx(5.0)
-    assert found.proved
-    assert found.gap < 1e-10
 
 
 def test_bad_input() -> None:

@@ -23,7 +23,6 @@ from scenes import (
     reference,
     rough,
     solve_exactly,
-    twins,
 )
 
 import convexrough as cr
@@ -123,41 +122,6 @@ def test_touching_exactly_is_undecided() -> None:
     assert list(contact.status) == ["undecided", "undecided"]
     assert list(contact.loads) == [0.0, 0.0]
     assert not contact.certificate.holds
-
-
-def test_scopes() -> None:
-    """From easy to hard: the shells, the Cholesky test, a local box, nothing."""
-
-    def pressed(spacing: float, tip_radius: float, kind: Kind = "dense") -> cr.Certificate:
-        lattice = cr.Asperities.hexagonal(spacing=spacing, tip_radius=tip_radius, within=0.0102)
-        scene = cr.Scene(1.0, lattice, MATERIAL, geometry="summit")
-        return cr.press(scene, approach=PAPER_APPROACH, influence=kind).certificate
-
-    shells, cholesky = pressed(0.0012, 0.01), pressed(0.0012, 0.03)
-    local, crowded = pressed(0.0012, 0.2), pressed(0.0025, 5.0)
-    scene, load = twins()
-    nothing = cr.press(scene, load=load).certificate
-    assert shells.scope == "global"
-    assert shells.convexity_number < 0.75
-    assert cholesky.scope == "global"
-    assert cholesky.convexity_number in (0.9, 0.999)
-    assert local.scope == "local"
-    assert local.holds
-    assert crowded.scope == "local"
-    assert crowded.fixed_open > local.fixed_open == 0
-    assert nothing.scope == "none"
-    assert not nothing.holds
-    assert np.isinf(nothing.load_errors).all()
-    assert (nothing.status == "undecided").all()
-    for kind in OPERATORS[1:]:  # no matrix, so no Cholesky test, but secants
-        assert pressed(0.0012, 0.01, kind).scope == "global"
-        assert pressed(0.0012, 0.03, kind).scope == "global"
-        assert pressed(0.0012, 0.03, kind).convexity_number not in (0.9, 0.999)
-        assert pressed(0.0012, 0.2, kind).scope == "local"
-        assert pressed(0.0025, 5.0, kind).scope == "local"
-    judged = cr.press(scene, load=load, influence="scattered").certificate
-    assert judged.scope == "none"
-    assert list(judged.in_the_way) == [0, 1]
 
 
 @pytest.mark.sample(3)
@@ -279,29 +243,6 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
     gap = certify_on(problem, wrong).duality_gap
     assert gap >= excess
     assert gap <= 1.01 * excess + certify_on(problem, contact.loads).duality_gap
-
-
-@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-9, 1e-3])
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> None:
-    """Of pressed loads, and with an error of the largest; both are scaled to a prescribed load."""
-    scene = paper("closest")
-    load = cr.press(scene, approach=PAPER_APPROACH).load
-    prescribed = {"approach": PAPER_APPROACH} if control == "approach" else {"load": load}
-    contact, exact = cr.press(scene, **prescribed), reference(scene, **prescribed)
-    wrong, certificate = contact.loads.copy(), contact.certificate
-    if off:
-        wrong[np.argmax(wrong)] *= 1 + off
-        certificate = cr.certify(scene, wrong, **prescribed)
-    with ctx.workdps(80):
-        loads = [arb(load) for load in wrong.tolist()]
-        if control == "load":
-            loads = [arb(load) * each / sum(loads) for each in loads]
-        above = multiprecision.energy(scene, loads, arb(PAPER_APPROACH))
-        above -= multiprecision.energy(scene, exact.loads, arb(PAPER_APPROACH))
-        assert 0 < above <= arb(certificate.duality_gap)
-    if off >= 1e-9:
-        assert certificate.duality_gap <= 3 * float(above)
 
 
 def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -> None:

@@ -71,22 +71,6 @@ def test_random_points_are_judged_honestly(
         assert_honest(by_load, wrong, exact)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("seed", range(6))
-def test_random_points_are_proved(seed: int) -> None:
-    """Through a matrix and through a mesh: what used to be undecided is decided."""
-    scene = random_points(seed, 300)
-    for kind in ("dense", "scattered"):
-        contact = cr.press(scene, approach=5e-5, influence=kind)
-        certificate = contact.certificate
-        assert contact.crowding > 1.5
-        assert certificate.scope == "local"
-        assert certificate.holds
-        assert certificate.fixed_open == (contact.status == "open").sum()
-        assert certificate.load_error < 1e-6 * contact.loads.max()
-        assert "fixed open" in certificate.meaning
-
-
 def all_states(scene: cr.Scene, approach: float) -> list[Any]:
     """Every solution, by every set of asperities that might touch."""
     found = []

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 import convexrough as cr
 from convexrough import plots
-from convexrough.plots.measure import measure, quantity
-from convexrough.tabular.units import UnitNames
+from convexrough.plots.measure import quantity
 
 
 @pytest.mark.parametrize(
@@ -33,17 +32,6 @@ from convexrough.tabular.units import UnitNames
 )
 def test_quantities_are_written_one_way(value: float, unit: str, said: str) -> None:
     assert quantity(value, unit) == said
-
-
-def test_axes_are_in_si_where_units_are_named() -> None:
-    axis = measure(4.12e-3, "mm", "a_H")
-    assert axis.label("x") == "$x$  [µm]"
-    assert axis.of(4.12e-3) == pytest.approx(4.12)
-    assert measure(3.0, "in", "a_H").label("x") == "$x$  [in]"
-    assert measure(4.0, "", "a_H").label("x") == "$x\\,/\\,a_H$  ($a_H$ = 4)"
-    assert measure(4.0, "").label("x") == "$x$"
-    assert (UnitNames("mm", "N").pressure, UnitNames("mm", "N").work) == ("N/mm²", "N mm")
-    assert UnitNames("mm").pressure == UnitNames(force="N").work == ""
 
 
 def scattered(load: float = 2.0) -> cr.Contact:

@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import fits, texts
+from figure_checks import fits
 from matplotlib.patches import Ellipse
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.plots import cycle_figures, press_figures, shear_figures
-from convexrough.plots.measure import Scale
+from convexrough.plots import press_figures, shear_figures
 from convexrough.sphere import hertz
 
 
@@ -116,15 +115,3 @@ def test_an_ellipse_beside_the_contact() -> None:
     assert_allclose([contour.width, contour.height], 2 * axes)
     whole, stick = figures["stick_slip"].axes[1].findobj(Ellipse)
     assert_allclose(stick.width / whole.width, np.cbrt(1 - 0.6))
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("base", [np.inf, (1.0, np.inf)])
-def test_no_smooth_reference(base: Any) -> None:
-    contact = cr.press(cr.Scene(base, paper().asperities, MATERIAL, 0.5, "summit"), load=3e-7)
-    figure = cycle_figures([cr.cycle(contact, maximum=0.15 * contact.load)])["hysteresis"]
-    said = " ".join(text.get_text() for text in texts(figure))
-    assert "smooth sphere" not in said
-    X0 = Scale(contact).travel
-    nearly = cr.shear(contact, force=0.5 * contact.load * (1 - 1e-9)).displacement
-    assert pytest.approx(X0, rel=1e-5) == nearly

@@ -16,7 +16,6 @@ import convexrough as cr
 from convexrough import plots
 from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import SLIDING
-from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
 UNITS = ("µm", "mN")
@@ -135,20 +134,6 @@ def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
         x, q = np.asarray(line.get_data(), dtype=float)
         assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
         assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
-
-
-def test_the_loss_is_that_of_the_cycles() -> None:
-    cycles = steady("paper", [0.5, 0.1, 0.0, 0.37])
-    loss, ratio = plots.cycle_figures(cycles)["loss"].axes
-    sphere, points = loss.lines
-    t, e = np.asarray(sphere.get_data(), dtype=float)
-    assert_allclose(e, mindlin.loss(t), rtol=1e-12)
-    x, w = np.asarray(points.get_data(), dtype=float)
-    assert_allclose(x, [0.1, 0.37, 0.5], rtol=1e-12)  # no loss at 0
-    assert_allclose(w, [cycles[i].loss_normalised for i in (1, 3, 0)], rtol=1e-12)
-    y = np.asarray(ratio.lines[1].get_ydata(), dtype=float)
-    assert_allclose(y, w / mindlin.loss(x), rtol=1e-12)
-    assert "loss" not in plots.cycle_figures(cycles[:1])
 
 
 # --- histories ------------------------------------------------------------------------------------

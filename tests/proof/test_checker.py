@@ -176,19 +176,6 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     refused(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
 
 
-def test_each_end_of_each_bound_counts(few: Any) -> None:
-    claims = few["claims"]
-    for key in ("load", "loads__1", "gaps__5"):
-        name, *place = key.split("__")
-        low, high = (
-            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
-        )
-        above, below = np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
-        for bounds in ((above, high), (low, below), (high, low)):
-            ends = [float(bound).hex() for bound in bounds]
-            refused(few, "not proved to be within", **{f"claims__{key}": ends})
-
-
 def test_numbers_are_written_one_way_and_nothing_is_left_unread(few: Any) -> None:
     for text in (
         "0x1p+1",
@@ -241,54 +228,6 @@ def test_a_loss_is_claimed_in_order_alone() -> None:
     assert (claim["order"], claim["loss"]) == ("proved for one step", None)
     refused(document, "proved 'proved for one step'", claims__shear__0__order="proved")
     refused(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
-
-
-def test_shells_prove_what_eigenvalues_show() -> None:
-    """Of random points and shells that overlap; a close pair up to where it turns indefinite."""
-    rng = np.random.default_rng(7)
-    scene, approach = scenes.scattered(5, 8, 0.5, 0.5)
-    given = deepcopy(cr.press(scene, approach=approach).proof().document["scene"])
-    accepted, overlapping = 0, 0
-    for trial in range(150):
-        points = rng.uniform(-1, 1, (8, 2)) if trial % 2 else rng.uniform(-9, 9, (8, 2))
-        points[1] = points[0] + rng.uniform(0.01, 0.3, 2)
-        given |= {"x": [x.hex() for x in points[:, 0]], "y": [y.hex() for y in points[:, 1]]}
-        read = checker.read_scene(given)
-        apart = np.hypot(*(points[:, None] - points).T)
-        np.fill_diagonal(apart, np.inf)
-        radii = np.pi / 2 * apart.min(axis=0) * 10 ** rng.uniform(-1.5, 0, 8)
-        shells = radii * 2 / np.pi * 2.0 ** rng.uniform(0, 3)
-        given_shells, given_radii = (list(map(Fraction, each.tolist())) for each in (shells, radii))
-        try:
-            everyone = list(range(8))
-            checker.prove_by_shells(read, given_shells, given_radii, everyone, lambda line: None)
-        except Refused:
-            continue
-        accepted += 1
-        overlapping += bool((shells[:, None] + shells > apart).any())
-        assert np.linalg.eigvalsh(1 / (np.pi * apart) + np.diag(1 / (2 * radii))).min() > 0
-    assert accepted > overlapping > 8
-
-
-def test_a_base_with_two_radii(document: Any) -> None:
-    scene = deepcopy(document["scene"])
-    x, y, tip = (Fraction(float.fromhex(scene[key][7])) for key in ("x", "y", "tip_radii"))
-    scene |= {"sphere_radius": [(0.5).hex(), "inf"], "geometry": "closest"}
-    read = checker.read_scene(scene)
-    assert read.radii[7] == 1 / (1 + 1 / tip)
-    drop = x * x / (2 * (Fraction(1, 2) + tip))
-    assert read.offsets[7].low <= -drop <= read.offsets[7].high
-    place = x / 2 / (Fraction(1, 2) + tip) * read.grid, y * read.grid
-    assert read.points[7] == tuple(map(math.floor, place))
-    for wrong in ("0x1.0000000000000p+0", "-0x1.0000000000000p+0", "-inf", "nan"):
-        with pytest.raises((Refused, checker.Unreadable)):
-            checker.read_scene(
-                scene | {"sphere_radius": [wrong, wrong, wrong][: 2 + (wrong[0] == "0")]}
-            )
-    both = deepcopy(document)
-    both["scene"]["sphere_radius"] = [document["scene"]["sphere_radius"]] * 2
-    both["sha256"] = checker.digest(both["scene"], both["prescribed"])
-    assert checker.check(both, lambda line: None).startswith("proved")
 
 
 def test_intervals_hold_what_they_should() -> None:

@@ -8,32 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
-
-
-def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102"))
-    ran = command("run", "a.toml", "--json", "--no-figures", "--out", "deep/er")
-    assert (ran.status, ran.err) == (0, "")
-    summary = json.loads(ran.out)
-    assert summary == json.loads((tmp_path / "deep/er/summary.json").read_text())
-    assert (summary["schema"], summary["version"]) == (2, cr.__version__)
-    normal, proof = summary["normal"], summary["normal"]["certificate"]
-    counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
-    assert {key: normal[key] for key in counts} == counts
-    assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
-    assert normal["approach"] == 5e-5
-    assert normal["solver"] == "newton"
-    assert {"iterations", "seconds", "model_error", "crowding", "approach_error"} < set(normal)
-    assert proof["scope"] == "global"
-    assert proof["convexity_number"] == pytest.approx(0.504, abs=1e-3)
-    assert 0 < proof["load_error"] < 1e-10 * normal["load"]
-    assert proof["gap_error"] > 0
-    verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
-    assert json.loads(verified.out)["normal"]["certificate"].keys() == proof.keys()
 
 
 def test_paper(command: Any, tmp_path: Path) -> None:

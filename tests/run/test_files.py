@@ -10,7 +10,6 @@ from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 from convexrough.atomic import replacing
-from convexrough.run import results
 from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
 from convexrough.run.stages import NormalStage
@@ -130,15 +129,3 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
         write(KeyboardInterrupt(), "2", force=True)
     assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
     assert (folder / "one.csv").read_text() == "1"
-
-
-def test_many_asperities_go_to_npz(
-    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(results, "MOST_CSV_ROWS", len(contact.loads) - 1)
-    assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
-    path = tmp_path / "asperities.npz"
-    with np.load(path) as arrays:
-        assert tuple(arrays) == COLUMNS
-        assert arrays["status"].tolist() == contact.status.tolist()
-    assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)

@@ -72,30 +72,6 @@ def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
     assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            "[path]\nloads = [3e-10, 3e-10]\nforces = [0, 1e-10]",
-            "[path] has loads up to 3e-10, and",
-        ),
-        ("[steady]\nellipse = { load = 3e-4, force_amplitude = 3e-5 }", "[steady] has loads up to"),
-        ("[shakedown]\nloads = 3e-4\nforce_amplitudes = [1e-5, 0.0]", "[shakedown] has loads"),
-        (
-            "[path]\nloads = [3e-7, 3e-7]\nforces = [0, 1e-10]",
-            "[path] has shear forces up to 1e-10",
-        ),
-    ],
-)
-def test_loads_that_do_not_fit_those_of_normal(tmp_path: Path, table: str, message: str) -> None:
-    """They are told before anything is computed from them."""
-    file = tmp_path / "scene.toml"
-    text = scene_text(HEXAGONAL + "within = 0.0102", normal="load = 3e-7", more=FRICTION)
-    file.write_text(text + table)
-    scene = cr.read_scene(file)
-    assert any(each.startswith(message) for each in scene.cautions(scene.press()))
-
-
 SHADED = scene_text(
     'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION
 ).replace("radius = 1.0", "radius = 1e6")

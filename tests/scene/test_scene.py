@@ -10,7 +10,6 @@ from scenes import MATERIAL, paper
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
 from convexrough.scene.patterns import CUT_DEVIATIONS
-from convexrough.scene.scene import reach
 
 
 def test_hexagonal_lattice() -> None:
@@ -38,18 +37,6 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
-
-
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_reach(geometry: Any) -> None:
-    """Just inside the reach an asperity could touch, just outside it cannot."""
-    edge = reach(1e-4, sphere_radius=2.0, tip_radius=0.1, height=1e-5, geometry=geometry)
-    for factor, sign in ((0.999, 1), (1.001, -1)):
-        asperity = cr.Asperities([[edge * factor, 0]], 0.1, 1e-5)
-        scene = cr.Scene(2.0, asperity, MATERIAL, geometry=geometry)
-        assert np.sign(1e-4 + scene.offsets[0]) == sign
-        assert scene.reach(1e-4) == edge
-    assert reach(-1.0, sphere_radius=2.0, tip_radius=0.1, height=0.0, geometry=geometry) == 0
 
 
 def square(**options: Any) -> cr.Asperities:

@@ -102,24 +102,6 @@ def test_any_scene_is_solved_or_refused(sampled: tuple[cr.Scene, float], control
         assert disagreement(found, expected) < 1e-11
 
 
-@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
-def test_a_solver_that_stops_early(solver: Any) -> None:
-    few = replace(solver, max_iterations=3)
-    problem = problem_of(paper(), PAPER_APPROACH)
-    with pytest.raises(
-        cr.SolverError, match=r"^conic.*(MaxIterations|user_limit); try more"
-    ) as stopped:
-        few.solve(problem)
-    assert stopped.value.solver == few.name
-    if isinstance(few, Conic):  # CVXPY keeps its last iterate to itself
-        boxes = ConeBoxes.choose(problem)
-        assert stopped.value.iterate is not None
-        assert stopped.value.iterate.max() > 0
-        assert (stopped.value.iterate <= boxes.to_candidates(problem, boxes.loads)).all()
-    else:
-        assert stopped.value.iterate is None
-
-
 def test_a_first_order_solver_is_judged_by_the_contact_law() -> None:
     """A hundred steps of SCS: not enough alone, enough to begin with."""
     problem = problem_of(paper(), PAPER_APPROACH)

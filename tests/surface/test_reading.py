@@ -171,10 +171,3 @@ class TestInstruments:
         scale = {"m": 1e-6, "µm": 1.0}[surface.unit]
         assert_allclose(surface.pixel, (2.0 * scale, 3.0 * scale), rtol=1e-9)
         assert_allclose(surface.heights, scale * HEIGHTS, rtol=1e-6, atol=1e-7 * scale)
-
-    def test_masked_pixels_are_holes(self, tmp_path: Path) -> None:
-        masked = np.ma.masked_array(HEIGHTS, X == 4)
-        path = self.written(tmp_path / "a.x3p", masked)
-        with pytest.raises(cr.InputError, match=r"7 holes \(nan\) in 63 pixels"):
-            raw(path)
-        assert raw(path, fill=True).filled == 7

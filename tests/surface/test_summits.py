@@ -37,16 +37,6 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert not again.prominences.flags.writeable
 
 
-def test_a_map_turned_or_scaled_has_the_same_summits() -> None:
-    first = MAP.summits()
-    turned = cr.surface.Surface(MAP.heights.T, 1.0).summits()
-    order = np.argsort(-first.prominences), np.argsort(-turned.prominences)
-    assert_allclose(turned.positions[order[1]][:, ::-1], first.positions[order[0]], atol=1e-9)
-    large = cr.surface.Surface(1e-6 * MAP.heights, 1e-6).summits()
-    assert_allclose(large.tip_radii, 1e-6 * first.tip_radii, rtol=1e-9)
-    assert_allclose(large.elliptic_loads, first.elliptic_loads, rtol=1e-9)
-
-
 def test_the_map_has_the_moments_of_its_spectrum() -> None:
     """Amplitudes are not random: variances are those of the waves to rounding, of every seed."""
     exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=256)

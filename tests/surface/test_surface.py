@@ -63,28 +63,6 @@ def test_no_map(heights: object, message: str) -> None:
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
 
 
-def test_a_trend_that_explains_most_is_named() -> None:
-    x, y = grid()
-    ball, tilt = -(x**2 + y**2) / 400, 0.3 * x
-    for trend, kind in (
-        (tilt, "plane"),
-        (ball, "sphere"),
-        (ball + tilt / 10, "sphere"),
-        (-(x**2) / 300 + tilt, "paraboloid"),
-        (-ball, "sphere"),
-    ):
-        surface = cr.surface.Surface(trend + NOISE, (0.5, 0.7))
-        assert f'explains 100 % of the variance of the heights: detrend="{kind}"' in str(
-            surface.warnings
-        )
-        assert "warning" in repr(surface)
-        assert surface.detrend(kind).warnings == ()
-    assert surface.detrend("plane").warnings[0].startswith("a sphere of radius -2")
-    assert cr.surface.Surface(NOISE, 1.0).warnings == ()
-    for seed in range(3):
-        assert cr.surface.self_affine(0.8, 0.1, 256.0, seed).warnings == ()
-
-
 def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
     """Oblong pixels; load and area, and the half axes on an ellipsoid."""
     flat = cr.surface.Surface(1e-9 * RNG.standard_normal((201, 161)), (1.0, 1.2))
@@ -123,25 +101,3 @@ def test_holes_become_soap_films() -> None:
     assert np.nanmin(rough) <= mended.min()
     assert mended.max() <= np.nanmax(rough)
     assert_allclose(mended[~np.isnan(rough)], rough[~np.isnan(rough)], rtol=0)
-
-
-def test_spikes_and_drop_outs_are_named() -> None:
-    """Single pixels and pairs; no feature of the map, not even a groove one pixel wide."""
-    made = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=128).heights + 50.0
-    grooved = made.copy()
-    grooved[40] -= 30.0
-    grooved[60:70, 60:70] += 30.0
-    assert cr.surface.Surface(grooved, 10.0).warnings == ()
-    (steep,) = cr.surface.Surface(grooved, 1.0).warnings
-    assert steep.startswith("rms slope 4.05: surfaces steeper than 1 are rare")
-    (flat,) = cr.surface.Surface(1e-3 * made, 1.0).warnings
-    assert flat.startswith("rms slope 9.95e-05: surfaces flatter than 0.0003 are rare")
-    missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
-    told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
-    assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
-    assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
-    grooved[7, 9:11] = 0.0
-    grooved[90, 0] = 80.0
-    (said,) = cr.surface.Surface(grooved, 10.0).warnings
-    assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
-    assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said

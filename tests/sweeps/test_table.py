@@ -170,17 +170,6 @@ def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
     assert sorted(rows["scene"].to_pylist()) == list(range(16))
 
 
-def test_quantiles_are_those_of_each_point(whole: cr.SweepTable) -> None:
-    found = whole.quantiles(["loss_0.37"], [0.1, 0.5])
-    groups = whole.to_dataframe().groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
-    for i, (point, values) in enumerate(groups):
-        assert (found["asperities.height_std"][i], found["normal.load"][i]) == point
-        assert (found["scenes"][i], found["failed"][i]) == (4, 0)
-        assert found["0.1"][i] == np.quantile(values, 0.1)
-        assert found["0.5"][i] == np.quantile(values, 0.5)
-    assert i == 3
-
-
 def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path) -> None:
     for k in (2, 3, 1):
         table = cr.sweep(SMALL, executor=here, out=tmp_path / "a", part=(k, 3))
@@ -188,16 +177,6 @@ def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path)
     assert same(table, whole)
     second = cr.sweep(SMALL, executor=here, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
-
-
-def test_a_part_under_the_name_of_another(
-    here: Executor, whole: cr.SweepTable, folder: Path
-) -> None:
-    first, second, *_ = sorted((folder / "parts").iterdir())
-    shutil.copy(first, second)
-    with pytest.raises(cr.FileError, match=f"{second.name}: has rows of other scenes"):
-        cr.open_sweep(folder).read(["load"])
-    assert same(cr.sweep(SMALL, executor=here, out=folder, resume=True), whole)
 
 
 def test_a_folder_of_another_sweep_is_refused(here: Executor, folder: Path) -> None:

@@ -103,22 +103,6 @@ def test_arrays(tmp_path: Path) -> None:
         assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
 
 
-def test_arrays_of_two_dimensions(tmp_path: Path) -> None:
-    """Pixels as a mesh of x, y and pressure; one alone has no known order."""
-    x, y = np.meshgrid(np.linspace(-0.1, 1.1, 13), np.linspace(-0.1, 2.6, 28))
-    pressure = np.where(np.hypot(x - 0.5, y - 2.5) < 0.15, 2.0, 0.0)
-    pressure[1, 1] = 1.0
-    np.savez(tmp_path / "a.npz", x=x, y=y, pressure=pressure)
-    area = 0.1 * 0.1
-    found = read_loads(tmp_path / "a.npz", small()).values
-    assert found == pytest.approx(area * np.array([1.0, 0.0, pressure.sum() - 1.0]))
-    np.savez(tmp_path / "b.npz", x=x[0], y=y[:, 0], pressure=pressure)
-    np.savez(tmp_path / "c.npz", load=pressure)
-    for name in "bc":
-        with pytest.raises(cr.FileError, match=r"of 28 x 13 numbers, expected vectors, or x, y an"):
-            read_loads(tmp_path / f"{name}.npz", small())
-
-
 def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pyarrow
     from pyarrow import parquet
