@@ -21,6 +21,6 @@ def inverse_sums(
         for _ in range(power):
             terms = terms / squares.at(apart).sqrt()
         sums.append(terms.total() * Pair.exact(np.full(len(columns), scale)))
-    shape = (2, len(targets), *loads.shape[1:])
-    high, low = np.moveaxis(np.array(sums).reshape(len(targets), 2, len(columns)), 1, 0).reshape(shape)
+    parts = np.array(sums).reshape(len(targets), 2, len(columns))
+    high, low = (parts[:, k].reshape(len(targets), *loads.shape[1:]) for k in (0, 1))
     return high, low

@@ -254,17 +254,6 @@ def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.floa
         return np.array([float(v - r) for v, r in _pairs(values, reference)])
 
 
-def relative_errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
-    """(values - reference) / reference; if the reference is zero: 0 if the value is, else inf."""
-    with ctx.workprec(EXACT_BITS):
-        return np.array(
-            [
-                float((v - r) / r) if r != 0 else 0.0 if v == 0 else inf
-                for v, r in _pairs(values, reference)
-            ]
-        )
-
-
 def _contact_points(
     summits: Balls, tips: Balls, bends: Balls, geometry: str
 ) -> tuple[Balls, Balls]:

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from scenes import PAPER_APPROACH, paper, rough
 
 import convexrough as cr
@@ -65,18 +65,3 @@ def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None
         assert cycle.asperity_losses[i] == pytest.approx(lost, rel=1e-4)
         assert found.slip_amplitudes[i] == pytest.approx(slip[0], rel=1e-12)
     assert_array_equal(found.losses, cycle.asperity_losses)
-
-
-def test_a_varying_load_of_many() -> None:
-    """Gross slip is half the range of drifts; where contact is lost it is not known."""
-    scene, P = contact("rough").scene, contact("rough").load
-    loads, forces = [P, 0.5 * P, 0.8 * P], [0.3 * P, -0.15 * P, 0.2 * P]
-    found = cr.fretting(cr.steady(scene, loads=loads, forces=forces))
-    path = cr.load_path(scene, loads=[*loads, *loads], forces=[*forces, *forces])
-    slides, gone = found.status == "sliding", found.status == "intermittent"
-    assert slides.any()
-    assert gone.any()
-    drifts = np.ptp(path.drifts[3:], axis=0) / 2.0
-    assert_allclose(found.gross_slip_amplitudes[slides], drifts[slides], rtol=1e-9)
-    assert_array_equal(np.isnan(found.slip_amplitudes), gone)
-    assert np.isfinite(found.largest_tractions).all()

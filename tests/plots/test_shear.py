@@ -119,23 +119,6 @@ def test_doubt_is_marked(scope: str, count: int) -> None:
 # --- cycles ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize(
-    ("maximum", "minimum"), [(0.5, -0.5), (0.9, -0.1), (0.1, -0.9), (1.0, -1.0), (0.6, 0.2)]
-)
-def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
-    (cycle,) = steady("paper", [maximum], [minimum])
-    whole = plots.cycle_figures([cycle])["hysteresis"].axes[0]
-    sphere = smooth(cycle.contact.scene, load=cycle.contact.load)
-    unit = sphere.energy_scale / (sphere.largest_force * sphere.displacement(sphere.largest_force))
-    for line, loss in zip(
-        whole.lines, (cycle.loss_normalised, cycle.smooth_normalised), strict=True
-    ):
-        x, q = np.asarray(line.get_data(), dtype=float)
-        assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
-        assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
-
-
 # --- histories ------------------------------------------------------------------------------------
 
 

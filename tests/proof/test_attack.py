@@ -32,7 +32,7 @@ Forgery = Callable[[random.Random, Any], Any]
 
 @cache
 def honest() -> list[Any]:
-    """Small proofs of every kind: controls, geometries, arguments, scopes, order, a graze."""
+    """Small proofs of every kind: controls, geometries, arguments, scopes, order."""
     six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
     heights = [0, -2e-6, -4e-6, -6e-6, -1e-5, -1.5e-5, -3e-5]  # the last is open
     ring = cr.Asperities(0.0025 * np.array([[0, 0], *six]), 0.02, heights)
@@ -45,9 +45,8 @@ def honest() -> list[Any]:
             proofs.append(each.proof(sheared=[cr.shear(each, force=Q) for Q in forces]))
     lifted = cr.press(shaded(), load=2.96)
     proofs.append(lifted.proof(sheared=[cr.shear(lifted, force=0.4 * lifted.load)]))
-    grazed = grazing()
-    rough = grazed.loads * [1, 1 + 1e-12, 1]
-    proofs.append(prove(grazed.scene, rough, approach=grazed.approach))
+    loads = cr.press(lifted.scene, load=2.96).loads * (1 + 1e-3 * (np.arange(6) == 0))
+    proofs.append(prove(lifted.scene, loads, load=2.96))
     proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
     documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
     by_cholesky = deepcopy(documents[-1])
@@ -56,29 +55,12 @@ def honest() -> list[Any]:
     assert {document["argument"]["shells"] is None for document in documents} == {True, False}
     assert {document["claims"]["scope"] for document in documents} == {"global", "local"}
     statuses = {status for document in documents for status in statuses_in(document["claims"])}
-    assert statuses == {"contact", "open", "undecided", "sliding", "partial"}
+    assert statuses == {"contact", "open", "sliding", "partial"}
     return documents
 
 
 def statuses_in(claims: Any) -> set[str]:
     return {status for table in (claims, *claims["shear"]) for status in table["status"]}
-
-
-def grazing() -> cr.Contact:
-    """The middle of three touches by less than a roundoff of the approach, if at all."""
-    points = np.array([[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]])
-
-    def pressed(height: float) -> cr.Contact:
-        asperities = cr.Asperities(points, 0.02, [height, 0.0, 0.0])
-        return cr.press(
-            cr.Scene(1.0, asperities, scenes.MATERIAL, geometry="summit"), approach=3e-5
-        )
-
-    low, high = -3e-5, 0.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if pressed(middle).loads[0] == 0 else (low, middle)
-    return pressed(high)
 
 
 def crowded(*sampled: float) -> cr.Contact:
@@ -181,35 +163,6 @@ def changed_radii(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def changed_friction(rng: random.Random, document: Any) -> Any:
-    entries = document["sheared"]
-    what = rng.choice(["order", "fewer", "force", "radii"])
-    if what == "order":
-        entries.reverse()
-    elif what == "fewer":
-        entries.pop()
-    elif what == "force":
-        rng.choice(entries)["force"] = rng.choice(entries)["force"]
-    else:
-        entries[0]["held"]["radii"] = document["pressed"]["radii"]
-    return document
-
-
-def missing_or_more(rng: random.Random, document: Any) -> Any:
-    tables = [(), *{p[:k] for p in leaves(document) for k in range(1, len(p))}]
-    place = look(document, rng.choice(sorted(tables, key=str)))
-    if isinstance(place, dict):
-        if rng.random() < 0.5:
-            place.pop(rng.choice(sorted(place)))
-        else:
-            place["note"] = "believe me"
-    elif rng.random() < 0.5:
-        place.pop()
-    else:
-        place.append(deepcopy(place[0]))
-    return document
-
-
 FORGED: tuple[Forgery, ...] = (
     one_number,
     tighter_bound,
@@ -217,8 +170,6 @@ FORGED: tuple[Forgery, ...] = (
     swapped_part,
     changed_box,
     changed_radii,
-    changed_friction,
-    missing_or_more,
 )
 
 

@@ -1,13 +1,11 @@
 """How strongly to prune: the curve, and who is named."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
-from convexrough.surface import Provability, crowded, provability
+from convexrough.surface import Provability, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
 
@@ -47,19 +45,3 @@ def test_what_trust_needs() -> None:
         trusted = change in fine
         curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})
         assert (curve.trusted.tolist(), curve.trusted_from == 0.1) == ([trusted], trusted)
-
-
-def test_crowded_pairs_are_all_of_them() -> None:
-    contact = press(MAP.summits(0.0))
-    points, a = contact.scene.contact_points, contact.contact_radii
-    expected = {
-        (i, j): (a[i] + a[j]) / np.hypot(*(points[i] - points[j]))
-        for i, j in combinations(np.flatnonzero(a).tolist(), 2)
-    }
-    expected = {pair: value for pair, value in expected.items() if value > 0.5}
-    pairs, values = crowded(contact, above=0.5)
-    assert {tuple(sorted(pair)) for pair in pairs.tolist()} == set(expected)
-    assert (np.diff(values) <= 0).all()
-    for (i, j), value in zip(pairs.tolist(), values, strict=True):
-        assert_allclose(value, expected[min(i, j), max(i, j)], rtol=1e-12)
-    assert_allclose(values[0], contact.crowding, rtol=1e-12)

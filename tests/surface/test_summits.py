@@ -3,7 +3,6 @@
 import pickle
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
@@ -67,19 +66,3 @@ def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     assert_allclose(curvature, exact.mean_curvature, rtol=0.04)
     assert_allclose(height, exact.mean_height, rtol=0.02)
     assert_allclose(spread, exact.height_std, rtol=0.03)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"hurst": 1.5}, "hurst"),
-        ({"seed": None}, "seed"),
-        ({"pixels": 4}, "pixels: found 4, expected a whole number, at least 8"),
-        ({"pixels": 10**7}, "GiB"),
-        ({"cutoff": 2.0}, "cutoff: found 2, expected more than two pixels of 1"),
-    ],
-)
-def test_no_self_affine_map(options: dict[str, object], message: str) -> None:
-    plain: dict[str, object] = dict(hurst=0.8, rms_slope=0.1, rolloff=32.0, seed=1)
-    with pytest.raises(cr.InputError, match=message):
-        cr.surface.self_affine(**(plain | options))  # type: ignore[arg-type]
