@@ -55,22 +55,6 @@ def test_reference_against_50_digits(family: Any) -> None:
 # What is measured, and what is said of it.
 
 
-def test_every_task_is_timed_on_the_scene_that_it_names() -> None:
-    rows = {(each.task, each.family): each for each in tiny().rows if each.task != "solve"}
-    for task in ("press", "from nothing", *suite.FOLLOWING):
-        found = rows[task, "lattice"]
-        assert (found.outcome, found.asperities) == ("answered", 61)
-        assert found.seconds > 0
-        assert found.product > 0
-        assert found.products == found.seconds / found.product
-    assert rows["press", "lattice"].touching == 37
-    assert 0 < rows["press", "lattice"].bound < 1e-11
-    assert np.isnan(rows["press", "scattered"].product)
-    assert rows["sweep", "rough"].message == "10 scenes, 1 processes, 10 certified"
-    default = next(each for each in tiny().rows if each.task == "solve" and each.default)
-    assert 0 < default.error < 1e-14
-
-
 # What it writes.
 
 

@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from path_scenes import shaded
-from scenes import MATERIAL, NAMED, random_scenes
+from scenes import MATERIAL, NAMED
 
 import convexrough as cr
 from convexrough import rows
@@ -90,24 +88,6 @@ def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
             assert cycles.loss_errors[k] <= 2 * cycle.loss_error
             assert cycles.displacement_amplitudes[k] == cycle.displacement_amplitude
             assert cycles.displacement_errors[k] <= 2 * cycle.displacement_error
-
-
-@settings(max_examples=8, deadline=None)
-@given(random_scenes(crowding=1.2, most=10), st.integers(0, 2**32 - 1))
-def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
-    """Also of scenes where nothing touches, or that the rows do not prove."""
-    scene, approach = sampled
-    rng = np.random.default_rng(seed)
-    scenes = [
-        replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, heights))
-        for heights in scene.asperities.heights + rng.uniform(-0.3, 0.3, (3, 1)) * approach
-    ]
-    contacts = cr.press_many(scenes, approach=approach)
-    for k, each in enumerate(scenes):
-        one = cr.press(each, approach=approach)
-        assert_array_equal(contacts.status[k], one.status)
-        uncertainty = one.certificate.load_errors + contacts.asperity_load_errors[k]
-        assert (np.abs(contacts.asperity_loads[k] - one.loads) <= uncertainty).all()
 
 
 def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:

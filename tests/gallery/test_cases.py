@@ -190,10 +190,6 @@ def test_wrong_answers_are_judged_wrong() -> None:
     assert not case.check(loads * (1 + 2e-6)).right
     assert case.check(loads * (1 + 2e-6), within=1e-5).right
     open_one = gallery.case("grazing-gap-1e-6")
-    loads = np.array([float(each) for each in open_one.loads])
-    loads[-1] = 1e-30
-    assert open_one.check(loads).wrongly_loaded.tolist() == [7]
-    assert open_one.check(loads, floor=1e-29).right
     forces = np.array([float(each) for each in open_one.forces])
     assert open_one.check_shear(forces).right
     assert not open_one.check_shear(forces[::-1]).right

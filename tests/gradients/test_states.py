@@ -141,16 +141,6 @@ def test_onset(holding: Any) -> None:
     assert_slopes(judge, gradient, sharp=1e-10)
 
 
-def test_onset_of_the_last_is_that_of_gross_sliding() -> None:
-    contact = small()
-    last = int(np.argmax(contact.scene.offsets))
-    gradient = cr.onset_gradient(contact, last)
-    assert gradient.load == FRICTION
-    assert not gradient.heights.any()
-    with pytest.raises(cr.InputError, match="others never slide"):
-        cr.onset_gradient(contact, int(np.argmin(contact.scene.offsets)))
-
-
 near_to = cache(lambda scene, load: cr.press(scene, load=load))
 
 

@@ -39,22 +39,6 @@ def test_product_and_its_bound(layout: str) -> None:
         assert rounding.relative <= 1e-12
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("power", [2, 3])
-def test_falloff(layout: str, power: int) -> None:
-    rng = np.random.default_rng(5)
-    points = LAYOUTS[layout](rng)
-    rows = rng.integers(0, len(points), 60)
-    operator = ScatteredInfluence(points, SCALE)
-    for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
-        true, _ = inverse_sums(points[rows], points, strengths, power=power)
-        above = operator.falloff(strengths, power)[rows]
-        assert (above >= true).all()
-        if layout != "coincident":
-            assert (above <= 1.05 * true + 0.02 * np.median(true[true > 0])).all()
-
-
 def test_among_and_onto() -> None:
     rng = np.random.default_rng(6)
     points = disc(rng)

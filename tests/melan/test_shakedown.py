@@ -53,24 +53,6 @@ def test_exact_limits_at_constant_load() -> None:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("angle", "a", "b"),
-    [
-        (0, 1.250804608223, 2.566569395968),
-        (45, 1.309538047714, 2.687086579329),
-        (90, 1.398442065278, 2.869511819177),
-    ],
-)
-def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
-    p, q = turned(angle)
-    found = cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q)
-    assert found.factor == pytest.approx(a, rel=1e-11)
-    assert found.factors[B] == pytest.approx(b, rel=1e-11)
-    assert found.lower <= a * (1 + 1e-12)
-    assert found.upper >= a * (1 - 1e-12)
-
-
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("angle", [None, 0, 45, 90])
 def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
@@ -285,24 +267,13 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: str) -> None:
 def test_bad_input() -> None:
     with pytest.raises(cr.InputError, match="force_amplitudes"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=[0.0, 0.0])
-    with pytest.raises(cr.InputError, match="force_amplitudes: found none"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=[])
-    with pytest.raises(cr.InputError, match=r"force_amplitudes\[0\].*finite"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=[np.nan, 1.0])
     with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, one"):
         cr.shakedown(PAPER, loads=P, load_amplitudes=[1e-9, 0, 0], force_amplitudes=SWING)
-    for wrong in ([["a", 0.0]], [[np.inf, 0.0]], np.zeros((0, 2))):
-        with pytest.raises(cr.InputError, match="force_amplitudes"):
-            cr.shakedown(PAPER, loads=P, force_amplitudes=wrong, kind="vector")
     with pytest.raises(cr.InputError, match="kind"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="plastic")  # type: ignore[arg-type]
     with pytest.raises(cr.InputError, match=r"load_amplitudes.*not .exact."):
         cr.shakedown(
             PAPER, loads=P, load_amplitudes=0.1 * P, force_amplitudes=SWING, kind="elastic"
         )
-    with pytest.raises(cr.InputError, match="forces"):
-        cr.shakedown(PAPER, loads=P, forces=P, force_amplitudes=SWING)
-    with pytest.raises(cr.InputError, match="shape"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="vector")
     with pytest.raises(cr.InputError, match="loads"):
         cr.shakedown(PAPER, loads=-P, force_amplitudes=SWING)

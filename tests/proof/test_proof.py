@@ -137,10 +137,6 @@ def test_what_is_asked_for_is_checked() -> None:
         prove(scene, contact.loads[:-1], approach=approach)
     with pytest.raises(cr.InputError, match="a load on some asperity"):
         prove(scene, 0 * contact.loads, load=1e-7)
-    rough = cr.press(replace(scene, friction=0.5), approach=approach)
-    state = cr.shear(rough, force=0.1 * rough.load)
-    with pytest.raises(cr.InputError, match="friction"):
-        contact.proof(sheared=[state])
     many = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=0.0312)
     assert len(many) > checker.MOST_ASPERITIES
     with pytest.raises(cr.InputError, match="at most 3,000"):

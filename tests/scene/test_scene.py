@@ -84,20 +84,3 @@ def test_bad_values(call: Any, message: str) -> None:
         call()
     assert isinstance(caught.value, ValueError)
     assert isinstance(caught.value, cr.ConvexroughError)
-
-
-def test_roughened_is_what_the_patterns_draw() -> None:
-    lattice = {"spacing": 0.0025, "tip_radius": 0.02, "within": 0.0102}
-    rough = {"height_std": 1e-6, "tip_radius_cv": 0.1, "seed": 5}
-    regular = cr.Asperities.hexagonal(**lattice)
-    one, other = regular.roughened(**rough), cr.Asperities.hexagonal(**lattice, **rough)
-    for name in ("positions", "tip_radii", "heights"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert not getattr(one, name).flags.writeable
-    assert one.layout is regular.layout
-    assert one.lattice is regular.lattice
-    assert regular.roughened() is regular
-    with pytest.raises(cr.InputError, match="seed: found None"):
-        regular.roughened(height_std=1e-6)
-    with pytest.raises(cr.InputError, match="height_std: found -1"):
-        regular.roughened(height_std=-1, seed=1)

@@ -112,21 +112,6 @@ def test_scenes_made_in_python(here: Executor) -> None:
         assert row == {"approach": contact.approach, "loss_0.3": loss}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [({"measure": ["load"]}, "approach, load: found neither"),
-     ({"measure": ["loss"], "load": 1e-7}, '[sweep] measure: found "loss"'),
-     ({"load": 1e-7}, "measure: found None, expected a list"),
-     ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
-     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found type int")],
-)  # fmt: skip
-def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    with pytest.raises(cr.InputError) as caught:
-        cr.sweep([cr.Scene(1.0, asperities, MATERIAL, geometry="summit")], **arguments)
-    assert said in str(caught.value)
-
-
 def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
     both = sweeping(over={"normal.load": [1e-7, 1e-30, 3e-7]}, together={})
     both["asperities"] = {**both["asperities"], "tip_radius": [0.02] * 61}

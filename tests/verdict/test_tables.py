@@ -114,9 +114,6 @@ def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
     with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
         read_loads(tmp_path / "gap.parquet", small())
-    (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
-    with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
-        read_loads(tmp_path / "b.parquet", small())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(cr.FileError, match="needs pyarrow: pip install pyarrow"):
         read_loads(tmp_path / "a.parquet", small())
