@@ -54,15 +54,3 @@ def test_no_pressure_outside_the_discs(contact: cr.Contact) -> None:
     assert fields.pressure(contact, [far, 0.0]) == 0.0
     open_ = contact.scene.contact_points[contact.loads == 0]
     assert_array_equal(fields.pressure(contact, open_), 0.0)
-
-
-@pytest.mark.parametrize("decades", [0.0, 4.0])
-def test_superpose_is_the_plain_sum_also_where_discs_overlap(decades: float) -> None:
-    rng = np.random.default_rng(5)
-    centres, points = rng.uniform(-1, 1, (300, 2)), rng.uniform(-1.2, 1.2, (500, 2))
-    radii, peaks = 0.5 * 10.0 ** (-decades * rng.random(300)), rng.uniform(0.5, 2, 300)
-    points[:100] = centres[:100]
-    r = np.hypot(*(points[:, None] - centres).T).T
-    plain = (peaks * np.sqrt(np.maximum(1 - (r / radii) ** 2, 0))).sum(axis=1)
-    assert np.count_nonzero(plain) > 100
-    assert_allclose(fields.superpose(points, centres, radii, peaks), plain, rtol=1e-12)

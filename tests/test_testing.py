@@ -1,6 +1,5 @@
 """What downstream tests call: it must pass what is right, and say what is wrong."""
 
-import re
 from typing import Any
 
 import numpy as np
@@ -36,17 +35,6 @@ def test_certified(contact: cr.Contact, control: str) -> None:
     certificate = assert_certified(paper(), contact.loads, **prescribed, within=1e-11)
     assert list(certificate.status) == list(contact.status)
     assert_certified(paper(), list(contact.loads), **prescribed)
-
-
-def test_loads_not_certified_as_closely_as_asked(contact: cr.Contact) -> None:
-    loads = np.array(contact.loads)
-    loads[5] *= 1 + 1e-4
-    assert_certified(paper(), loads, approach=PAPER_APPROACH)  # the statuses are still proved
-    message = failure(assert_certified, paper(), loads, approach=PAPER_APPROACH, within=1e-6)
-    error = re.search(r"at most (\S+) of the largest load \(1e-06 allowed", message)
-    assert error is not None
-    assert 1e-6 < float(error[1]) < 1e-3
-    assert first_named(message, "load error") == 5  # the guilty one
 
 
 def test_shear_forces() -> None:

@@ -120,17 +120,6 @@ def test_what_is_nearly_a_lattice_is_refused(name: str) -> None:
     assert Lattice.through(doubled) is None
 
 
-def test_what_is_no_lattice_is_refused() -> None:
-    points = patch(np.array(BASES["square"]), 40)
-    assert Lattice.through(points[:1]) is None
-    assert Lattice.through(points[:2]) is None
-    assert Lattice.through(np.repeat(points[:1], 5, axis=0)) is None
-    for line in ([1.0, 0.0], [0.3, 0.7]):
-        assert Lattice.through(np.outer(np.arange(9), line)) is None
-    far = np.concatenate((points, [[1e5, 2e5]]))  # far too many sites for the points
-    assert Lattice.through(far) is None
-
-
 # Products.
 
 

@@ -207,21 +207,6 @@ def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
     assert_honest(contact.certificate, contact.loads, reference(scene, approach=1e-4))
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("kind", operators(paper()))
-def test_judging_loads_of_screened_asperities(kind: Kind) -> None:
-    """A load on an asperity that cannot touch is proved to be wrong by just that load."""
-    scene = paper()
-    contact = cr.press(scene, approach=1e-5, influence=kind)
-    assert_honest(contact.certificate, contact.loads, reference(scene, approach=1e-5))
-    outermost = len(scene) - 1
-    wrong = contact.loads.copy()
-    wrong[outermost] = 1e-9
-    certificate = cr.certify(scene, wrong, approach=1e-5, influence=kind)
-    assert certificate.status[outermost] == "open"
-    assert certificate.load_errors[outermost] == 1e-9
-
-
 @pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
 def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
     scene = rough()

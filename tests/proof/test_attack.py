@@ -52,15 +52,7 @@ def honest() -> list[Any]:
     by_cholesky = deepcopy(documents[-1])
     by_cholesky["argument"] |= {"shells": None, "convexity_number": (0.999).hex()}
     documents.append(by_cholesky)
-    assert {document["argument"]["shells"] is None for document in documents} == {True, False}
-    assert {document["claims"]["scope"] for document in documents} == {"global", "local"}
-    statuses = {status for document in documents for status in statuses_in(document["claims"])}
-    assert statuses == {"contact", "open", "sliding", "partial"}
     return documents
-
-
-def statuses_in(claims: Any) -> set[str]:
-    return {status for table in (claims, *claims["shear"]) for status in table["status"]}
 
 
 def crowded(*sampled: float) -> cr.Contact:
@@ -95,9 +87,8 @@ def one_number(rng: random.Random, document: Any) -> Any:
     part = rng.choice([(), ("claims",), ("scene",), ("prescribed",)])
     path = a_number(rng, document, *part)
     if rng.random() < 0.2:
-        odd = ["nan", "inf", "0x1.8p+99999", "1e-3", "", " 0x1.0000000000000p+0", None, 1, [], {}]
-        huge = [value.hex() for value in (1.7e308, 5e-324, 1e150, 0.0, -0.0, -1.0)]
-        put(document, path, rng.choice([*odd, *huge]))
+        odd = ["nan", "0x1.8p+99999", "1e-3", "", None, 1, [], {}, (5e-324).hex(), (1e150).hex()]
+        put(document, path, rng.choice([*odd, (0.0).hex(), (-1.0).hex()]))
         return document
     value = float.fromhex(look(document, path))
     change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
@@ -151,15 +142,9 @@ def changed_box(rng: random.Random, document: Any) -> Any:
 
 
 def changed_radii(rng: random.Random, document: Any) -> Any:
-    places = [entry["held"] for entry in document["sheared"]]
-    place = rng.choice([document["pressed"], *places])
+    place = rng.choice([document["pressed"], *(each["held"] for each in document["sheared"])])
     radii = place["radii"]
-    if rng.random() < 0.3:
-        rng.shuffle(radii)
-    else:
-        radii[rng.randrange(len(radii))] = rng.choice(
-            [[(0.0).hex()], rng.choice(radii), [(1e-3).hex()], []]
-        )
+    radii[rng.randrange(len(radii))] = rng.choice([[(0.0).hex()], rng.choice(radii), []])
     return document
 
 

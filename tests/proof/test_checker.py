@@ -105,14 +105,6 @@ def test_unreadable(
     assert reason in capsys.readouterr().err
 
 
-def test_larger_scenes_are_refused(document: Any) -> None:
-    scene = deepcopy(document["scene"])
-    for name in ("x", "y", "heights", "tip_radii"):
-        scene[name] = [scene[name][0]] * (checker.MOST_ASPERITIES + 1)
-    with pytest.raises(Refused, match="3001 asperities"):
-        checker.read_scene(scene)
-
-
 def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
     return json.loads(json.dumps(cr.press(scene, approach=approach).proof(**more).document))
 
@@ -266,3 +258,34 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
         document["argument"] |= {"box": wide}
         with pytest.raises(Refused, match="breaks down"):
             checker.prove(document, lambda line: None)
+
+
+def test_each_end_of_each_bound_counts(few: Any) -> None:
+    claims = few["claims"]
+    for key in ("load", "loads__1", "gaps__5"):
+        name, *place = key.split("__")
+        low, high = (
+            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
+        )
+        above, below = np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
+        for bounds in ((above, high), (low, below), (high, low)):
+            ends = [float(bound).hex() for bound in bounds]
+            refused(few, "not proved to be within", **{f"claims__{key}": ends})
+
+
+def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
+    scene, _ = scenes.scattered(11, 12, 0.5, 0.5)
+    read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
+    radii = np.random.default_rng(0).uniform(0.1, 1, 12)
+    points = scene.contact_points
+    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    root = np.sqrt(2 * radii)
+    end = -1 / np.linalg.eigvalsh(root[:, None] / (np.pi * apart) * root).min()
+    for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
+        given = [Fraction(float(radius * end * factor)) for radius in radii]
+        try:
+            checker.prove_definite(read, given, list(range(12)), lambda line: None)
+            assert definite
+        except Refused:
+            assert not definite

@@ -116,13 +116,6 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     assert [float(row["minimum_fraction"]) for row in cycles] == [-0.37, 0.1]
     assert float(cycles[1]["loss"]) == summary["cycle"][1]["loss"]
     assert float(cycles[1]["loss"]) == pytest.approx(partial.loss, rel=1e-13)
-    loop = rows(folder / "loop.csv")
-    assert {row["curve"] for row in loop} == {"total", *map(str, (0, 1, 7, 13, 19, 31))}
-    for curve, loss in (("total", partial.loss), ("7", partial.asperity_losses[7])):
-        own = [row for row in loop if (row["curve"], row["maximum_fraction"]) == (curve, "0.5")]
-        force, moved = ([float(row[key]) for row in own] for key in ("force", "displacement"))
-        assert np.trapezoid(force, moved) == pytest.approx(loss, rel=1e-3)
-
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
     assert summary["history"]["loss"] == past.losses.tolist()
     text = command("run", "a.toml", "--no-figures", "--force").out

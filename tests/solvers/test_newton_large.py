@@ -152,21 +152,3 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     found = cr.press(pressed, **prescribed, influence="lattice")
     assert found.candidates > ALL_ITERATED
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize("kind", ["lattice", "scattered"])
-def test_few_touching_under_a_load(kind: Kind, seed: int) -> None:
-    """A defect that is the same at all that touch lies wholly in the change of the approach."""
-    rng = np.random.default_rng(seed)
-    flat = cr.Asperities.square(spacing=2.5e-3, tip_radius=0.01, within=0.05)
-    heights = flat.distances**2 / 2
-    few = int(rng.integers(1, 6))
-    heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)
-    asperities = cr.Asperities(flat.positions, 0.01, heights)
-    pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3, geometry="summit")
-    load = 0.5 * cr.press(pressed, approach=1e-6).load
-    contact = cr.press(pressed, load=load, influence=kind)
-    assert contact.certificate.holds
-    assert cr.shear(contact, force=0.15 * load).certificate.holds
