@@ -52,16 +52,6 @@ class Sloppy:
         return replace(solution, loads=loads, refine=False, trial=None)
 
 
-@dataclass(frozen=True)
-class Empty:
-    """A solver that returns nothing."""
-
-    name: str = "empty"
-
-    def solve(self, problem: NormalProblem, start: Any = None) -> Any:
-        return None
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("name", NAMED)
@@ -94,29 +84,6 @@ def test_certified_answers_never_exclude_each_other(
         prescribed = {"load": load}
     comparison = compare(scene, **prescribed, solvers=[Sloppy(error), BristleQP(16, False)])
     assert comparison.contradictions == ()
-
-
-def test_solvers_that_do_not_answer() -> None:
-    others = [
-        Sloppy(instead=cr.SolverError("sloppy: stopped")),
-        Sloppy(instead=cr.InputError("scene", found="this", expected="another")),
-        BristleQP(16),
-        Sloppy(instead=ValueError("boom")),
-        Empty(),
-    ]
-    failed, refused, answered, *wrong = compare(paper(), approach=5e-5, solvers=others).entries[1:]
-    assert (failed.outcome, failed.message) == ("failed", "sloppy: stopped")
-    assert (refused.outcome, refused.message) == ("refused", "scene: found this, expected another")
-    for entry in (failed, refused):
-        assert np.isnan(entry.disagreement)
-        assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
-    assert answered.outcome == "answered"
-    assert [
-        (entry.outcome, entry.message.partition(" (test_compare.py:")[0]) for entry in wrong
-    ] == [
-        ("failed", "ValueError: boom"),
-        ("failed", "empty: returned NoneType, expected a Solution"),
-    ]
 
 
 # Forged proofs: what a mistake in the mathematics would look like.

@@ -105,24 +105,11 @@ def test_every_test_that_the_guarantees_name_is_there() -> None:
     assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))
 
 
-LONG = {"design.png", "design-fine.png"}
 DRAWING = runpy.run_path(str(ROOT / "docs/figures.py"))["drawings"]()
 
 
-def test_one_command_draws_the_figures_of_the_pages() -> None:
-    """All but those that show what the benchmark measured."""
-    measured = {"cost.png", "work-precision.png"}
-    assert {*DRAWING} | measured == {path.name for path in (ROOT / "docs/figures").iterdir()}
-
-
-@pytest.mark.parametrize("name", sorted(DRAWING.keys() - LONG))
+@pytest.mark.parametrize("name", sorted(DRAWING.keys() - {"design.png", "design-fine.png"}))
 @pytest.mark.sample(1)
 def test_each_figure_is_drawn(name: str, tmp_path: Path) -> None:
     DRAWING[name](tmp_path / name)
     assert (tmp_path / name).stat().st_size > 10_000
-
-
-@pytest.mark.sample(0)  # a minute and ten seconds: only with --full
-@pytest.mark.parametrize("name", sorted(LONG))
-def test_long_figures_are_drawn(name: str, tmp_path: Path) -> None:
-    test_each_figure_is_drawn(name, tmp_path)

@@ -38,19 +38,6 @@ def scattered(load: float = 2.0) -> cr.Contact:
     return cr.press(scene, load=load)
 
 
-def test_scattered_asperities_are_all_in_the_right_panel() -> None:
-    contact = scattered()
-    figure = plots.press_figures(contact)["pressure"]
-    fits(figure)
-    panel = figure.axes[1]
-    (points,) = [line for line in panel.lines if line.get_marker() == "o"]
-    r, p = np.asarray(points.get_data(), dtype=float)
-    touching = contact.loads > 0
-    np.testing.assert_allclose(r, 1e3 * np.hypot(*contact.scene.contact_points[touching].T))
-    np.testing.assert_allclose(p, 1e-3 * cr.fields.peak_pressures(contact)[touching])
-    assert (panel.get_xlabel(), panel.get_ylabel()) == ("$r$  [µm]", "$p$  [GPa]")
-
-
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     figure = Figure(figsize=(1, 1))
     figure.subplots().set_xlabel("load [mN]")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, STEEL
+from scenes import MATERIAL, PAPER_APPROACH
 
 import convexrough as cr
 from convexrough.influence import Kind
@@ -46,25 +46,12 @@ def sparse(whole: cr.Scene) -> cr.Scene:
 
 #: name -> (scene, approach) of 1000 to 3500 candidates, each in the convex range.
 SCENES: dict[str, tuple[cr.Scene, float]] = {
-    "smooth": (scene(6), PAPER_APPROACH),
     "heights": (scene(6, height_std=1e-7, seed=1), PAPER_APPROACH),
     "rough": (scene(6, height_std=1e-6, tip_radius_cv=0.1, seed=2), PAPER_APPROACH),
     "closest": (scene(6, geometry="closest", height_std=1e-6, seed=3), PAPER_APPROACH),
-    "square": (scene(6, pattern="square", height_std=1e-7, seed=4), PAPER_APPROACH),
-    "cut by its edge": (scene(9, within=0.005, height_std=1e-7, seed=4), PAPER_APPROACH),
     "screened": (scene(6, within=0.02, height_std=1e-7, seed=4), PAPER_APPROACH),
-    "off axis": (edited(scene(6), shift=np.array([0.004, 0.001])), PAPER_APPROACH),
     "hole": (middle_free(scene(7)), PAPER_APPROACH),
     "sparse": (sparse(scene(7, height_std=1e-7, seed=4)), PAPER_APPROACH),
-    "steel": (
-        cr.Scene(
-            0.01,
-            cr.Asperities.hexagonal(spacing=4e-6, tip_radius=3e-5, within=1e-4),
-            STEEL,
-            geometry="summit",
-        ),
-        0.5e-6,
-    ),
 }
 
 
