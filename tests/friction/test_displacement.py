@@ -18,6 +18,17 @@ def test_a_displacement_beyond_gross_sliding() -> None:
     assert cr.shear(light, displacement=0.0).force == 0.0
 
 
+def test_stiffness_and_loss_factor() -> None:
+    contact = pressed("rough")
+    limit = FRICTION * contact.load
+    cycle = cr.cycle(contact, maximum=0.5 * limit, minimum=-0.1 * limit)
+    loop = cycle.loop(400)
+    half = np.ptp(loop.displacements) / 2
+    assert cycle.secant_stiffness == pytest.approx(0.3 * limit / half, rel=1e-12)
+    # The area of the loop over 2 pi times that of the triangle under its tip.
+    assert cycle.loss_factor == pytest.approx(loop.area / (np.pi * 0.3 * limit * half), rel=1e-3)
+
+
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("influence", KINDS)
 @pytest.mark.parametrize(("high", "low"), [(0.6, -0.6), (0.6, 0.2), (0.2, -0.8), (-0.3, -0.3)])

@@ -6,9 +6,12 @@ from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
 
-from convexrough.influence.coupling import JointCoupling
+from convexrough.influence.coupling import JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.influence.softened import Softened
+from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
 
@@ -82,3 +85,21 @@ def test_point_error_is_counted() -> None:
         above = rough.falloff(loads, power)[:60]
         assert (above >= inverse_sums(far[:60], far, loads, power=power)[0]).all()
     assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
+
+
+def test_upper_bounds_on_sums() -> None:
+    """Also where what is computed is too low, as on a mesh that is coarse enough."""
+    rng = np.random.default_rng(13)
+    points = rng.uniform(0, 1.2, (300, 2))
+    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, splitting, np.float64)
+    inverse = inverse_distances(points, points) ** 3
+    too_low = 0
+    for i in range(20):
+        strengths = np.zeros(len(points))
+        strengths[i] = 1.0
+        assert (product.above(strengths) >= inverse[i]).all()
+        relative = product.rounding(strengths).relative
+        low = product.apply(strengths) < (1 - relative) * inverse[i]
+        too_low += int(low[inverse[i] > 0].sum())
+    assert too_low > 100
