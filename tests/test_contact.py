@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
     CASES,
-    MATERIAL,
     NAMED,
     PAPER_APPROACH,
     operators,
@@ -112,20 +111,6 @@ def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
             judged = cr.certify(scene, solved.loads, approach=approach, influence=kind)
             assert judged.scope == "global"
             assert (judged.status == first.status).all()
-
-
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_a_single_asperity_is_hertz(control: str) -> None:
-    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL, geometry="summit")
-    radius, approach = 0.4, 1e-3  # 1/R_i = 1/2 + 1/0.5
-    load = 4 / 3 * np.sqrt(radius) * approach**1.5
-    contact = cr.press(scene, **{control: {"approach": approach, "load": load}[control]})
-    assert_allclose(contact.loads, [load], rtol=1e-15)
-    assert contact.approach == pytest.approx(approach, rel=1e-15)
-    assert_allclose(contact.contact_radii, np.sqrt(radius * approach), rtol=1e-15)
-    assert contact.certificate.scope == "global"
-    assert contact.certificate.convexity_number == 0
-    assert contact.status[0] == "contact"
 
 
 @settings(max_examples=15, deadline=None)

@@ -5,7 +5,6 @@ import pytest
 from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed
 from levels_reference import reference as exact
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
 
@@ -64,16 +63,3 @@ def test_zero_and_the_limit() -> None:
     forth = cr.shear(contact, force=0.3 * limit)
     assert (back.forces == -forth.forces).all()
     assert back.displacement == -forth.displacement
-
-
-def test_gross_sliding_is_refused() -> None:
-    contact = pressed("paper")
-    limit = FRICTION * contact.load
-    for force in (1.01 * limit, -1.01 * limit):
-        with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding"):
-            cr.shear(contact, force=force)
-    with pytest.raises(cr.InputError, match="found nan, expected a finite number"):
-        cr.shear(contact, force=float("nan"))
-    frictionless = cr.press(paper(), approach=PAPER_APPROACH)
-    with pytest.raises(cr.InputError, match="coefficient of friction"):
-        cr.shear(frictionless, force=1e-9)

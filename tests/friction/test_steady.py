@@ -108,15 +108,3 @@ def test_losses_against_phase() -> None:
     assert found.sliding[1] == np.isin(alone.status, ("sliding", "intermittent")).sum()
     assert found.losses[2] < 0.5 * found.losses[0]
     assert found.order == "proved"
-
-
-def test_bad_input() -> None:
-    scene, P, Q = octagon("paper")
-    with pytest.raises(cr.InputError, match="gross sliding"):
-        cr.steady(scene, loads=P, forces=4 * Q)
-    with pytest.raises(cr.InputError, match=r"phase: found 90\.0, expected a phase in radians"):
-        cr.elliptic_path(load=1.0, force_amplitude=0.1, load_amplitude=0.0, friction=0.5, phase=90)
-    with pytest.raises(cr.InputError, match=r"phases\[1\]: found 90\.0, .*90 degrees are 1\.5708"):
-        cr.phase_losses(
-            scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[-3.1416, 90.0]
-        )

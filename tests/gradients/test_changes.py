@@ -91,18 +91,6 @@ def test_everything_that_changes(name: str, holding: str, fraction: float) -> No
         np.testing.assert_allclose(found, true, rtol=0, atol=2e-13 * np.abs(true).max())
 
 
-def test_what_cannot_change() -> None:
-    contact = pressed("paper", "load")
-    with pytest.raises(cr.InputError, match="at most one of the two"):
-        contact.change(cr.Direction(load=1.0, approach=1.0))
-    with pytest.raises(cr.InputError, match="x and y of each"):
-        contact.change(cr.Direction(positions=[1.0, 2.0]))
-    with pytest.raises(cr.InputError, match="expected a Direction"):
-        contact.change({"heights": 1.0})  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match="below f P"):
-        cr.shear(contact, force=FRICTION * contact.load).change(cr.Direction(heights=1e-9))
-
-
 def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
     by_load, by_approach = pressed("rough", "load"), pressed("rough", "approach")
     raised = cr.Direction(heights=1e-9)

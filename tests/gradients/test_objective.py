@@ -90,19 +90,3 @@ def test_autograd() -> None:
     np.testing.assert_array_equal(autograd.grad(function)(x), slopes)
     other = autograd.grad(lambda y: function(y) ** 2)(x)
     np.testing.assert_allclose(other, 2 * value * slopes, rtol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"of": "energy"}, "of: found 'energy', expected one of: loss, displacement"),
-        ({"force": None}, "force: found none, expected a number, for the loss"),
-        ({"by": ["height"]}, "by: found 'height', expected some of: heights"),
-        ({"load": "3.6e-7"}, "load: found '3.6e-7', expected a finite number"),
-    ],
-)
-def test_mistakes(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(cr.InputError, match=said):
-        of_loss(**changes)
-    with pytest.raises(cr.InputError, match="found 1 numbers, expected 91: heights"):
-        of_loss()([0.0])

@@ -13,7 +13,6 @@ from scipy import sparse
 
 import convexrough as cr
 from convexrough.programs import program
-from convexrough.programs.folder import write_programs
 
 #: The source paper's, its inner 19 asperities.
 SCENE = cr.Scene(
@@ -92,14 +91,7 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
     )
 
 
-def test_programs_that_are_not_made(tmp_path: Path) -> None:
-    made = cr.program(SCENE, approach=PAPER_APPROACH)
-    with pytest.raises(cr.InputError, match=r"the ending '\.mps', expected one of \.cbf, \.json"):
-        made.save(tmp_path / "scene.mps")
-    with pytest.raises(cr.InputError, match="approach: found 0, expected an approach at which an"):
-        cr.program(SCENE, approach=0)
-    with pytest.raises(cr.InputError, match="approach: found -1e-05, expected an approach at whi"):
-        write_programs(tmp_path, "scene", SCENE, approach=-1e-5)
+def test_a_program_that_is_not_convex_is_not_made() -> None:
     above = cr.gallery.case("convexity-end-above")
     with pytest.raises(cr.solvers.TooDenseError):
         cr.program(above.scene, **above.control)

@@ -114,18 +114,3 @@ def test_crowded_contacts_are_proved_with_others_held_open() -> None:
         claims = judged(contact.proof())
         assert claims["scope"] == "local"
         assert claims["status"] == list(contact.status)
-
-
-def test_what_is_asked_for_is_checked() -> None:
-    scene, approach = scenes.NAMED["paper"]
-    contact = cr.press(scene, approach=approach)
-    with pytest.raises(cr.InputError, match="approach"):
-        prove(scene, contact.loads)
-    with pytest.raises(cr.InputError, match="loads"):
-        prove(scene, contact.loads[:-1], approach=approach)
-    with pytest.raises(cr.InputError, match="a load on some asperity"):
-        prove(scene, 0 * contact.loads, load=1e-7)
-    many = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=0.0312)
-    assert len(many) > checker.MOST_ASPERITIES
-    with pytest.raises(cr.InputError, match="at most 3,000"):
-        cr.press(replace(scene, asperities=many), approach=1e-6).proof()

@@ -7,11 +7,10 @@ import multiprecision
 import numpy as np
 import pytest
 from proof_oracle import false_claims
-from scenes import MATERIAL, paper, rough, solve_exactly
+from scenes import MATERIAL, rough, solve_exactly
 
 import convexrough as cr
 from convexrough import checker
-from convexrough.errors import InputError
 from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import reach
 
@@ -122,19 +121,3 @@ def test_gradients(base: Any, geometry: Any) -> None:
     assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
     assert gradient.sphere_radius is None
     assert np.isfinite(gradient.height_errors).all()
-
-
-BAD = [
-    ((1.0, -2.0), r"sphere_radius\[1\]: found -2.0, expected a positive number"),
-    ((1.0, 2.0, 3.0), "sphere_radius: found .*, expected a number, or the two radii"),
-    (float("nan"), "sphere_radius: found nan"),
-    (-INF, "sphere_radius: found -inf"),
-    ((1.0, "a"), r"sphere_radius\[1\]: found 'a'"),
-    (1e99, "sphere_radius: found .* choose other units"),
-]
-
-
-@pytest.mark.parametrize(("radius", "message"), BAD)
-def test_bad_radii(radius: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        cr.Scene(radius, paper().asperities, MATERIAL, geometry="summit")

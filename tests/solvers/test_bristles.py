@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL, NAMED, scattered
+from scenes import MATERIAL, NAMED
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
@@ -51,23 +51,6 @@ def test_a_box_cut_to_the_convex_range(control: str) -> None:
     assert np.abs(contact.loads - reference.loads).max() < 1e-6 * reference.loads.max()
     if control == "approach":
         assert contact.certificate.scope == reference.certificate.scope
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_too_dense(control: str) -> None:
-    """Refused by name: the asperities that Newton's method also finds beyond the convex range."""
-    scene, approach = scattered(4, 5, 3.0, 0.0)
-    reference, prescribed = pressed(scene, approach, control)
-    assert reference.crowding > 1
-    with pytest.raises(cr.solvers.TooDenseError, match="bristles") as caught:
-        cr.press(scene, solver=BristleQP(), **prescribed)
-    points = scene.contact_points
-    apart = np.hypot(*(points[:, None] - points).T)
-    np.fill_diagonal(apart, np.inf)
-    ratio = reference.contact_radii / (np.pi / 4 * apart.min(axis=0))
-    assert set(np.flatnonzero(ratio > 1.05)) <= set(caught.value.asperities)
-    assert set(caught.value.asperities) <= set(np.flatnonzero(ratio > 0.9))
-    assert (caught.value.ratios > 0.98).all()
 
 
 # What stops it, in words.

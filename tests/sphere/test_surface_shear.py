@@ -90,13 +90,3 @@ def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fracti
             forces += weight * 2 * np.pi * squared * np.cos(angle) * np.sin(angle) * traction
     assert_allclose(forces, state.forces[touching], rtol=1e-7)
     assert forces.sum() == pytest.approx(state.force, rel=1e-7)
-
-
-@pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [[0.0, np.nan]]])
-def test_points_that_are_none(bad: Any) -> None:
-    state = sheared("paper", 0.5)
-    for field in (fields.traction, fields.shear_displacement):
-        with pytest.raises(cr.InputError, match=r"points.*x and y of each"):
-            field(state, bad)
-    assert fields.traction(state, np.zeros((3, 0, 2))).shape == (3, 0)
-    assert fields.shear_displacement(state, np.zeros((3, 0, 2))).shape == (3, 0)

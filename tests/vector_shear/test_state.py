@@ -11,10 +11,10 @@ from friction_scenes import (
     pressed,
 )
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper
+from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
-from convexrough import FrictionConic, FrictionNewton, shear_vector
+from convexrough import shear_vector
 from convexrough.sphere import mindlin
 
 
@@ -99,39 +99,6 @@ def test_gross_sliding() -> None:
     assert_allclose(finite.displacement[0], scalar.displacement, rtol=1e-13)
     assert_allclose(finite.slips[:, 0], scalar.slips, atol=1e-13 * scalar.displacement)
     assert finite.residual < 1e-13
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("conic", [False, True])
-@pytest.mark.parametrize("fraction", [1e-6, 0.5, 0.95])
-def test_turning_the_force_turns_the_answer(fraction: float, conic: bool) -> None:
-    """By 60 degrees on the hexagonal array; and by any angle if the asperities turn too."""
-    contact, state = pressed("paper"), found("paper", 0.3, fraction, conic)
-    Q = fraction * FRICTION * contact.load
-    solver = FrictionConic() if conic else FrictionNewton()
-    tolerance = 1e-6 if conic else 1e-11
-    points = contact.scene.asperities.positions
-    for angle, scene in ((np.pi / 3, None), (1.0, "turned")):
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        other, same = contact, np.zeros(len(points), dtype=int)
-        if scene is None:
-            off = np.abs(points[None] - (points @ turn.T)[:, None]).max(axis=2)
-            same = off.argmin(axis=1)  # where each asperity is turned to
-            assert off.min(axis=1).max() < 1e-12
-        else:
-            asperities = cr.Asperities(points @ turn.T, 0.02)
-            other = cr.press(
-                cr.Scene(1.0, asperities, MATERIAL, FRICTION, geometry="summit"),
-                approach=PAPER_APPROACH,
-            )
-            same = np.arange(len(points))
-        turned = shear_vector(other, force=turn @ [Q, 0.0], solver=solver)
-        size = lengths(state.forces).max()
-        assert_allclose(turned.forces[same], state.forces @ turn.T, atol=tolerance * size)
-        travel = np.hypot(*state.displacement)
-        assert_allclose(turned.slips[same], state.slips @ turn.T, atol=tolerance * travel)
-        assert_allclose(turned.displacement, turn @ state.displacement, atol=tolerance * travel)
-        assert (turned.status[same] == state.status).all()
 
 
 def test_bad_input() -> None:
