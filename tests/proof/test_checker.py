@@ -6,6 +6,7 @@ import math
 import random
 import subprocess
 import sys
+from contextlib import nullcontext
 from copy import deepcopy
 from dataclasses import replace
 from fractions import Fraction
@@ -260,19 +261,6 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
             checker.prove(document, lambda line: None)
 
 
-def test_each_end_of_each_bound_counts(few: Any) -> None:
-    claims = few["claims"]
-    for key in ("load", "loads__1", "gaps__5"):
-        name, *place = key.split("__")
-        low, high = (
-            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
-        )
-        above, below = np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
-        for bounds in ((above, high), (low, below), (high, low)):
-            ends = [float(bound).hex() for bound in bounds]
-            refused(few, "not proved to be within", **{f"claims__{key}": ends})
-
-
 def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
     scene, _ = scenes.scattered(11, 12, 0.5, 0.5)
     read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
@@ -289,3 +277,17 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
             assert definite
         except Refused:
             assert not definite
+
+
+def test_claims_hold_the_whole_interval_that_is_proved() -> None:
+    proved = Interval(Fraction(1), Fraction(3))
+    for low, high, fine in (
+        (1, 3, True),
+        (0, 4, True),
+        (0, 2, False),
+        (2, 4, False),
+        (4, 0, False),
+    ):
+        claim = [float(end).hex() for end in (low, high)]
+        with nullcontext() if fine else pytest.raises(Refused, match="not proved to be within"):
+            checker.hold("load", claim, proved)

@@ -134,3 +134,23 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
                 several[k] = replace(found, order="proved for one step")
                 (said,) = replace(result, found=tuple(several)).doubts()
                 assert said.startswith(f"not proved: the losses of [{result.name}], as")
+
+
+def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
+    """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
+    normal = "load = 3e-8"
+    path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
+
+    def run(within: str) -> tuple[cr.Contact, Any, list[str]]:
+        file = tmp_path / "scene.toml"
+        file.write_text(scene_text(HEXAGONAL + within, normal=normal, more=path))
+        scene = cr.read_scene(file)
+        contact = scene.press()
+        return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
+
+    (pressed, grown, said), (_, whole, _) = run(""), run("within = 0.03")
+    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (121, 13)
+    assert not said
+    assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
+    *_, narrow = run("within = 0.0067")
+    assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
