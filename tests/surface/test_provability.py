@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
-from convexrough.surface import Provability, provability
+from convexrough.surface import Provability, crowded, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
 
@@ -30,6 +30,8 @@ def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
         assert_allclose(curve.crowding[i], contact.crowding, rtol=1e-9)
         assert_allclose(curve.model_error[i], contact.model_error, rtol=1e-6)
         assert_allclose(curve.approaches[i], contact.approach, rtol=1e-9)
+        _, values = crowded(contact, above=0.1)
+        assert_allclose(values[0], contact.crowding, rtol=1e-12)
         if contact.certificate.holds:
             assert curve.contacts[i] == (contact.status == "contact").sum()
             assert curve.undecided[i] == 0
