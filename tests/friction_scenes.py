@@ -1,4 +1,4 @@
-"""Pressed scenes with friction, and their states by definition, that the tests of shear share."""
+"""Pressed scenes with friction that the tests of shear share."""
 
 from dataclasses import replace
 from functools import cache

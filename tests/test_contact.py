@@ -1,4 +1,4 @@
-"""The solved contact: reference values, closed forms, symmetries, and 50-digit solutions."""
+"""The solved contact: reference values, symmetries, and 50-digit solutions."""
 
 import re
 from typing import Any

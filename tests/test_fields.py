@@ -1,4 +1,4 @@
-"""Pressure anywhere: closed forms, quadrature, scaling, and the plain sum over all asperities."""
+"""Pressure anywhere: quadrature, and none outside the discs."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Solvers that lie: wrong, negative, missing or late answers with the status "optimal"."""
+"""Solvers that lie: wrong, negative or missing answers with the status "optimal"."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

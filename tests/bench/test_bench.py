@@ -1,4 +1,4 @@
-"""The benchmark: its reference, what it concludes, what it writes. No time is tested."""
+"""The benchmark: its reference, and what it writes. No time is tested."""
 
 import csv
 import json

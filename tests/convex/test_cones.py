@@ -106,6 +106,18 @@ def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(cones: Any, weights:
     assert sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination) == 0
 
 
+def test_the_four_cone_identity_as_printed() -> None:
+    right = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
+    right += D * (t**2 - s**2) ** 2
+    assert sp.expand(ENERGY - LAM * t**3 + MU - right) == 0
+
+
+def test_the_five_cone_identity_as_printed() -> None:
+    right = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
+    right += B1 * t * (1 - t) + A0 * (1 - t)
+    assert sp.expand(ENERGY - LAM * t**3 + MU - (t - s) ** 2 * right) == 0
+
+
 @pytest.mark.parametrize(
     ("weights", "limit"), [(FOUR_WEIGHTS, LIMIT_FOUR), (FIVE_WEIGHTS, sp.Integer(1))]
 )

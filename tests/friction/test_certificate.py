@@ -1,4 +1,4 @@
-"""What is said of friction where little is known: loads in doubt, the limit, contacts unproved."""
+"""What is said of friction where little is known: near touching, crowded, contacts unproved."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Shear forces from anywhere: right ones are proved, no wrong ones get a wrong status or bound."""
+"""Shear forces from anywhere: no wrong ones get a wrong status or bound."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Shear and cycles by displacement; loops by Masing's rule; what a cycle says of stiffness."""
+"""Displacements beyond gross sliding; loops by Masing's rule; what a cycle says of stiffness."""
 
 import numpy as np
 import pytest

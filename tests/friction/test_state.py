@@ -1,4 +1,4 @@
-"""Friction states: against 80 digits, and against their own equations."""
+"""Friction states: against 80 digits, at rest and at the limit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Closed paths: values of the prototypes, closed forms, and today's cycles as the special case."""
+"""Closed paths: values of the prototypes, and today's cycles as the special case."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Levels found together, in rows, against the same ones found one by one."""
+"""Order that is proved when asked, and shares of a loss where the load varies."""
 
 from fractions import Fraction
 

@@ -1,4 +1,4 @@
-"""Forward derivatives: against differences in 130 digits, and against gradients."""
+"""Forward derivatives: against differences in 130 digits."""
 
 from dataclasses import replace
 from typing import Any

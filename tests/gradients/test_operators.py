@@ -1,4 +1,4 @@
-"""Slopes of the surface, which gradients by positions are made of, by every kind of operator."""
+"""Slopes of the surface, which gradients by positions are made of, on a mesh."""
 
 import numpy as np
 from scenes import MATERIAL

@@ -1,4 +1,4 @@
-"""The normal problem: derivatives, bounds, convexity, and contacts with known answers."""
+"""The normal problem: bounds, and that Newton's method converges."""
 
 from typing import Any
 

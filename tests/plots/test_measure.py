@@ -1,4 +1,4 @@
-"""Units of axes, and files as journals want them."""
+"""Quantities with units, and files as journals want them."""
 
 import re
 from pathlib import Path

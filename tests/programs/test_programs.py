@@ -1,4 +1,4 @@
-"""Scenes as programs: each file is read by a library that shares nothing with its writer."""
+"""Scenes as programs: files are read by libraries that share nothing with their writer."""
 
 import json
 from pathlib import Path

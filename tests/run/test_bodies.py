@@ -1,4 +1,4 @@
-"""Scene files of two bodies, and of bases that are no sphere: what is read, refused and said."""
+"""Scene files of two bodies, and of bases that are no sphere, from file to proof."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Scene files, CSV in and out, results on disk."""
+"""How wide arrays are by default, and results on disk."""
 
 import json
 from pathlib import Path

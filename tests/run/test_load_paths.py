@@ -1,4 +1,4 @@
-"""Load paths in scene files: tables, files, figures, and mistakes in words."""
+"""Load paths in scene files: tables, files, and what is not proved."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""A folder of results: what stays of earlier runs, where results are from, loops on request."""
+"""A folder of results: what stays of earlier runs, where results are from."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""Bases that are no sphere: flat, ellipsoid, cylinder. 50 digits, exact fractions, limits."""
+"""Bases that are no sphere: flat, ellipsoid, cylinder. 50 digits, exact fractions, differences."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Two bodies that differ: sums over both, published values, limits, the equal case bit for bit."""
+"""Two bodies that differ: sums over both, the equal case bit for bit."""
 
 from typing import Any
 

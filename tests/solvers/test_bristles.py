@@ -1,4 +1,4 @@
-"""The bristle program: its order of convergence, its convexity, what it refuses."""
+"""The bristle program: its order of convergence, its convexity."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The smooth ellipsoid: Legendre's integrals, quadrature, a fine bed of asperities, its losses."""
+"""The smooth ellipsoid: Legendre's integrals, and its losses by quadrature."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Traction and displacement under shear: Cerruti's integral, 60 digits, balance, plain sums."""
+"""Traction and displacement under shear: Cerruti's integral, and balance."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How strongly to prune: the curve, and who is named."""
+"""How strongly to prune: the curve, and what trust needs."""
 
 import numpy as np
 import pytest

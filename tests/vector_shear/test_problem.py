@@ -1,4 +1,4 @@
-"""The program of vector friction: its kernel and shift, its residual and its duality gap."""
+"""The program of vector friction: its duality gap."""
 
 import numpy as np
 from friction_scenes import with_friction

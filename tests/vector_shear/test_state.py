@@ -1,4 +1,4 @@
-"""Vector friction: states against their own equations, their limits and their symmetries."""
+"""Vector friction: states without Poisson's ratio, near gross sliding and at it."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,51 @@
+"""The source's appendix method: its crossing and scatter, and where it must agree with `shear`."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import PAPER_APPROACH, paper
+from scipy.optimize import brentq
+
+import convexrough as cr
+from convexrough.paper import appendix
+from convexrough.sphere.smooth import smooth
+
+RATIOS = [0.0, 0.3, 0.5]
+
+
+def pressed(
+    nu: float, approach: float = PAPER_APPROACH, friction: float | None = 0.5
+) -> cr.Contact:
+    scene = cr.Scene(1.0, paper().asperities, cr.Material(1.0, nu), friction, geometry="summit")
+    return cr.press(scene, approach=approach)
+
+
+def sheared(nu: float, fraction: float) -> cr.ShearState:
+    contact = pressed(nu)
+    return cr.shear(contact, force=fraction * 0.5 * contact.load)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
+    contact = pressed(nu)
+    hertz = smooth(contact.scene, load=contact.load)
+    limit = hertz.largest_force
+
+    def appendix_over_smooth(t: float) -> float:
+        return float(appendix.cycle_energy(contact, t * limit) / hertz.energy(t * limit) - 1)
+
+    def over_smooth(t: float) -> float:
+        return float(cr.cycle(contact, maximum=t * limit).loss / hertz.energy(t * limit) - 1)
+
+    assert brentq(appendix_over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.385524, abs=1e-6)
+    assert brentq(over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.387687, abs=1e-6)
+
+
+@pytest.mark.parametrize("fraction", [0.37, -0.8, 1.0])
+def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
+    """But for discs in place of points, an error of the displacements that slips are made of."""
+    state = sheared(0.0, fraction)
+    assert np.count_nonzero(state.slips) >= 6
+    error = state.contact.model_error * abs(state.displacement)
+    assert_allclose(appendix.slips(state), state.slips, rtol=0, atol=2 * error)
+    assert not np.allclose(appendix.slips(state), state.slips, rtol=0, atol=0.01 * error)
