@@ -18,13 +18,18 @@ from scenes import (
 )
 
 import convexrough as cr
+from convexrough.arithmetic.balls import Ball
 from convexrough.convex.newton import descend
 from convexrough.influence import Kind
+from convexrough.normal.boxes import tried
 from convexrough.normal.load_control import all_that_could_touch, highest_approach
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.proved import Proved, proved
+from convexrough.normal.refine import refined_loads
 from convexrough.scene.asperities import largest_tip_radius
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import reach
+from convexrough.solvers import Newton
 from convexrough.solvers.pressing import Pressing
 from convexrough.sphere import hertz
 
@@ -144,3 +149,24 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 
     scene, bound = all_that_could_touch(scene_within, farthest, load)
     assert cr.press(scene, load=load).certificate.approach <= bound * (1 + 1e-12)
+
+
+def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
+    pair = cr.Asperities([[-1e-3, 0.0], [1e-3, 0.0]], 0.02)  # alike: the loads only scale
+    problem = assembled(cr.Scene(1.0, pair, MATERIAL), load=1e-8)
+    total = problem.load
+    assert total is not None
+    state = refined_loads(problem, Newton().solve(problem).loads)
+    box = next(tried(problem, state.loads.high, state.product.value))
+    wide, higher = (
+        proved(each, refined_loads(each, state.loads.high), iter((box,)))
+        for each in (
+            problem.at_load(Ball.around(total, 1e-6 * total)),
+            problem.at_load(Ball.exact(total * (1 + 0.999e-6))),
+        )
+    )
+    assert isinstance(wide, Proved)
+    assert isinstance(higher, Proved)
+    for name in ("loads", "indentation", "approach"):
+        moved = np.abs((getattr(higher, name) - getattr(wide, name)).value)
+        assert (moved <= getattr(wide, name).radius).all(), name
