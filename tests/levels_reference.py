@@ -1,7 +1,7 @@
 """Normal solutions at any load in 100 digits and all that friction makes of them: the reference.
 
-At a total load L: loads P_i, approach D0, gaps, energy V = sum (3/5) k P^(5/3) + P'AP/2 - d'P, and
-its tangent (2k/(3 P^(1/3)) + A) q = S, sum q = 1. Of two such levels, P above and L = P - Q/f:
+At a total load L: loads P_i, approach D0, gaps, energy V = sum (3/5) k P^(5/3) + P'AP/2 - d'P. Of
+two such levels, P above and L = P - Q/f:
 
     Q_i = f (P_i(P) - P_i(L)),   X = c_t f (D0(P) - D0(L)),   slip_i = c_t f gap_i(L),
     W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2],      T = Q / f,
@@ -13,12 +13,12 @@ steps and remembers. Nothing of the package is used but float64 loads to begin N
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, wraps
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
-from gradient_oracle import DIGITS, Balls, Oracle, Setup, cube_root, exact, solve
+from gradient_oracle import DIGITS, Balls, Oracle, Setup, cube_root, exact
 from scenes import MATERIAL, NAMED
 
 import convexrough as cr
@@ -43,20 +43,6 @@ SCENES["dense"] = (
 )
 
 
-class Slopes(NamedTuple):
-    """Derivatives of a number by everything it depends on; `control` is the load or approach."""
-
-    heights: Balls
-    tip_radii: Balls
-    positions: Balls
-    sphere_radius: Balls
-    contact_modulus: Balls
-    poisson_ratio: Balls
-    friction: Balls
-    control: Balls
-    force: Balls
-
-
 def in_digits(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function, evaluated in DIGITS wherever it is called."""
 
@@ -71,11 +57,14 @@ def in_digits(function: Callable[..., Any]) -> Callable[..., Any]:
 class Level(Oracle):
     """The normal solution of a setup; who touches is taken from float64 and then proved by signs.
 
-    start : a contact of the same scene, pressed nearly as the setup asks
+    start : a contact of the same scene, pressed nearly as the setup asks; or a level
     """
 
-    def __init__(self, setup: Setup, start: cr.Contact) -> None:
-        super().__init__(setup, exact(start.loads), arb(start.approach), 7)
+    def __init__(self, setup: Setup, start: "cr.Contact | Level") -> None:
+        if isinstance(start, Level):
+            super().__init__(setup, start.loads, start.approach, 3)
+        else:
+            super().__init__(setup, exact(start.loads), arb(start.approach), 7)
         left = self.thresholds + self.inner @ self.P - self.offsets[self.touching] - self.approach
         assert max(abs(left), default=arb(0)) < abs(self.approach) * arb(10) ** (15 - DIGITS)
         assert all(load > 0 for load in self.P)
@@ -92,51 +81,6 @@ class Level(Oracle):
         """V(L)."""
         own = 3 * self.thresholds / 5 + self.inner @ self.P / 2 - self.offsets[self.touching]
         return own @ self.P
-
-    @cached_property
-    @in_digits
-    def tangent(self) -> tuple[Balls, Balls]:
-        """q = dP_i/dL of those that touch, and S = dD0/dL."""
-        matrix = self.inner + np.diag(2 * self.thresholds / (3 * self.P))
-        y = solve(matrix, np.full(len(self.P), arb(1)))
-        return y / y.sum(), 1 / y.sum()
-
-    @cached_property
-    @in_digits
-    def energy_slopes(self) -> Slopes:
-        """dV = -P'dd + (3/5) P^(5/3)'dk + P'dA P / 2 + D0 dL."""
-        root = cube_root(self.P)
-        return self._slopes(self.P, 3 * root**5 / 5, self.P / 2, self.approach)
-
-    @cached_property
-    @in_digits
-    def approach_slopes(self) -> Slopes:
-        """dD0 = -q'dd + (q P^(2/3))'dk + q'dA P + S dL."""
-        q, S = self.tangent
-        return self._slopes(q, q * cube_root(self.P) ** 2, q, S)
-
-    def _slopes(self, alpha: Balls, kappa: Balls, left: Balls, by_load: Balls) -> Slopes:
-        """Of a number that changes by -alpha'dd + kappa'dk + left'dA P + by_load dL."""
-        s, on = self.setup, self.touching
-        R, E, rho, x = s.sphere_radius, s.contact_modulus, s.tip_radii[on], s.positions[on]
-        closest = s.geometry == "closest"
-        far = R + rho if closest else R + 0 * rho
-        share = R / far if closest else 1 + 0 * rho  # contact points c = share x
-        points = x * share[:, None]
-        weights = self.inner**3 * (np.outer(left, self.P) + np.outer(self.P, left))
-        weights *= -(arb.pi() ** 2) * E * E
-        pulls = points * weights.sum(axis=1)[:, None] - weights @ points  # by contact points
-        far_off, along = (x * x).sum(axis=1) / (2 * far * far), (pulls * x).sum(axis=1) / far**2
-        bent = -kappa * self.k[on] / (3 * (1 / R + 1 / rho))
-        tips = bent / rho**2 - (alpha * far_off + along * R if closest else 0 * rho)
-        sphere = bent / R**2 - alpha * far_off + (along * rho if closest else 0 * rho)
-        modulus = -(2 * (kappa @ self.k[on]) / 3 + left @ (self.inner @ self.P)) / E
-        places = (alpha / far)[:, None] * x + pulls * share[:, None]
-        heights, tip_radii, positions = (self._spread(each) for each in (-alpha, tips, places))
-        none = arb(0)
-        return Slopes(
-            heights, tip_radii, positions, sphere.sum(), modulus, none, none, by_load, none
-        )
 
     def _spread(self, values: Balls) -> Balls:
         full = np.full((len(self.offsets), *values.shape[1:]), arb(0))
@@ -215,65 +159,18 @@ class Friction:
         own = arb(24) / 5 * self.travel * self.f * P * self.pressed.thresholds * e
         return self.pressed._spread(own + 4 * self.f * P * slips)
 
-    @in_digits
-    def loss_slopes(self, holding: Holding = "load") -> Slopes:
-        """dW at constant Q; with the approach held P follows."""
-        T, f, unit = self.T, self.f, 8 * self.travel * self.f
-        displacement = self.pressed.approach - self.held.approach
-        S, s = self.pressed.tangent[1], self.held.tangent[1]
-        ends = zip(
-            self.pressed.energy_slopes, self.held.energy_slopes,
-            self.pressed.approach_slopes, self.held.approach_slopes, strict=True,
-        )  # fmt: skip
-        partial = Slopes(*(unit * (a - b - T / 2 * (c + d)) for a, b, c, d in ends))
-        by_force = unit / (2 * f) * (T * s - displacement)
-        return self._held(holding, partial._replace(
-            poisson_ratio=self._by_ratio(self.energy),
-            friction=2 * self.energy / f - T * by_force,
-            control=unit * (displacement - T * (S + s) / 2),
-            force=by_force,
-        ))  # fmt: skip
 
-    @in_digits
-    def displacement_slopes(self, holding: Holding = "load") -> Slopes:
-        ends = zip(self.pressed.approach_slopes, self.held.approach_slopes, strict=True)
-        partial, X = Slopes(*(self.travel * (a - b) for a, b in ends)), self.displacement
-        by_force = self.pressed.ratio * self.held.tangent[1]
-        return self._held(holding, partial._replace(
-            poisson_ratio=self._by_ratio(X),
-            friction=X / self.f - self.T * by_force,
-            force=by_force,
-        ))  # fmt: skip
-
-    def _by_ratio(self, value: Balls) -> Balls:
-        nu = self.pressed.setup.poisson_ratio
-        return value / ((1 - nu) * (2 - nu))
-
-    def _held(self, holding: Holding, slopes: Slopes) -> Slopes:
-        if holding == "load":
-            return slopes
-        moved, follows = self.pressed.approach_slopes, slopes.control / self.pressed.tangent[1]
-        there = Slopes(*(a - follows * b for a, b in zip(slopes, moved, strict=True)))
-        return there._replace(control=follows)
-
-
-def friction_state(contact: cr.Contact, force: float, holding: Holding = "load") -> Friction:
-    """Of a pressed scene under a shear force below f P, all its float64 numbers taken as exact."""
-    with ctx.workdps(DIGITS):
-        setup = Setup.of(contact, holding, [force])
-        return of_setup(setup, contact)
-
-
-def of_setup(setup: Setup, contact: cr.Contact) -> Friction:
-    upper = Level(setup, contact)
+def of_setup(setup: Setup, contact: cr.Contact, near: Friction | None = None) -> Friction:
+    """A state under a shear force below f P; near : one of nearly the same setup."""
+    upper = Level(setup, near.pressed if near else contact)
     T = setup.forces[0] / setup.friction
     left = (upper.load - T).mid()
-    start = cr.press(contact.scene, load=float(left))
+    start = near.held if near else cr.press(contact.scene, load=float(left))
     return Friction(upper, Level(replace(setup, control=left, by_load=True), start), T)
 
 
 def displaced(contact: cr.Contact, displacement: float, holding: Holding = "load") -> Friction:
-    """As `friction_state`, moved by X [length]: the level at the approach D0(P) - X / (c_t f)."""
+    """Moved by X [length]: the level at the approach D0(P) - X / (c_t f)."""
     with ctx.workdps(DIGITS):
         upper = Level(Setup.of(contact, holding), contact)
         left = (upper.approach - arb(displacement) / (upper.ratio * upper.setup.friction)).mid()
@@ -286,7 +183,9 @@ def displaced(contact: cr.Contact, displacement: float, holding: Holding = "load
 def reference(name: str, fraction: float, holding: Holding = "approach") -> Friction:
     """One of SCENES at Q = fraction f P, kept."""
     contact = pressed(name, holding)
-    return friction_state(contact, fraction * FRICTION * contact.load, holding)
+    with ctx.workdps(DIGITS):
+        setup = Setup.of(contact, holding, [fraction * FRICTION * contact.load])
+        return of_setup(setup, contact)
 
 
 @cache

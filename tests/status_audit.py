@@ -296,6 +296,13 @@ def _audit_vectors(
     if np.hypot(*pair) > FRICTION * contact.load:
         pair *= 1 - 1e-15
     tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
+    audit_vectors(kind, operator, tilted, full, pair, tally)
+
+
+def audit_vectors(
+    kind: str, operator: str, tilted: cr.Contact, full: Any, pair: Any, tally: Tally
+) -> None:
+    """The state of a contact with exact loads `full` under a shear force along x and y."""
     state = cr.shear_vector(tilted, force=pair)
     tally.count(kind, operator, "tensor", state.status)
     for status, load in zip(state.status, full.loads, strict=True):

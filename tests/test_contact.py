@@ -1,4 +1,4 @@
-"""The solved contact: reference values, closed forms, symmetries, and 50-digit solutions."""
+"""The solved contact: reference values, symmetries, and 50-digit solutions."""
 
 import re
 from typing import Any
@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
     CASES,
-    MATERIAL,
     NAMED,
     PAPER_APPROACH,
     operators,
@@ -19,7 +18,6 @@ from scenes import (
     random_cases,
     reference,
     rough,
-    scattered,
 )
 
 import convexrough as cr
@@ -72,8 +70,8 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     contact = cr.press(scene, **prescribed, influence=kind)
     exact = reference(scene, **prescribed)
     assert contact.influence == kind
-    assert np.abs(multiprecision.relative_errors(contact.loads, exact.loads)).max() < 1e-13
     truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    assert (truth <= 1e-13 * contact.loads).all()
     assert truth.max() < 1e-14 * contact.loads.max()
     gap_errors = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
     assert gap_errors.max() < 1e-13 * contact.gaps.max()
@@ -113,37 +111,6 @@ def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
             judged = cr.certify(scene, solved.loads, approach=approach, influence=kind)
             assert judged.scope == "global"
             assert (judged.status == first.status).all()
-
-
-def test_which_operator() -> None:
-    """A matrix for few; one may be asked for by name, where the scene allows it."""
-    assert cr.press(paper(), approach=PAPER_APPROACH).influence == "dense"
-    with pytest.raises(cr.InputError, match="influence: found lattice, expected asperities on a"):
-        cr.press(rough("closest"), approach=PAPER_APPROACH, influence="lattice")
-    wrong: Any = "fft"
-    with pytest.raises(cr.InputError, match="influence: found 'fft', expected one of dense"):
-        cr.press(paper(), approach=PAPER_APPROACH, influence=wrong)
-    many = cr.Asperities.hexagonal(spacing=0.0008, tip_radius=0.005, within=0.0102)
-    assert (
-        cr.press(
-            cr.Scene(1.0, many, MATERIAL, geometry="summit"), approach=PAPER_APPROACH
-        ).influence
-        == "lattice"
-    )
-
-
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_a_single_asperity_is_hertz(control: str) -> None:
-    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL, geometry="summit")
-    radius, approach = 0.4, 1e-3  # 1/R_i = 1/2 + 1/0.5
-    load = 4 / 3 * np.sqrt(radius) * approach**1.5
-    contact = cr.press(scene, **{control: {"approach": approach, "load": load}[control]})
-    assert_allclose(contact.loads, [load], rtol=1e-15)
-    assert contact.approach == pytest.approx(approach, rel=1e-15)
-    assert_allclose(contact.contact_radii, np.sqrt(radius * approach), rtol=1e-15)
-    assert contact.certificate.scope == "global"
-    assert contact.certificate.convexity_number == 0
-    assert contact.status[0] == "contact"
 
 
 @settings(max_examples=15, deadline=None)
@@ -209,10 +176,3 @@ def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> 
     assert np.abs(error.iterate - contact.loads).max() < 0.01 * contact.loads.max()
     again = cr.press(scene, approach=PAPER_APPROACH, start=error.iterate)
     assert again.iterations < contact.iterations
-
-
-def test_a_crowded_contact_is_named_as_the_reason() -> None:
-    """Newton's method that fails beyond the convex range says so."""
-    scene, approach = scattered(1, 20, 4.0, 0.5)
-    with pytest.raises(cr.SolverError, match=r"so crowded .* \(convexity number \d"):
-        cr.press(scene, approach=approach, solver=cr.solvers.Newton(max_iterations=2))

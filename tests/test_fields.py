@@ -1,4 +1,4 @@
-"""Pressure anywhere: closed forms, quadrature, scaling, and the plain sum over all asperities."""
+"""Pressure anywhere: quadrature, and none outside the discs."""
 
 from typing import Any
 
@@ -54,35 +54,3 @@ def test_no_pressure_outside_the_discs(contact: cr.Contact) -> None:
     assert fields.pressure(contact, [far, 0.0]) == 0.0
     open_ = contact.scene.contact_points[contact.loads == 0]
     assert_array_equal(fields.pressure(contact, open_), 0.0)
-
-
-@pytest.mark.parametrize("decades", [0.0, 4.0])
-def test_superpose_is_the_plain_sum_also_where_discs_overlap(decades: float) -> None:
-    rng = np.random.default_rng(5)
-    centres, points = rng.uniform(-1, 1, (300, 2)), rng.uniform(-1.2, 1.2, (500, 2))
-    radii, peaks = 0.5 * 10.0 ** (-decades * rng.random(300)), rng.uniform(0.5, 2, 300)
-    points[:100] = centres[:100]
-    r = np.hypot(*(points[:, None] - centres).T).T
-    plain = (peaks * np.sqrt(np.maximum(1 - (r / radii) ** 2, 0))).sum(axis=1)
-    assert np.count_nonzero(plain) > 100
-    assert_allclose(fields.superpose(points, centres, radii, peaks), plain, rtol=1e-12)
-
-
-@pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [["x", "y"]], [[0.0, np.nan]]])
-def test_points_that_are_none(bad: Any) -> None:
-    with pytest.raises(cr.InputError, match=r"points.*x and y of each"):
-        fields.pressure(pressed("paper"), bad)
-
-
-@pytest.mark.parametrize(
-    ("asperities", "cell"),
-    [
-        (cr.Asperities.hexagonal(spacing=0.3, tip_radius=1.0, within=2.0), np.sqrt(0.75) * 0.09),
-        (cr.Asperities.square(spacing=0.3, tip_radius=1.0, within=2.0), 0.09),
-    ],
-)
-def test_the_cells_of_a_lattice(asperities: cr.Asperities, cell: float) -> None:
-    areas = fields.cell_areas(asperities.positions)
-    inside = asperities.distances < 1.4
-    assert np.isnan(areas).any()
-    assert_allclose(areas[inside], cell, rtol=1e-9)

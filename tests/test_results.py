@@ -5,7 +5,6 @@ import dataclasses
 import doctest
 import importlib
 import pickle
-import sys
 from collections.abc import Iterator
 from functools import cache
 from html.parser import HTMLParser
@@ -114,17 +113,6 @@ def test_a_result_is_printed_on_one_screen_and_in_a_notebook() -> None:
         assert [text.strip() for text in cells.text if text.strip()] == [it for it in shown if it]
 
 
-def test_what_is_printed_is_what_is_there() -> None:
-    contact, verdict = results()["Contact"], results()["Verdict"]
-    assert "status           37 contact, 24 open\n" in repr(contact)
-    assert f"loads            61 from 0 to {contact.loads.max():.6g}\n" in repr(contact)
-    assert "certificate      Certificate: global; 37 contact, 24 open\n" in repr(contact)
-    assert "status                  31 partial, 6 sliding, 24 open\n" in repr(results()["Cycle"])
-    assert "wrongly_open      3\n" in repr(verdict)
-    assert "wrongly_loaded    none\n" in repr(verdict)
-    assert "contradictions          none" in repr(results()["Comparison"])
-
-
 class Cells(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
@@ -213,16 +201,6 @@ def test_data_frames_and_data_sets_have_the_arrays() -> None:
             held["load"][0] = -1.0  # a copy: the result stays as it is
 
 
-@pytest.mark.parametrize("extra", ["pandas", "xarray"])
-def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, extra, None)
-    contact = results()["Contact"]
-    with pytest.raises(ExtraError, match=rf"needs {extra}: pip install {extra}"):
-        _ = contact.to_dataframe() if extra == "pandas" else contact.to_xarray()
-    assert issubclass(ExtraError, cr.ConvexroughError)
-    assert issubclass(ExtraError, ImportError)
-
-
 def test_axes_in_axes_out() -> None:
     for name, result in having("plot").items():
         alone = result.plot()
@@ -231,11 +209,6 @@ def test_axes_in_axes_out() -> None:
         assert plots.plot(result, other) is other
         assert (mine.has_data(), other.has_data()) == (False, True), name
         assert other.get_xlabel()
-
-
-def test_what_has_no_picture_says_so() -> None:
-    with pytest.raises(cr.InputError, match="found type Scene, expected a result that has"):
-        plots.plot(results()["Scene"])
 
 
 PUBLIC = [name for name in cr.__all__ if hasattr(getattr(cr, name), "__module__")]

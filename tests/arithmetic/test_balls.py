@@ -3,7 +3,6 @@
 import itertools
 import operator
 from collections.abc import Callable
-from fractions import Fraction
 from math import isfinite
 from typing import Any
 
@@ -13,9 +12,9 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.arithmetic.balls import Ball, where
+from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.kernels import residual
-from convexrough.arithmetic.pairs import CHUNK, PAIR_ROUNDOFF, Pair, two_sum
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
 BITS = 4000
@@ -126,19 +125,6 @@ def test_residual(k: Any, P: Any, v: Any, D: Any) -> None:
             assert holds(found, i, a * x + b - c)
 
 
-def test_residual_is_sharp() -> None:
-    """Of exact numbers, a few roundoffs of its terms; many at once as few; k may be one for all."""
-    rng = np.random.default_rng(1)
-    P = Pair.exact(rng.random(CHUNK + 5) * (rng.random(CHUNK + 5) < 0.7))
-    k, v, D = Ball.exact(0.7), Ball.exact(P.high + 0.1), Ball.exact(P.high**0.5)
-    found = residual(k, Ball.exact(P), v, D)
-    few = residual(k, Ball.exact(P)[:61], v[:61], D[:61])
-    formula = k * Ball.exact(P).two_thirds() + v - D
-    assert (found.radius <= PAIR_ROUNDOFF * (P.high ** (2 / 3) + v.size + D.size)).all()
-    assert ((found - formula).size <= 2.1 * (found.radius + formula.radius)).all()
-    np.testing.assert_array_equal(found[:61].mid, few.mid)
-
-
 @settings(max_examples=60, deadline=None)
 @given(st.lists(numbers(), max_size=40), st.integers(0, 2**32 - 1))
 def test_sums_of_products(rows: Any, seed: int) -> None:
@@ -213,31 +199,3 @@ def test_what_is_no_number_is_unknown() -> None:
         assert (bad.radius == INF).all()
         assert np.isfinite(bad.value).all()
         assert (bad + 1.0).radius[0] == INF
-
-
-def test_many_at_once() -> None:
-    """Chunks on all cores are as one; one number stands for all."""
-    rng = np.random.default_rng(2)
-    x = Ball.around(rng.random((2, 3 * CHUNK)), 1e-20)
-    k = Ball.around(0.7, 1e-19)
-    at_once, by_row = k * x.two_thirds() - x, [k * x[i].two_thirds() - x[i] for i in (0, 1)]
-    assert at_once.shape == (2, 3 * CHUNK)
-    parts = [k * x[0][:9].two_thirds() - x[0][:9], by_row[0][:9], at_once[0][:9]]
-    for other in parts:
-        np.testing.assert_array_equal(other.mid, parts[0].mid)
-        np.testing.assert_array_equal(other.radius, parts[0].radius)
-    assert (x[:, :1] * x[0]).shape == x.shape
-    np.testing.assert_array_equal((x[:, :1] * x[0]).value[1], (x[1, 0] * x[0]).value)
-
-
-def test_building() -> None:
-    third = Fraction(1, 3)
-    ball = Ball.exact(third)
-    assert ball.shape == ()
-    assert holds(ball[None], 0, arb(1) / 3)
-    assert ball.radius < 1e-29
-    assert len(Ball.exact([1.0, 2.0])) == 2
-    chosen = where(np.array([True, False]), Ball.exact(np.ones(2)), Ball.around(np.zeros(2), 0.5))
-    np.testing.assert_array_equal(chosen.value, [1, 0])
-    np.testing.assert_allclose(chosen.radius, [0, 0.5], rtol=1e-11)
-    assert ((1.0 - third * chosen) / 2.0).shape == (2,)

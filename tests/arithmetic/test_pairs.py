@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, in_parts, square_sum, two_sum
+from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, square_sum, two_sum
 
 
 def random_pair(seed: int, count: int, scale: float = 1.0) -> Pair:
@@ -67,11 +67,3 @@ def test_total(count: int) -> None:
     rows = Pair(*(np.stack((part, -part)) for part in a)).total()
     np.testing.assert_array_equal(rows.high, [total.high, -total.high])
     np.testing.assert_array_equal(rows.low, [total.low, -total.low])
-
-
-def test_in_parts() -> None:
-    """By slices, as at once; what comes back cannot be changed."""
-    a = random_pair(3, 40_000)
-    found = in_parts(40_000, lambda some: a.at(some) * a.at(some))
-    np.testing.assert_array_equal(found, a * a)
-    assert not found.high.flags.writeable

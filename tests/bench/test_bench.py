@@ -1,8 +1,7 @@
-"""The benchmark: its reference, what it concludes, what it writes. No time is tested."""
+"""The benchmark: its reference, and what it writes. No time is tested."""
 
 import csv
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,10 @@ import multiprecision
 import numpy as np
 import pytest
 
-import convexrough as cr
-from convexrough.bench import measure, page, suite
-from convexrough.bench.measure import Attempt, reference
-from convexrough.bench.profile import Profile, profile_of
-from convexrough.bench.rows import Bench, Row, better_than_default
+from convexrough.bench import measure, suite
+from convexrough.bench.measure import reference
+from convexrough.bench.rows import Bench
 from convexrough.bench.scenes import APPROACH, scene
-from convexrough.solvers import BristleQP, Conic, Newton
 
 SMALL = (("lattice", 61),)
 
@@ -59,54 +55,6 @@ def test_reference_against_50_digits(family: Any) -> None:
 # What is measured, and what is said of it.
 
 
-def test_rows_of_those_that_do_not_answer() -> None:
-    small = scene("lattice", 1.0)
-    dense = cr.Scene(1.0, cr.Asperities.hexagonal(spacing=0.0025, tip_radius=5.0, within=0.01),
-                     cr.Material(1.0, 0.3), geometry="summit")  # fmt: skip
-    for each, attempt, outcome, message in (
-        (small, Attempt("newton", "", Newton(max_iterations=1)), "failed", "residual"),
-        (dense, Attempt("conic", "", Conic()), "refused", "asperities too dense for a"),
-        (scene("scattered", 1.0), Attempt("", "", Newton(), "lattice"), "refused", "lattice"),
-    ):
-        row = measure.measure_attempt("lattice", each, attempt, None, 0.0)
-        assert (row.outcome, message in row.message) == (outcome, True)
-
-
-def row(name: str, seconds: float, error: float, setting: str = "default") -> Row:
-    return Row("solve", "lattice", 61, solver=name, setting=setting, seconds=seconds, error=error)
-
-
-def test_who_is_better_than_the_default() -> None:
-    others = [
-        row("within noise", 0.95, 1e-12),
-        row("less accurate", 0.5, 1.1e-12),
-        row("slower", 1.2, 1e-15),
-        row("better", 0.85, 1e-12),
-    ]
-    rows = [row("newton", 1.0, 1e-12), *others]
-    assert [each.solver for each in better_than_default(rows)] == ["better"]
-    assert better_than_default(others) == others
-    (line,) = replace(tiny(), rows=tuple(rows)).verdicts()
-    assert line.endswith("61 asperities (lattice): the default solver is not on the frontier: "
-                         "better, default.")  # fmt: skip
-
-
-def test_every_task_is_timed_on_the_scene_that_it_names() -> None:
-    rows = {(each.task, each.family): each for each in tiny().rows if each.task != "solve"}
-    for task in ("press", "from nothing", *suite.FOLLOWING):
-        found = rows[task, "lattice"]
-        assert (found.outcome, found.asperities) == ("answered", 61)
-        assert found.seconds > 0
-        assert found.product > 0
-        assert found.products == found.seconds / found.product
-    assert rows["press", "lattice"].touching == 37
-    assert 0 < rows["press", "lattice"].bound < 1e-11
-    assert np.isnan(rows["press", "scattered"].product)
-    assert rows["sweep", "rough"].message == "10 scenes, 1 processes, 10 certified"
-    default = next(each for each in tiny().rows if each.task == "solve" and each.default)
-    assert 0 < default.error < 1e-14
-
-
 # What it writes.
 
 
@@ -141,53 +89,3 @@ def test_command(command: Any, tmp_path: Path) -> None:
     said = command("bench", "--quick", "--force", "--no-figures")
     assert said.status == 0
     assert f"in products on {tiny().machine['cores']} cores" in said.out
-
-
-PAGE = f"# Title\n\nBefore.\n\n{page.BEGIN}\nold\n{page.END}\n\nAfter.\n"
-
-
-def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> None:
-    path = tmp_path / "docs" / "page.md"
-    path.parent.mkdir()
-    path.write_text(PAGE)
-    assert command("bench", "--quick", "--page", "docs/page.md", "--no-figures").status == 0
-    text = path.read_text()
-    assert page.split_page(path) == ("# Title\n\nBefore.\n\n", "\n\nAfter.\n")
-    assert "old" not in text
-    assert "| lattice " in text
-    assert "(figures/work-precision.png)" in text
-    assert (tmp_path / "docs" / "figures" / "work-precision.png").exists()
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["nothing", PAGE.replace(page.END, ""), PAGE.replace(page.BEGIN, ""), PAGE + PAGE],
-    ids=["no block", "no end", "no beginning", "two blocks"],
-)
-def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path, text: str) -> None:
-    (tmp_path / "page.md").write_text(text)
-    ran = command("bench", "--quick", "--page", "page.md")
-    assert ran.status == 2
-    assert "page.md: expected one line <!-- bench: begin -->" in ran.err
-    assert (tmp_path / "page.md").read_text() == text
-    assert not (tmp_path / "bench-results").exists()
-
-
-def test_a_performance_profile() -> None:
-    """Parts of the cases by time over the least; nothing that is not right counts."""
-    seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
-    texts = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
-    sets = np.array([[True, True, True, False]] * 2)
-    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts, sets)
-    assert found.part(1.0).tolist() == [0.25, 0.5]
-    assert found.part(2.0).tolist() == [0.5, 0.5]
-    assert found.part(4.0).tolist() == [0.5, 0.75]
-    assert list(found.rows()[0].values())[:7] == ["a", 2, 1, 0, 1, 3, 0.25]
-    assert [len(line.get_xdata()) for line in found.plot().lines] == [4, 4]
-
-
-def test_answers_are_judged_before_they_are_timed() -> None:
-    found = profile_of([BristleQP(newton_step=False)], cases=["two-equal"], within=1e-9)
-    assert found.solvers == ("newton", "bristles")
-    assert found.outcomes == (("right",), ("wrong",))
-    assert found.ratios.tolist() == [[1.0], [np.inf]]

@@ -1,39 +1,11 @@
-"""Shear and cycles by displacement; loops by Masing's rule; what a cycle says of stiffness."""
+"""Displacements beyond gross sliding; loops by Masing's rule; what a cycle says of stiffness."""
 
 import numpy as np
 import pytest
 from friction_scenes import FRICTION, KINDS, pressed
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
-
-
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("influence", KINDS)
-@pytest.mark.parametrize("share", [1e-6, 0.3, -0.7, 0.999, 1.0])
-def test_the_force_of_a_displacement(influence: str, share: float) -> None:
-    contact = pressed("rough", influence)
-    limit = FRICTION * contact.load
-    known = cr.shear(contact, force=share * limit)
-    found = cr.shear(contact, displacement=known.displacement)
-    error = known.certificate.displacement_error + found.certificate.displacement_error
-    assert abs(found.displacement - known.displacement) <= error + 1e-14 * abs(known.displacement)
-    assert found.force == pytest.approx(known.force, rel=1e-9)
-    assert list(found.status) == list(known.status)
-
-
-@pytest.mark.parametrize("influence", KINDS)
-def test_cycles_by_displacement(influence: str) -> None:
-    contact = pressed("paper", influence)
-    limit = FRICTION * contact.load
-    known = cr.cycles(contact, np.array([0.1, 0.6]) * limit)
-    found = cr.cycles(contact, displacement=[each.displacement_amplitude for each in known])
-    for one, other in zip(known, found, strict=True):
-        assert other.maximum == -other.minimum == pytest.approx(one.maximum, rel=1e-11)
-        assert other.loss == pytest.approx(one.loss, rel=1e-10)
-    one = cr.cycle(contact, displacement=known[0].displacement_amplitude)
-    assert one.loss == pytest.approx(known[0].loss, rel=1e-10)
 
 
 def test_a_displacement_beyond_gross_sliding() -> None:
@@ -42,12 +14,6 @@ def test_a_displacement_beyond_gross_sliding() -> None:
     for wrong in (1.01 * last, np.nan):
         with pytest.raises(cr.InputError, match="displacement"):
             cr.shear(contact, displacement=wrong)
-    with pytest.raises(cr.InputError, match="gross sliding"):
-        cr.cycle(contact, displacement=1.01 * last)
-    with pytest.raises(cr.InputError, match="force, displacement: found both"):
-        cr.shear(contact, force=0.0, displacement=0.0)
-    with pytest.raises(cr.InputError, match=r"minimum: .*symmetric"):
-        cr.cycle(contact, displacement=0.5 * last, minimum=0.0)
     light = cr.press(contact.scene, approach=-1e-6)
     assert cr.shear(light, displacement=0.0).force == 0.0
 
@@ -58,15 +24,9 @@ def test_stiffness_and_loss_factor() -> None:
     cycle = cr.cycle(contact, maximum=0.5 * limit, minimum=-0.1 * limit)
     loop = cycle.loop(400)
     half = np.ptp(loop.displacements) / 2
-    assert cycle.displacement_amplitude == pytest.approx(half, rel=1e-12)
-    assert 0 < cycle.displacement_error < 1e-9 * half
     assert cycle.secant_stiffness == pytest.approx(0.3 * limit / half, rel=1e-12)
     # The area of the loop over 2 pi times that of the triangle under its tip.
-    stored = 0.3 * limit * half / 2
-    assert cycle.loss_factor == pytest.approx(loop.area / (2 * np.pi * stored), rel=1e-3)
-    still = cr.cycle(contact, maximum=0.0)
-    assert np.isnan(still.loss_factor)
-    assert np.isnan(still.secant_stiffness)
+    assert cycle.loss_factor == pytest.approx(loop.area / (np.pi * 0.3 * limit * half), rel=1e-3)
 
 
 @pytest.mark.sample(3)
@@ -88,16 +48,3 @@ def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, 
     theirs = np.where(loaded, past.asperity_displacements[body][:, chosen], 0.0)
     assert_allclose(loop.asperity_displacements, theirs, atol=1e-11 * scale)
     assert loop.asperities.tolist() == chosen
-
-
-def test_bad_loops() -> None:
-    cycle = cr.cycle(pressed("paper"), maximum=0.0)
-    with pytest.raises(cr.InputError, match="points: found 3"):
-        cycle.loop(3)
-    with pytest.raises(cr.InputError, match=r"asperities: .*from 0 to 60"):
-        cycle.loop(asperities=[61])
-    assert cr.loops([]) == []
-    light = cr.press(pressed("paper").scene, approach=-1e-6)
-    assert not cr.cycle(light, maximum=0.0).loop(10).displacements.any()
-    with pytest.raises(cr.InputError, match="coefficient of friction"):
-        cr.shear(cr.press(paper(), approach=PAPER_APPROACH), displacement=0.0)

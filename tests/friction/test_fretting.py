@@ -2,17 +2,15 @@
 
 import dataclasses
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from scenes import PAPER_APPROACH, paper, rough
-from scipy.optimize import brentq
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.friction.fretting import fretting_columns, rim_gap
+from convexrough.friction.fretting import rim_gap
 from convexrough.sphere import mindlin
 
 
@@ -67,109 +65,3 @@ def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None
         assert cycle.asperity_losses[i] == pytest.approx(lost, rel=1e-4)
         assert found.slip_amplitudes[i] == pytest.approx(slip[0], rel=1e-12)
     assert_array_equal(found.losses, cycle.asperity_losses)
-
-
-def test_open_asperities_and_no_shear() -> None:
-    cycle, found = worn("paper", 0.0, 0.0)
-    for values in (found.slip_amplitudes, found.mean_tractions, found.largest_tractions):
-        assert_array_equal(values, 0.0)
-    _, found = worn("paper", 0.5, -0.5)
-    assert_array_equal(found.slip_amplitudes[cycle.contact.loads == 0], 0.0)
-    slides = found.status == "sliding"
-    assert_array_equal(found.gross_slip_amplitudes > 0, slides)
-    f_p0 = 0.5 * fields.peak_pressures(found.contact)
-    assert_allclose(found.largest_tractions[slides], f_p0[slides], rtol=1e-15)
-    assert_allclose(found.mean_tractions[slides], 2 / 3 * f_p0[slides], rtol=1e-12)
-
-
-def bristles(
-    radius: float, f: float, c_t: float, points: list[tuple[float, float]]
-) -> tuple[float, float, float]:
-    """One sphere, E* = 1, by springs in a row (Popov and Hess 2015), in small steps.
-
-    The amplitude of slip at the rim of the least disc in the second cycle, and the largest mean
-    and largest traction at its points. Surfaces are Abel transforms of the row.
-    """
-    halfway = np.sqrt(radius) * (0.75 * max(P for P, _ in points) / np.sqrt(radius)) ** (1 / 3)
-    x, step = np.linspace(0.0, halfway, 4001, retstep=True)
-    least = np.sqrt(radius) * (0.75 * min(P for P, _ in points) / np.sqrt(radius)) ** (1 / 3)
-    way = np.sin(np.linspace(0.0, np.pi / 2, 2001))
-    moved, row, slips, tractions, before = 0.0, 0.0 * x, [], [], np.zeros(2)
-    for number, point in enumerate([*points, *points, points[0]]):
-        for part in np.linspace(0.0, 1.0, 101)[1:] ** (1 if number else 3):
-            P, Q = before + part * (np.array(point) - before)
-            depth = (0.75 * P / np.sqrt(radius)) ** (2 / 3)
-            most = f * c_t * np.maximum(depth - x**2 / radius, 0.0)
-
-            def force(by: float, row: Any = row, most: Any = most) -> float:
-                return float(2 / c_t * np.trapezoid(np.clip(row + by, -most, most), x))
-
-            by = brentq(lambda by, Q=Q: force(by) - Q, -10 * most[0], 10 * most[0], xtol=1e-16)
-            moved, row = moved + by, np.clip(row + by, -most, most)
-            if number >= len(points):
-                slips.append(np.interp(least * way, x, moved - row).mean())
-        before = np.array(point)
-        if number >= len(points):
-            r = x[:-1:8]
-            above = np.maximum(x[None, :] / np.maximum(r, 1e-3 * step)[:, None], 1.0)
-            q = -np.diff(row) / c_t @ np.diff(np.arccosh(above)).T / step / np.pi
-            tractions.append((abs(Q) / (np.pi * radius * depth), np.abs(q).max()))
-    return float(np.ptp(slips)) / 2, *np.max(tractions, axis=0)
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    "points",
-    [
-        [(1.0, 0.0), (0.6, 0.25), (0.8, -0.2)],
-        [(1.0, 0.4), (0.5, -0.2)],
-        [(0.7, 0.3), (1.0, 0.3), (0.6, -0.1), (0.9, 0.2)],
-    ],
-)
-def test_a_varying_load_against_bristles(points: list[tuple[float, float]]) -> None:
-    one = cr.Scene(
-        np.inf,
-        cr.Asperities([[0.0, 0.0]], tip_radii=2.0),
-        cr.Material(contact_modulus=1.0, poisson_ratio=0.3),
-        friction=0.5,
-    )
-    points = [(1e-3 * P, 1e-3 * Q) for P, Q in points]
-    loads, forces = zip(*points, strict=True)
-    found = cr.fretting(cr.steady(one, loads=loads, forces=forces))
-    slip, mean, largest = bristles(2.0, 0.5, 1.7 / 1.4, points)
-    assert found.slip_amplitudes[0] == pytest.approx(slip, rel=2e-3)
-    assert found.mean_tractions[0] == pytest.approx(mean, rel=1e-6)
-    assert found.largest_tractions[0] == pytest.approx(largest, rel=5e-3)
-
-
-def test_a_varying_load_of_many() -> None:
-    """Gross slip is half the range of drifts; where contact is lost it is not known."""
-    scene, P = contact("rough").scene, contact("rough").load
-    loads, forces = [P, 0.5 * P, 0.8 * P], [0.3 * P, -0.15 * P, 0.2 * P]
-    found = cr.fretting(cr.steady(scene, loads=loads, forces=forces))
-    path = cr.load_path(scene, loads=[*loads, *loads], forces=[*forces, *forces])
-    slides, gone = found.status == "sliding", found.status == "intermittent"
-    assert slides.any()
-    assert gone.any()
-    drifts = np.ptp(path.drifts[3:], axis=0) / 2.0
-    assert_allclose(found.gross_slip_amplitudes[slides], drifts[slides], rtol=1e-9)
-    assert_array_equal(np.isnan(found.slip_amplitudes), gone)
-    assert np.isfinite(found.largest_tractions).all()
-
-
-def test_a_constant_load_as_a_path() -> None:
-    P, (_, found) = contact("rough").load, worn("rough", 0.6, -0.6)
-    as_a_path = cr.steady(contact("rough").scene, loads=[P] * 3, forces=[0.0, 0.3 * P, -0.3 * P])
-    for name, values in cr.fretting(as_a_path).columns().items():
-        if name != "status":
-            assert_allclose(values, getattr(found, name), rtol=1e-6, atol=1e-12 * values.max())
-
-
-def test_columns_have_a_row_for_each_touching_asperity() -> None:
-    several = [worn("paper", share, -share)[1] for share in (0.2, 0.5)]
-    columns = fretting_columns(several)
-    assert {len(values) for values in columns.values()} == {2 * 37}
-    last = columns["maximum"] == several[1].maximum
-    touching = np.flatnonzero(several[1].contact.loads)
-    assert_array_equal(columns["asperity"][last], touching)
-    assert_array_equal(columns["largest_traction"][last], several[1].largest_tractions[touching])

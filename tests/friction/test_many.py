@@ -1,16 +1,13 @@
 """Many scenes at once against the same ones one by one: status by status, digit by digit."""
 
-import pickle
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from path_scenes import shaded
-from scenes import MATERIAL, NAMED, random_scenes
+from scenes import MATERIAL, NAMED
 
 import convexrough as cr
 from convexrough import rows
@@ -93,24 +90,6 @@ def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
             assert cycles.displacement_errors[k] <= 2 * cycle.displacement_error
 
 
-@settings(max_examples=8, deadline=None)
-@given(random_scenes(crowding=1.2, most=10), st.integers(0, 2**32 - 1))
-def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
-    """Also of scenes where nothing touches, or that the rows do not prove."""
-    scene, approach = sampled
-    rng = np.random.default_rng(seed)
-    scenes = [
-        replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, heights))
-        for heights in scene.asperities.heights + rng.uniform(-0.3, 0.3, (3, 1)) * approach
-    ]
-    contacts = cr.press_many(scenes, approach=approach)
-    for k, each in enumerate(scenes):
-        one = cr.press(each, approach=approach)
-        assert_array_equal(contacts.status[k], one.status)
-        uncertainty = one.certificate.load_errors + contacts.asperity_load_errors[k]
-        assert (np.abs(contacts.asperity_loads[k] - one.loads) <= uncertainty).all()
-
-
 def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = rough(3)
     lifted = cr.press_many(scenes, approach=[-1.0, 5e-5, 5e-5])
@@ -135,46 +114,3 @@ def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
         assert cycles.order[k] == one.order
         assert cycles.losses[k] == one.loss
         assert_array_equal(cycles.status[k], one.status)
-
-
-def test_one_asperity_near_gross_sliding() -> None:
-    """One row of one asperity, whose load at the end is poorly known."""
-    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, F, geometry="summit")
-    contacts = cr.press_many([scene], load=3e-7)
-    cycles = contacts.cycles((1 - 1e-12) * F * contacts.loads)
-    assert cycles.order.tolist() == ["proved"]
-    assert abs(cycles.losses[0] - cycles[0].loss) <= cycles.loss_errors[0] + cycles[0].loss_error
-
-
-def test_results_are_tables_and_sequences() -> None:
-    contacts = cr.press_many(rough(3), approach=5e-5)
-    assert len(contacts) == 3
-    assert contacts[-1] is contacts[2]
-    assert_array_equal(contacts[1].loads, contacts.asperity_loads[1])
-    cycles = contacts.cycles([1e-8, 2e-8, 3e-8])
-    assert cycles[1].loss == cycles.losses[1]
-    assert cycles.to_xarray()["status"].dims == ("scene", "asperity")
-    assert len(contacts.to_dataframe()) == 3
-    again = pickle.loads(pickle.dumps(contacts))
-    assert_array_equal(again.cycles([1e-8, 2e-8, 3e-8]).losses, cycles.losses)
-    with pytest.raises(IndexError):
-        contacts[3]
-    assert len(cr.press_many([], approach=5e-5)) == 0
-
-
-def test_bad_input() -> None:
-    scenes = rough(2)
-    with pytest.raises(cr.InputError, match=r"scenes\[1\]: found 1 asperities"):
-        cr.press_many([scenes[0], cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL)], load=1.0)
-    with pytest.raises(cr.InputError, match="approach"):
-        cr.press_many(scenes)
-    with pytest.raises(cr.InputError, match="2 values, one per scene"):
-        cr.press_many(scenes, load=[1e-7] * 3)
-    contacts = cr.press_many(scenes, approach=5e-5)
-    with pytest.raises(cr.InputError, match=r"maximum\[1\].*gross sliding"):
-        contacts.cycles([1e-8, 1.0])
-    with pytest.raises(cr.InputError, match=r"maximum\[0\].*at least the minimum"):
-        contacts.cycles(0.0, 1e-8)
-    bare = cr.press_many([replace(each, friction=None) for each in scenes], approach=5e-5)
-    with pytest.raises(cr.InputError, match="friction"):
-        bare.cycles(1e-8)

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from path_scenes import ONE, PAPER, TWO, path_of, shaded
+from path_scenes import ONE, TWO, path_of, shaded
 from scenes import random_scenes
 
 import convexrough as cr
-from convexrough.friction import conic_step
-from convexrough.solvers.programs import RawAnswer
 
 
 @pytest.mark.sample(1)
@@ -59,34 +57,3 @@ def test_without_order_the_curve_is_refused_and_the_steps_agree() -> None:
     assert "refused: an indentation falls" in repr(found)
     assert np.isnan(found.to_xarray()["asperity_forces"][1]).all()
     found.plot()
-
-
-def test_a_crowded_scene_is_refused_by_the_cones() -> None:
-    points = np.array([[0.0, 0.0], [1.0, 0.0]])
-    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-    scene = cr.Scene(
-        1e9, cr.Asperities(points, np.ones(2)), material, friction=0.5, geometry="summit"
-    )
-    P = cr.press(scene, approach=2.0).load
-    found = cr.compare_paths(scene, loads=[P], forces=[0.1 * P])
-    assert found.entries[2].outcome == "failed"
-    assert "too dense for a convex program" in found.entries[2].message
-
-
-def test_a_wrong_answer_of_the_solver_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing repairs the cone program's answer on its way to the comparison."""
-    honest = conic_step.run_clarabel
-
-    def liar(*arguments: object, **settings: object) -> RawAnswer:
-        raw = honest(*arguments, **settings)  # type: ignore[arg-type]
-        return raw._replace(x=raw.x * 0.99)
-
-    monkeypatch.setattr(conic_step, "run_clarabel", liar)
-    scene, P, Q = path_of("paper", ONE)
-    conic = cr.compare_paths(scene, loads=P, forces=Q).entries[2]
-    assert conic.force_disagreement > 1e-3
-
-
-def test_bad_input() -> None:
-    with pytest.raises(cr.InputError, match="gross sliding"):
-        cr.compare_paths(PAPER, loads=[1e-7], forces=[1e-7])

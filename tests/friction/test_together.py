@@ -1,12 +1,10 @@
-"""Levels found together, in rows, against the same ones found one by one."""
+"""Order that is proved when asked, and shares of a loss where the load varies."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from levels_reference import SCENES
-from numpy.testing import assert_array_equal
 from scenes import NAMED
 
 import convexrough as cr
@@ -15,20 +13,6 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
 from convexrough.friction.walk import follow
-
-
-def test_cycles_together_are_those_alone() -> None:
-    scene, approach = NAMED["rough"]
-    contact, alone = (cr.press(replace(scene, friction=0.5), approach=approach) for _ in range(2))
-    maxima = 0.5 * contact.load * np.array([1e-3, 0.2, 0.0, 0.9, 1.0])
-    for found, maximum in zip(cr.cycles(contact, maxima), maxima, strict=True):
-        one = cr.cycle(alone, maximum=maximum)
-        assert found.order == one.order == "proved"
-        assert (found.status == one.status).all()
-        assert (found.loss, found.loss_first) == (one.loss, one.loss_first)
-        assert found.displacement_amplitude == one.displacement_amplitude
-        assert found.loss_error <= 2 * one.loss_error
-        assert_array_equal(found.asperity_losses, one.asperity_losses)
 
 
 def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:

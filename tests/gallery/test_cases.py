@@ -7,11 +7,10 @@ from functools import cache
 from typing import Any
 
 import gallery_answers
-import multiprecision
 import numpy as np
 import pytest
 from gallery_answers import true_statuses
-from scenes import operators, solve_exactly
+from scenes import operators
 
 import convexrough as cr
 from convexrough import gallery, solvers
@@ -89,23 +88,6 @@ def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     assert within(proof.approach, [case.exact_approach], proof.approach_error)
     if operator == "dense":
         assert (contact.status != "undecided").all()
-
-
-@pytest.mark.parametrize(
-    ("threshold", "below", "above"),
-    [("bound-1", "global", "global"), ("fitted", "local", "local"), ("end", "global", "local")],
-)
-def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) -> None:
-    """By shells, which is all that is known without a matrix: of secants, and such as overlap.
-
-    The last by Cholesky. On this side of each case a proof of what is near still exists.
-    """
-    operator = "dense" if threshold == "end" else "scattered"
-    scopes = [
-        pressed(f"convexity-{threshold}-{side}", operator).certificate.scope
-        for side in ("below", "above")
-    ]
-    assert scopes == [below, above]
 
 
 @pytest.mark.sample(8)
@@ -207,10 +189,6 @@ def test_wrong_answers_are_judged_wrong() -> None:
     assert not case.check(loads * (1 + 2e-6)).right
     assert case.check(loads * (1 + 2e-6), within=1e-5).right
     open_one = gallery.case("grazing-gap-1e-6")
-    loads = np.array([float(each) for each in open_one.loads])
-    loads[-1] = 1e-30
-    assert open_one.check(loads).wrongly_loaded.tolist() == [7]
-    assert open_one.check(loads, floor=1e-29).right
     forces = np.array([float(each) for each in open_one.forces])
     assert open_one.check_shear(forces).right
     assert not open_one.check_shear(forces[::-1]).right
@@ -227,24 +205,5 @@ def test_manufactured_contacts_of_any_size(count: int) -> None:
     again = gallery.manufactured(count)
     assert np.array_equal(again.loads, made.loads)
     assert not np.array_equal(gallery.manufactured(count, seed=1).loads, made.loads)
-    with pytest.raises(cr.InputError, match="a positive whole number"):
+    with pytest.raises(cr.InputError, match="a whole number, at least 1"):
         gallery.manufactured(count - 20_001)
-
-
-def test_a_manufactured_contact_is_its_answer() -> None:
-    """To rounding: against ball arithmetic."""
-    made = gallery.manufactured(61)
-    exact = solve_exactly(made.scene, approach=made.approach, start=made.loads)
-    off = multiprecision.errors(made.loads, exact.loads)
-    assert np.abs(off).max() < 1e-14 * made.loads.max()
-    assert np.array_equal(made.loads > 0, [load > 0 for load in exact.loads])
-    assert np.abs(multiprecision.errors(made.gaps, exact.gaps)).max() < 1e-14
-
-
-def test_names() -> None:
-    assert len(NAMES) == len(set(NAMES)) > 50
-    assert gallery.names("few") == ("one", "one-under-load", "two-equal")
-    with pytest.raises(cr.InputError, match='the name of a case; did you mean "two-equal"'):
-        gallery.case("two-equals")
-    with pytest.raises(cr.InputError, match='of a case or a family; did you mean "grazing"'):
-        gallery.names("grasing")

@@ -125,24 +125,6 @@ def test_cbf(name: str, pack: Path, index: Any) -> None:
     assert isinstance(problem, picos.Problem)
 
 
-def test_the_index(pack: Path, index: Any) -> None:
-    assert list(index) == list(gallery.names())
-    page = (pack / "index.md").read_text()
-    for name, about in index.items():
-        case = gallery.case(name)
-        assert f"| {name} " in page
-        assert about["answer"]["loads"] == list(case.loads)
-        assert about["touching"] == case.touching.sum()
-        assert about["scene"]["heights"] == case.scene.asperities.heights.tolist()
-        for file in about["programs"]:
-            assert (pack / file).stat().st_size < 2_000_000
-    left_out = {name for name, about in index.items() if "bristles" in about["left_out"]}
-    assert left_out == {"convexity-end-above"}
-    written = {path.name for path in pack.iterdir()}
-    listed = set(json.loads((pack / "files.json").read_text())["files"])
-    assert written - listed <= {"files.json"}
-
-
 def test_the_command(command: Any, tmp_path: Path) -> None:
     output = command("gallery", "--list", "few")
     assert output.status == 0

@@ -61,17 +61,6 @@ def of_state(
     return Judge(Setup.of(contact, holding, [force]), value)
 
 
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_the_approach_and_the_load(geometry: str) -> None:
-    contact = small(geometry)
-    gradient = contact.gradient(approach=1.0)
-    assert_slopes(of_contact(contact, "load", lambda o: o.approach), gradient, sharp=SHARP)
-    assert gradient.heights.sum() == pytest.approx(-1.0, abs=1e-15)
-    contact = small(geometry, "approach")
-    gradient = contact.gradient(load=1.0)
-    assert_slopes(of_contact(contact, "approach", lambda o: o.P.sum()), gradient, sharp=SHARP)
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("holding", ["load", "approach"])
@@ -88,21 +77,6 @@ def test_any_sum_of_loads_and_gaps(geometry: str, holding: Any) -> None:
     assert_slopes(judge, gradient, sharp=SHARP)
     assert abs(gradient.value - float(judge.at)) <= gradient.value_error * 1.01
     assert gradient.balance_defect < 1e-14
-
-
-def test_gaps_of_asperities_that_could_not_touch() -> None:
-    contact = small(holding="approach")
-    scene = contact.scene
-    low = np.argmin(scene.offsets)
-    heights = scene.asperities.heights - 2e-5 * (np.arange(len(scene)) == low)
-    lowered = replace(scene, asperities=replace(scene.asperities, heights=heights))
-    contact = cr.press(lowered, approach=contact.approach)
-    assert contact.candidates < len(scene)
-    weights = np.ones(len(scene))
-    gradient = contact.gradient(gaps=weights)
-    judge = of_contact(contact, "approach", lambda o: o.gaps.sum())
-    assert_slopes(judge, gradient)
-    assert gradient.height_errors.max() < SHARP
 
 
 STATES = [("summit", "load", 1e-3), ("summit", "approach", 0.5), ("closest", "load", 0.95)]
@@ -165,16 +139,6 @@ def test_onset(holding: Any) -> None:
     gradient = cr.onset_gradient(contact, asperity, holding=holding)
     assert gradient.value == pytest.approx(onset, rel=1e-13)
     assert_slopes(judge, gradient, sharp=1e-10)
-
-
-def test_onset_of_the_last_is_that_of_gross_sliding() -> None:
-    contact = small()
-    last = int(np.argmax(contact.scene.offsets))
-    gradient = cr.onset_gradient(contact, last)
-    assert gradient.load == FRICTION
-    assert not gradient.heights.any()
-    with pytest.raises(cr.InputError, match="others never slide"):
-        cr.onset_gradient(contact, int(np.argmin(contact.scene.offsets)))
 
 
 near_to = cache(lambda scene, load: cr.press(scene, load=load))
@@ -342,36 +306,15 @@ def test_histories_are_paths_whose_load_is_one() -> None:
     assert same.friction == last.friction
 
 
-def test_a_point_that_is_repeated_has_two_sides() -> None:
-    contact = small()
-    Q = contact.load * np.array([0.2, 0.2, -0.4])
-    found = cr.history(contact, forces=Q).gradient(losses=[0.0, 0.0, 1.0])
-    assert found.forces is not None
-    assert found.force_errors is not None
-    assert found.force_sides is not None
-    assert np.isnan(found.forces[:2]).all()
-    assert np.isinf(found.force_errors[:2]).all()
-    assert found.force_errors[2] < 1e-13 * found.force_sides[0, 1]
-    np.testing.assert_array_equal(found.force_sides[0], found.force_sides[1])
-    assert found.force_sides[0, 0] == 0.0  # less: the other point holds what was reached
-
-
 def test_what_has_no_derivative() -> None:
     contact = small()
     scene = contact.scene
     with pytest.raises(cr.InputError, match="a contact with a load"):
         cr.press(scene, approach=-1e-4).gradient(load=1.0)
-    with pytest.raises(cr.InputError, match="weights of at least one"):
-        contact.gradient()
-    with pytest.raises(cr.InputError, match='expected "load" or "approach"'):
-        contact.gradient(load=1.0, holding="both")  # type: ignore[arg-type]
     with pytest.raises(cr.InputError, match="in gross sliding a history has no derivative"):
         cr.history(contact, forces=[FRICTION * contact.load]).gradient(losses=[1.0])
     with pytest.raises(cr.InputError, match="19 values, one per asperity"):
         contact.gradient(loads=[1.0, 2.0])
-    past = cr.history(contact, forces=contact.load * np.array([0.1, -0.1, 0.0]))
-    with pytest.raises(cr.InputError, match=r"losses: .* 3 values, one per force"):
-        past.gradient(losses=[1.0, 2.0])
 
 
 def test_where_order_fails_there_is_no_sum_of_levels() -> None:

@@ -1,12 +1,11 @@
 """The coupling as a matrix, its rounding bound, and the shell lemma."""
 
 import numpy as np
-import pytest
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum
-from scenes import paper, rough, scattered
+from scenes import rough, scattered
 
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.choice import couple
@@ -105,22 +104,6 @@ def test_sums_where_points_are_pairs() -> None:
     assert (found.radius < 1e-26 * found.value).all()
 
 
-def test_sums_of_what_is_no_number() -> None:
-    points = paper().contact_points
-    for bad in (np.inf, np.nan):
-        loads = np.full(len(points), 1.0)
-        loads[3] = bad
-        assert (DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads)).radius == np.inf).all()
-
-
-def test_crowding() -> None:
-    points, radii = np.array([[0.0, 0.0], [3.0, 4.0], [0.0, 2.0]]), np.array([0.1, 1.0, 0.2])
-    operator = DenseInfluence.assemble(points, SCALE)
-    assert operator.crowding(radii) == pytest.approx(1.2 / np.sqrt(13))
-    assert DenseInfluence.assemble(points[:1], SCALE).crowding(radii[:1]) == 0
-    assert operator.smoother(radii) is None
-
-
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.3, 4))
 def test_shell_lemma(seed: int, count: int, shape: float) -> None:
@@ -132,12 +115,6 @@ def test_shell_lemma(seed: int, count: int, shape: float) -> None:
     eigenvalues = np.linalg.eigvalsh(shifted)
     assert eigenvalues[0] >= -1e-13 * eigenvalues[-1]
     assert np.linalg.eigvalsh(matrix)[0] < 0  # so the shift is needed
-
-
-def test_shell_lemma_is_sharp_for_a_pair() -> None:
-    points = np.array([[0.0, 0.0], [1.0, 0.0]])
-    shifted = inverse_distances(points, points) + np.diag(0.5 / shell_radii(points))
-    assert np.linalg.eigvalsh(shifted)[0] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_shells_do_not_overlap() -> None:

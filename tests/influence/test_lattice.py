@@ -1,6 +1,5 @@
 """Lattices found from points, and the coupling on them against exact sums over all pairs."""
 
-import math
 from fractions import Fraction
 from typing import Any
 
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from convexrough.influence.convolution import SiteBox
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -108,27 +106,6 @@ def test_blur_is_a_bound(name: str, shift: float) -> None:
             assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.site_error)
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.floats(0.3, 1.0))
-def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> None:
-    """Also where most sites are empty, except around the middle, where it is looked for."""
-    rng = np.random.default_rng(seed)
-    basis = turned(BASES[name], 0.7)
-    points = patch(basis, 500)
-    kept = rng.random(500) < coverage
-    kept[:30] = True
-    lattice = Lattice.through(points[kept] - points[kept].mean(axis=0))
-    assert lattice is not None
-    assert_spans(lattice, basis)
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(5, 200))
-def test_scattered_points_are_refused(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    assert Lattice.through(rng.uniform(-1, 1, (count, 2))) is None
-
-
 @pytest.mark.parametrize("name", BASES)
 def test_what_is_nearly_a_lattice_is_refused(name: str) -> None:
     points = patch(np.array(BASES[name]), 500)
@@ -141,17 +118,6 @@ def test_what_is_nearly_a_lattice_is_refused(name: str) -> None:
         assert Lattice.through(jittered) is None
     doubled = np.concatenate((points, points[77:78]))
     assert Lattice.through(doubled) is None
-
-
-def test_what_is_no_lattice_is_refused() -> None:
-    points = patch(np.array(BASES["square"]), 40)
-    assert Lattice.through(points[:1]) is None
-    assert Lattice.through(points[:2]) is None
-    assert Lattice.through(np.repeat(points[:1], 5, axis=0)) is None
-    for line in ([1.0, 0.0], [0.3, 0.7]):
-        assert Lattice.through(np.outer(np.arange(9), line)) is None
-    far = np.concatenate((points, [[1e5, 2e5]]))  # far too many sites for the points
-    assert Lattice.through(far) is None
 
 
 # Products.
@@ -249,30 +215,3 @@ def test_fitted_shells_do_not_overlap(
         with np.errstate(divide="ignore"):
             s = SCALE / fitted_shells(A, radii, share)
         assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (17, 23)])
-@pytest.mark.parametrize("power", [1, 2, 3])
-def test_convolutions(shape: tuple[int, int], power: int) -> None:
-    """Also on a box of one row, or one site; and what they lose stays below the bounds."""
-    basis = turned(BASES["hexagonal"], 0.4)
-    box = SiteBox(shape, basis)
-    assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
-    sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
-    inverse = inverse_distances(sites, sites) ** power
-    rng = np.random.default_rng(1)
-    for dtype, roundoff in ((np.float64, ROUNDOFF), (np.float32, 2.0**-24)):
-        kernel = box.kernel(power, dtype)
-        assert kernel.norm >= np.sqrt((inverse**2).sum(axis=1).max()) * (1 - 1e-12)
-        for field in (rng.standard_normal(shape), np.ones(shape), rng.random(shape) ** 20):
-            given = field.astype(dtype)
-            found = box.convolve(given, kernel.spectrum)
-            assert found.dtype == dtype
-            terms = inverse * given.ravel()
-            exact = np.array([math.fsum(row) for row in terms]).reshape(shape)
-            # The kernel itself is rounded before it is transformed; that is counted elsewhere.
-            slack = 24 * ROUNDOFF * power * (inverse @ np.abs(given).ravel()).reshape(shape)
-            lost = np.maximum(np.abs(found - exact) - slack, 0)
-            size = float(np.linalg.norm(given))
-            assert lost.max() <= box.bound(kernel, roundoff) * size

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.typing import NDArray
-from point_layouts import LAYOUTS, disc, jittered
-from scenes import scattered, solve_exactly
+from point_layouts import LAYOUTS, disc
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.bench.scenes import APPROACH, scene
-from convexrough.influence import scattered as scattered_points
 from convexrough.influence import sharp_sums as sharp
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
@@ -205,19 +203,6 @@ def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
         assert found.radius.max() * 0.37 < 0.1 * plain
 
 
-def test_points_that_are_not_known() -> None:
-    rng = np.random.default_rng(8)
-    points, error = jittered(rng), 1e-13
-    moved = points + rng.choice([-error, error], points.shape)
-    loads = rng.random(len(points))
-    found = sums(ScatteredInfluence(points, 1.0, error), loads)
-    exactly = sums(ScatteredInfluence(points, 1.0), loads)
-    with ctx.workprec(200):
-        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 600)]
-    worst = max(float(off.mid()) for off in offs)
-    assert exactly.radius.max() < worst <= found.radius.max()
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
@@ -242,41 +227,3 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     certificate = certify_on(problem, problem.to_scene(loads) * problem.units.force)
     assert certificate.scope == "local"
     assert certificate.load_error < 1e-11 * loads.max() * problem.units.force
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("by_load", [False, True])
-def test_fifty_digits_through_a_mesh(
-    seed: int, geometry: Any, by_load: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Few asperities, made to go by a mesh: bounds against the truth, of good loads and of poor."""
-    made, approach = scattered(seed, 24, 0.5, 0.3)
-    given = cr.Scene(
-        made.sphere_radius, made.asperities, made.material, friction=0.5, geometry=geometry
-    )
-
-    def meshed(cls: Any, points: Array, power: int, tolerance: float) -> Splitting:
-        extent = float(np.ptp(points, axis=0).max())
-        return Splitting(Softened(power, 26, 0.4 * extent), 0.01 * extent, 20)
-
-    monkeypatch.setattr(Splitting, "choose", classmethod(meshed))
-    monkeypatch.setattr(scattered_points, "FEW", 0)
-    first = cr.press(given, approach=approach, influence="scattered")
-    control = {"load": first.load} if by_load else {"approach": approach}
-    contact = cr.press(given, influence="scattered", **control)
-    problem = NormalProblem.assemble(given, influence="scattered", **control)
-    loads = contact.loads[problem.candidates] / problem.units.force
-    assert problem.influence.sums(Pair.exact(loads)) is not None
-    exactly = solve_exactly(given, **control)
-    rng = np.random.default_rng(seed)
-    for off in (0.0, 1e-15, 1e-12, 1e-6):
-        judged = contact.loads * (1 + off * rng.standard_normal(len(given)))
-        certificate = certify_on(problem, judged)
-        assert certificate.scope != "none"
-        errors = np.abs(multiprecision.errors(judged, exactly.loads))
-        assert (errors <= certificate.load_errors).all()
-        gaps = np.abs(multiprecision.errors(certificate.gaps, exactly.gaps))
-        assert (gaps <= certificate.gap_errors).all()
-        assert certificate.load_error < (3e-13 + 30 * off) * judged.max()

@@ -17,14 +17,6 @@ def test_coordinates_too_small(size: float) -> None:
         cr.Asperities(HEXAGON * size, 1.0)
 
 
-@pytest.mark.parametrize("size", [1e-61, 1e-130, 5e-324])
-def test_tip_radii_and_heights_too_small(size: float) -> None:
-    with pytest.raises(cr.InputError, match=r"tip_radii\[1\]: found .* choose other units"):
-        cr.Asperities([[0, 0], [1, 0]], [1.0, size])
-    with pytest.raises(cr.InputError, match=r"heights\[0\]: found .* choose other units"):
-        cr.Asperities([[0, 0], [1, 0]], 1.0, [-size, 0.0])
-
-
 @pytest.mark.parametrize("exponent", [-59, -70, -140])
 def test_contact_points_too_near_to_each_other(exponent: int) -> None:
     """Reached by "closest" from positions of a good size: no status, and no search without end."""

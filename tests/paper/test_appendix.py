@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scenes import PAPER_APPROACH, paper
 from scipy.optimize import brentq
 
@@ -49,15 +49,3 @@ def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
     error = state.contact.model_error * abs(state.displacement)
     assert_allclose(appendix.slips(state), state.slips, rtol=0, atol=2 * error)
     assert not np.allclose(appendix.slips(state), state.slips, rtol=0, atol=0.01 * error)
-
-
-@pytest.mark.parametrize("nu", RATIOS)
-def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
-    contact = pressed(nu)
-    for t in (1e-9, 0.1, 0.35):
-        Q = t * 0.5 * contact.load
-        cycle = cr.cycle(contact, maximum=Q)
-        assert appendix.cycle_energy(contact, Q) == pytest.approx(cycle.loss, rel=1e-13)
-        state = cr.shear(contact, force=-Q)
-        assert_array_equal(appendix.slips(state), 0.0)
-        assert_allclose(appendix.energies(state), cycle.asperity_losses, rtol=1e-12)

@@ -1,12 +1,10 @@
 """Figures of load paths: they show the numbers of the results, and nothing in them collides."""
 
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import discs, fits, texts
+from figure_checks import discs, fits
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, follow
 
@@ -17,35 +15,6 @@ from convexrough.plots.asperity_map import LOOKS
 P = LARGEST["paper"]
 UNITS = ("µm", "mN")
 NAMED = replace(PAPER, units=UNITS)
-
-
-def limit(name: str) -> cr.Shakedown:
-    swing = 0.5 * P * np.array([1.0, -1.0])
-    if name == "ellipse":
-        p, q = cr.elliptic_path(
-            load=0.0, load_amplitude=0.09 * P, force_amplitude=0.09 * P, phase=0.8, friction=0.5
-        )
-        return cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q)
-    given: Any = {
-        "constant": {"force_amplitudes": swing},
-        "about a mean": {"forces": 0.1 * P, "force_amplitudes": swing},
-        "elastic": {"force_amplitudes": swing, "kind": "elastic"},
-        "vector": {"force_amplitudes": np.column_stack((swing, 0 * swing)), "kind": "vector"},
-    }[name]
-    return cr.shakedown(NAMED, loads=P, **given)
-
-
-@cache
-def losses() -> cr.PhaseLosses:
-    return cr.phase_losses(
-        NAMED,
-        load=0.7 * P,
-        load_amplitude=0.2 * P,
-        force_amplitude=0.14 * P,
-        phases=np.linspace(0, np.pi, 3),
-        factors=[0.5, 1.0],
-        chords=6,
-    )
 
 
 def test_the_path_and_its_memory_are_drawn() -> None:
@@ -76,25 +45,3 @@ def test_what_a_closed_path_settles_to() -> None:
     assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
     for status in LOOKS:
         assert discs(place, status) == int((found.status == status).sum())
-
-
-def test_losses_against_phase_are_drawn() -> None:
-    found = losses()
-    figure = plots.phase_figures(found)["phase_losses"]
-    fits(figure)
-    (axes,) = figure.axes
-    half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
-    assert_allclose(half / whole, found.losses[:3] * 8 / found.losses[3:])
-    assert axes.get_ylabel().endswith("J]")
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse", "elastic", "vector"])
-def test_limits_are_drawn(name: str) -> None:
-    found = limit(name)
-    figures = plots.shakedown_figures(found)
-    assert set(figures) == {"shakedown"} | ({"shakedown_map"} if found.kind == "exact" else set())
-    for figure in figures.values():
-        fits(figure)
-    (said,) = [text for text in texts(figures["shakedown"]) if ":" in text.get_text()][:1]
-    assert f"{found.kind}: {found.factor:.5g}" in said.get_text()

@@ -13,10 +13,9 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough
 
 import convexrough as cr
-from convexrough import fields, plots
+from convexrough import plots
 from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import SLIDING
-from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
 UNITS = ("µm", "mN")
@@ -59,14 +58,6 @@ def of_paper(name: str) -> dict[str, Figure]:
     return paper_figures(contact(f"{name} in units"))
 
 
-def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
-    """The state with doubt cast on the last of its touching asperities."""
-    status = state.status.copy()
-    status[np.flatnonzero(state.contact.loads)[-count:]] = "undecided"
-    certificate = dataclasses.replace(state.certificate, scope=scope, status=status)
-    return dataclasses.replace(state, certificate=certificate)
-
-
 # --- nothing collides -----------------------------------------------------------------------------
 
 
@@ -107,6 +98,14 @@ def test_discs_have_the_radii_of_the_state() -> None:
     assert_allclose(lines["sliding"].get_facecolor(), [to_rgba(SLIDING)])
 
 
+def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
+    """The state with doubt cast on the last of its touching asperities."""
+    status = state.status.copy()
+    status[np.flatnonzero(state.contact.loads)[-count:]] = "undecided"
+    certificate = dataclasses.replace(state.certificate, scope=scope, status=status)
+    return dataclasses.replace(state, certificate=certificate)
+
+
 @pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
 def test_doubt_is_marked(scope: str, count: int) -> None:
     state = doubted(states("paper", [0.5])[0], scope, count)
@@ -118,37 +117,6 @@ def test_doubt_is_marked(scope: str, count: int) -> None:
 
 
 # --- cycles ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize(
-    ("maximum", "minimum"), [(0.5, -0.5), (0.9, -0.1), (0.1, -0.9), (1.0, -1.0), (0.6, 0.2)]
-)
-def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
-    (cycle,) = steady("paper", [maximum], [minimum])
-    whole = plots.cycle_figures([cycle])["hysteresis"].axes[0]
-    sphere = smooth(cycle.contact.scene, load=cycle.contact.load)
-    unit = sphere.energy_scale / (sphere.largest_force * sphere.displacement(sphere.largest_force))
-    for line, loss in zip(
-        whole.lines, (cycle.loss_normalised, cycle.smooth_normalised), strict=True
-    ):
-        x, q = np.asarray(line.get_data(), dtype=float)
-        assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
-        assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
-
-
-def test_the_loss_is_that_of_the_cycles() -> None:
-    cycles = steady("paper", [0.5, 0.1, 0.0, 0.37])
-    loss, ratio = plots.cycle_figures(cycles)["loss"].axes
-    sphere, points = loss.lines
-    t, e = np.asarray(sphere.get_data(), dtype=float)
-    assert_allclose(e, mindlin.loss(t), rtol=1e-12)
-    x, w = np.asarray(points.get_data(), dtype=float)
-    assert_allclose(x, [0.1, 0.37, 0.5], rtol=1e-12)  # no loss at 0
-    assert_allclose(w, [cycles[i].loss_normalised for i in (1, 3, 0)], rtol=1e-12)
-    y = np.asarray(ratio.lines[1].get_ydata(), dtype=float)
-    assert_allclose(y, w / mindlin.loss(x), rtol=1e-12)
-    assert "loss" not in plots.cycle_figures(cycles[:1])
 
 
 # --- histories ------------------------------------------------------------------------------------
@@ -171,35 +139,6 @@ def test_the_path_passes_through_every_step() -> None:
 
 
 # --- the paper's figures --------------------------------------------------------------------------
-
-
-def test_the_traction_drawn_is_the_field() -> None:
-    _, profile, _ = of_paper("paper")["fig5_traction"].axes
-    (state,) = states("paper", [0.5])
-    lines = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
-    a, c = state.contact.contact_radii[0], state.stick_radii[0]
-    mega = 1e-3  # Pa, of mN/µm²
-    x, q = lines["$q$"]
-    points = np.column_stack((x * a, 0 * x))
-    assert_allclose(q, fields.traction(state, points) / mega, rtol=1e-9, atol=1e-12)
-    assert x[q.argmax()] == pytest.approx(-c / a, abs=1e-9) or x[q.argmax()] == pytest.approx(c / a)
-    _, fp = lines["$fp$"]
-    slipping = np.abs(x) > c / a * (1 + 1e-9)
-    assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
-
-
-def test_the_crossing_is_marked_where_it_is() -> None:
-    _, zoom = of_paper("paper")["fig9_energy"].axes
-    (mark,) = [line for line in zoom.lines if line.get_label() == "_crossing"]
-    t, w = (float(np.ravel(v)[0]) for v in mark.get_data())
-    (cycle,) = steady("paper", [t])
-    assert t == pytest.approx(0.3877, abs=1e-4)
-    assert cycle.loss_normalised == pytest.approx(cycle.smooth_normalised, rel=3e-4)
-    smallest = 1e-6  # fJ, of mN µm
-    assert w * smallest == pytest.approx(cycle.loss, rel=1e-3)
-    said = " ".join(text.get_text() for text in zoom.texts)
-    assert "0.388" in said
-    assert "paper's\ngraph: about 0.37" in said
 
 
 # --- nothing touches ------------------------------------------------------------------------------

@@ -1,13 +1,11 @@
 """The figures of a surface say what the surface says, and nothing in them collides."""
 
-import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
-from numpy.testing import assert_allclose
 from scenes import MATERIAL
 
 import convexrough as cr
-from convexrough.plots import provability_figure, surface_figures
+from convexrough.plots import surface_figures
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384, unit="µm")
 MAXIMA = MAP.summits(0.0)
@@ -42,30 +40,3 @@ def test_figures_fit(load: float) -> None:
     pairs, _ = cr.surface.crowded(contact)
     named = {f"{i}, {j}" for i, j in pairs[:1]}
     assert named <= said(figures["map"])
-
-
-def test_a_map_alone() -> None:
-    figures = surface_figures(MAP, MAXIMA, MAXIMA.pruned(0.05))
-    assert set(figures) == {"map", "histograms"}
-    for figure in figures.values():
-        fits(figure)
-    chart = figures["map"].axes[0]
-    assert chart.get_xlabel() == "$x$  [µm]"
-    assert_allclose(chart.get_xlim(), (-192, 192))
-    shown = chart.images[0].get_array()
-    np.testing.assert_array_equal(shown, MAP.heights)
-    dots = chart.lines[0].get_xydata()
-    np.testing.assert_array_equal(dots, MAXIMA.pruned(0.05).positions)
-
-
-def test_the_curve_is_drawn_where_it_is() -> None:
-    curve = cr.surface.provability(MAXIMA, press)
-    figure = provability_figure(curve, 0.05, "µm")
-    upper, middle, lower = figure.axes
-    at, contacts = upper.lines[1].get_data()
-    assert_allclose(np.square(at), curve.prune, atol=1e-15)
-    assert_allclose(contacts, curve.contacts)
-    assert_allclose(middle.lines[0].get_ydata(), curve.crowding)
-    assert_allclose(lower.lines[0].get_ydata(), 100 * curve.model_error)
-    title = upper.get_title(loc="left")
-    assert title.startswith(f"advised pruning: at least {100 * curve.trusted_from:.3g} %")

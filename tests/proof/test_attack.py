@@ -32,7 +32,7 @@ Forgery = Callable[[random.Random, Any], Any]
 
 @cache
 def honest() -> list[Any]:
-    """Small proofs of every kind: controls, geometries, arguments, scopes, order, a graze."""
+    """Small proofs of every kind: controls, geometries, arguments, scopes, order."""
     six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
     heights = [0, -2e-6, -4e-6, -6e-6, -1e-5, -1.5e-5, -3e-5]  # the last is open
     ring = cr.Asperities(0.0025 * np.array([[0, 0], *six]), 0.02, heights)
@@ -45,40 +45,14 @@ def honest() -> list[Any]:
             proofs.append(each.proof(sheared=[cr.shear(each, force=Q) for Q in forces]))
     lifted = cr.press(shaded(), load=2.96)
     proofs.append(lifted.proof(sheared=[cr.shear(lifted, force=0.4 * lifted.load)]))
-    grazed = grazing()
-    rough = grazed.loads * [1, 1 + 1e-12, 1]
-    proofs.append(prove(grazed.scene, rough, approach=grazed.approach))
+    loads = cr.press(lifted.scene, load=2.96).loads * (1 + 1e-3 * (np.arange(6) == 0))
+    proofs.append(prove(lifted.scene, loads, load=2.96))
     proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
     documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
     by_cholesky = deepcopy(documents[-1])
     by_cholesky["argument"] |= {"shells": None, "convexity_number": (0.999).hex()}
     documents.append(by_cholesky)
-    assert {document["argument"]["shells"] is None for document in documents} == {True, False}
-    assert {document["claims"]["scope"] for document in documents} == {"global", "local"}
-    statuses = {status for document in documents for status in statuses_in(document["claims"])}
-    assert statuses == {"contact", "open", "undecided", "sliding", "partial"}
     return documents
-
-
-def statuses_in(claims: Any) -> set[str]:
-    return {status for table in (claims, *claims["shear"]) for status in table["status"]}
-
-
-def grazing() -> cr.Contact:
-    """The middle of three touches by less than a roundoff of the approach, if at all."""
-    points = np.array([[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]])
-
-    def pressed(height: float) -> cr.Contact:
-        asperities = cr.Asperities(points, 0.02, [height, 0.0, 0.0])
-        return cr.press(
-            cr.Scene(1.0, asperities, scenes.MATERIAL, geometry="summit"), approach=3e-5
-        )
-
-    low, high = -3e-5, 0.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if pressed(middle).loads[0] == 0 else (low, middle)
-    return pressed(high)
 
 
 def crowded(*sampled: float) -> cr.Contact:
@@ -90,13 +64,7 @@ def leaves(tree: Any, at: Place = ()) -> list[Place]:
     """Where the strings are."""
     if isinstance(tree, str):
         return [at]
-    items = (
-        tree.items()
-        if isinstance(tree, dict)
-        else enumerate(tree)
-        if isinstance(tree, list)
-        else ()
-    )
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree or ())
     return [path for key, value in items for path in leaves(value, (*at, key))]
 
 
@@ -115,16 +83,13 @@ def a_number(rng: random.Random, document: Any, *under: str) -> Place:
     return rng.choice([(*under, *p) for p in leaves(start) if "0x" in look(start, p)])
 
 
-def one_digit(rng: random.Random, document: Any) -> Any:
-    path = a_number(rng, document)
-    text = look(document, path)
-    place = rng.randrange(len(text))
-    put(document, path, text[:place] + rng.choice("0123456789abcdef-+px.") + text[place + 1 :])
-    return document
-
-
-def one_number(rng: random.Random, document: Any, *under: str) -> Any:
-    path = a_number(rng, document, *under)
+def one_number(rng: random.Random, document: Any) -> Any:
+    part = rng.choice([(), ("claims",), ("scene",), ("prescribed",)])
+    path = a_number(rng, document, *part)
+    if rng.random() < 0.2:
+        odd = ["nan", "0x1.8p+99999", "1e-3", "", None, 1, [], {}, (5e-324).hex(), (1e150).hex()]
+        put(document, path, rng.choice([*odd, (0.0).hex(), (-1.0).hex()]))
+        return document
     value = float.fromhex(look(document, path))
     change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
     changed = value * (1 + change) if value else change * 1e-9
@@ -132,10 +97,6 @@ def one_number(rng: random.Random, document: Any, *under: str) -> Any:
         changed = float(np.nextafter(value, rng.choice([-np.inf, np.inf])))
     put(document, path, changed.hex())
     return document
-
-
-def one_claim(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "claims")
 
 
 def tighter_bound(rng: random.Random, document: Any) -> Any:
@@ -157,12 +118,6 @@ def one_status(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def several_statuses(rng: random.Random, document: Any) -> Any:
-    statuses = document["claims"]["status"]
-    rng.shuffle(statuses)
-    return document
-
-
 def swapped_part(rng: random.Random, document: Any) -> Any:
     """All that another proof claims, or its scene, what it prescribes, its friction."""
     other = deepcopy(rng.choice(honest()))
@@ -171,14 +126,6 @@ def swapped_part(rng: random.Random, document: Any) -> Any:
     if part == "sheared":
         document["claims"]["shear"] = other["claims"]["shear"]
     return document
-
-
-def changed_scene(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "scene")
-
-
-def changed_control(rng: random.Random, document: Any) -> Any:
-    return one_number(rng, document, "prescribed")
 
 
 def changed_box(rng: random.Random, document: Any) -> Any:
@@ -195,77 +142,19 @@ def changed_box(rng: random.Random, document: Any) -> Any:
 
 
 def changed_radii(rng: random.Random, document: Any) -> Any:
-    places = [entry["held"] for entry in document["sheared"]]
-    place = rng.choice([document["pressed"], *places])
+    place = rng.choice([document["pressed"], *(each["held"] for each in document["sheared"])])
     radii = place["radii"]
-    if rng.random() < 0.3:
-        rng.shuffle(radii)
-    else:
-        radii[rng.randrange(len(radii))] = rng.choice(
-            [[(0.0).hex()], rng.choice(radii), [(1e-3).hex()], []]
-        )
-    return document
-
-
-def changed_friction(rng: random.Random, document: Any) -> Any:
-    entries = document["sheared"]
-    what = rng.choice(["order", "fewer", "force", "radii"])
-    if what == "order":
-        entries.reverse()
-    elif what == "fewer":
-        entries.pop()
-    elif what == "force":
-        return one_number(rng, document, "sheared", rng.randrange(len(entries)), "force")
-    else:
-        entries[0]["held"]["radii"] = document["pressed"]["radii"]
-    return document
-
-
-def no_number(rng: random.Random, document: Any) -> Any:
-    values: list[Any] = ["nan", "inf", "-inf", "0x1.8p+99999", "0x1p-5000", "1e-3", "0X1.8P+1"]
-    values += ["", " 0x1.0000000000000p+0", "0x1p+0"]
-    values += [None, 1, 0.5, True, [], {}, float("nan"), 10**400]
-    put(document, a_number(rng, document), rng.choice(values))
-    return document
-
-
-def huge_number(rng: random.Random, document: Any) -> Any:
-    value = rng.choice([1.7e308, 5e-324, 1e150, 1e-150, 0.0, -0.0, -1.0])
-    put(document, a_number(rng, document), value.hex())
-    return document
-
-
-def missing_or_more(rng: random.Random, document: Any) -> Any:
-    tables = [(), *{p[:k] for p in leaves(document) for k in range(1, len(p))}]
-    place = look(document, rng.choice(sorted(tables, key=str)))
-    if isinstance(place, dict):
-        if rng.random() < 0.5:
-            place.pop(rng.choice(sorted(place)))
-        else:
-            place["note"] = "believe me"
-    elif rng.random() < 0.5:
-        place.pop()
-    else:
-        place.append(deepcopy(place[0]))
+    radii[rng.randrange(len(radii))] = rng.choice([[(0.0).hex()], rng.choice(radii), []])
     return document
 
 
 FORGED: tuple[Forgery, ...] = (
-    one_digit,
     one_number,
-    one_claim,
     tighter_bound,
     one_status,
-    several_statuses,
     swapped_part,
-    changed_scene,
-    changed_control,
     changed_box,
     changed_radii,
-    changed_friction,
-    no_number,
-    huge_number,
-    missing_or_more,
 )
 
 
@@ -285,23 +174,9 @@ def forged(rng: random.Random) -> tuple[str, bytes]:
     contents = json.dumps(document).encode()
     if rng.random() < 0.1:
         names.append("torn")
-        contents = torn(rng, contents)
+        place = rng.randrange(len(contents))
+        contents = rng.choice([contents[:place], contents[:place] + contents[place + 1 :]])
     return "+".join(names), contents
-
-
-def torn(rng: random.Random, contents: bytes) -> bytes:
-    place = rng.randrange(len(contents))
-    return rng.choice(
-        [
-            contents[:place],
-            contents[:place] + bytes([rng.randrange(256)]) + contents[place + 1 :],
-            contents[:place] + contents[place + 1 :],
-            contents + b"{}",
-            b"\xef\xbb\xbf" + contents,
-            contents[:-1] + b', "claims": {}}',
-            b"[" * 100000,
-        ]
-    )
 
 
 def judge(seed: int, folder: Path) -> str:

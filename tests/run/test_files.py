@@ -1,4 +1,4 @@
-"""Scene files, CSV in and out, results on disk."""
+"""How wide arrays are by default, and results on disk."""
 
 import json
 from pathlib import Path
@@ -9,34 +9,15 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
-from convexrough.atomic import replacing, to_json
-from convexrough.run import results
-from convexrough.run.results import MANIFEST, results_folder, write_results
+from convexrough.atomic import replacing
+from convexrough.run.results import MANIFEST, results_folder
 from convexrough.run.scene_file import read_scene
-from convexrough.run.stages import NormalStage
-from convexrough.tabular.table import read_table
-from convexrough.verdict.claims import Manner, read_loads
-
-COLUMNS = ("x", "y", "height", "tip_radius", "load", "contact_radius", "gap", "status",
-           "load_error")  # fmt: skip
 
 
 def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
     path = tmp_path / "scene.toml"
     path.write_text(scene_text(*parts, **tables), encoding="utf-8")
     return read_scene(path)
-
-
-def small_scene() -> cr.Scene:
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.006, height_std=1e-6, tip_radius_cv=0.1, seed=2
-    )
-    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit")
-
-
-@pytest.fixture(scope="module")
-def contact() -> cr.Contact:
-    return cr.press(small_scene(), approach=2e-5)
 
 
 # What `within` is when the file does not say
@@ -64,30 +45,6 @@ def test_the_default_within_loses_no_asperity(
 
 
 # Results
-
-
-def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    found = [NormalStage(approach=contact.approach).compute(contact)]
-    paths = write_results(folder, found, figures=figures)
-    assert all(path.stat().st_size > 0 for path in paths)
-    assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
-    return [path.name for path in paths]
-
-
-def test_results_read_back_the_same(tmp_path: Path, contact: cr.Contact) -> None:
-    assert written(tmp_path, contact) == ["summary.json", "asperities.csv"]
-    path = tmp_path / "asperities.csv"
-    assert path.read_text().splitlines()[0] == ",".join(COLUMNS)
-    wanted = ("x", "y", "height", "tip_radius", "load")
-    columns = read_table(path, required=wanted).columns
-    asperities = contact.scene.asperities
-    assert np.array_equal(np.column_stack((columns["x"], columns["y"])), asperities.positions)
-    assert np.array_equal(columns["height"], asperities.heights)
-    assert np.array_equal(columns["tip_radius"], asperities.tip_radii)
-    assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
-    normal = json.loads((tmp_path / "summary.json").read_text())["normal"]
-    assert normal["contact"] == int((contact.status == "contact").sum())
-    assert normal["certificate"]["load_error"] == contact.certificate.load_error
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -130,25 +87,3 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
         write(KeyboardInterrupt(), "2", force=True)
     assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
     assert (folder / "one.csv").read_text() == "1"
-
-
-def test_json_has_no_infinities() -> None:
-    summary: Any = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
-    assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}
-
-
-def test_many_asperities_go_to_npz(
-    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(results, "MOST_CSV_ROWS", len(contact.loads) - 1)
-    assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
-    path = tmp_path / "asperities.npz"
-    with np.load(path) as arrays:
-        assert tuple(arrays) == COLUMNS
-        assert arrays["status"].tolist() == contact.status.tolist()
-    assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
-
-
-def test_one_fraction_is_a_list_of_one(tmp_path: Path) -> None:
-    more = "[friction]\ncoefficient = 0.5\n[cycle]\nmaximum_fraction = 0.5\n"
-    assert read(tmp_path, more=more).stages["cycle"].maximum_fraction == [0.5]

@@ -1,4 +1,4 @@
-"""Load paths in scene files: tables, files, figures, and mistakes in words."""
+"""Load paths in scene files: tables, files, and what is not proved."""
 
 import csv
 import json
@@ -50,78 +50,6 @@ def test_a_run(command: Any) -> None:
     for name in ("steady", "shakedown"):
         with Path(f"out/{name}.csv").open() as file:
             assert len(list(csv.DictReader(file))) == 61
-
-
-def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
-    """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
-    normal = "load = 3e-8"
-    path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
-
-    def run(within: str) -> tuple[cr.Contact, Any, list[str]]:
-        file = tmp_path / "scene.toml"
-        file.write_text(scene_text(HEXAGONAL + within, normal=normal, more=path))
-        scene = cr.read_scene(file)
-        contact = scene.press()
-        return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
-
-    (pressed, grown, said), (_, whole, _) = run(""), run("within = 0.03")
-    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (121, 13)
-    assert not said
-    assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
-    *_, narrow = run("within = 0.0067")
-    assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            "[path]\nloads = [3e-10, 3e-10]\nforces = [0, 1e-10]",
-            "[path] has loads up to 3e-10, and",
-        ),
-        ("[steady]\nellipse = { load = 3e-4, force_amplitude = 3e-5 }", "[steady] has loads up to"),
-        ("[shakedown]\nloads = 3e-4\nforce_amplitudes = [1e-5, 0.0]", "[shakedown] has loads"),
-        (
-            "[path]\nloads = [3e-7, 3e-7]\nforces = [0, 1e-10]",
-            "[path] has shear forces up to 1e-10",
-        ),
-    ],
-)
-def test_loads_that_do_not_fit_those_of_normal(tmp_path: Path, table: str, message: str) -> None:
-    """They are told before anything is computed from them."""
-    file = tmp_path / "scene.toml"
-    text = scene_text(HEXAGONAL + "within = 0.0102", normal="load = 3e-7", more=FRICTION)
-    file.write_text(text + table)
-    scene = cr.read_scene(file)
-    assert any(each.startswith(message) for each in scene.cautions(scene.press()))
-
-
-def test_factors_of_amplitudes_count_in_the_largest_load(tmp_path: Path) -> None:
-    ellipse = "{ load = 3e-7, load_amplitude = 1e-7, force_amplitude = 1e-8 }"
-    steady = f"[steady]\nellipse = {ellipse}\nphases = [0.5]\nfactors = [0.5, 2.0]\n"
-    file = tmp_path / "scene.toml"
-    file.write_text(scene_text(HEXAGONAL, normal="load = 3e-7", more=FRICTION + steady))
-    assert cr.read_scene(file).stages["steady"].highest_load == pytest.approx(5e-7)
-
-
-def test_a_limit_for_forces_along_x_and_y(command: Any) -> None:
-    table = """
-[shakedown]
-loads = 2.0
-force_amplitudes = [[0.0, 1.0], [0.0, -1.0]]
-kind = "vector"
-reference = 1.80426694373333e-07
-"""
-    Path("scene.toml").write_text(SCENE + table)
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 0, outcome.err
-    limit = json.loads(Path("out/summary.json").read_text())["shakedown"]
-    assert limit["factor"] == pytest.approx(0.2419789620, rel=1e-9)
-    assert limit["lower"] < limit["factor"] < limit["upper"]
-    assert limit["proved"] is True
-    assert "shakedown  (vector)" in outcome.out
-    columns = Path("out/shakedown.csv").read_text().splitlines()[0].split(",")
-    assert columns[-4:] == ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
 
 
 SHADED = scene_text(
@@ -206,3 +134,23 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
                 several[k] = replace(found, order="proved for one step")
                 (said,) = replace(result, found=tuple(several)).doubts()
                 assert said.startswith(f"not proved: the losses of [{result.name}], as")
+
+
+def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
+    """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
+    normal = "load = 3e-8"
+    path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
+
+    def run(within: str) -> tuple[cr.Contact, Any, list[str]]:
+        file = tmp_path / "scene.toml"
+        file.write_text(scene_text(HEXAGONAL + within, normal=normal, more=path))
+        scene = cr.read_scene(file)
+        contact = scene.press()
+        return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
+
+    (pressed, grown, said), (_, whole, _) = run(""), run("within = 0.03")
+    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (121, 13)
+    assert not said
+    assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
+    *_, narrow = run("within = 0.0067")
+    assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]

@@ -18,7 +18,6 @@ hardness = 8e3
 youngs_modulus = 70e3
 poisson_ratio = 0.33
 """
-BASE = TWO.index("[material.base]")
 
 
 def layout(keys: str, normal: str = "approach = 5e-5", more: str = "") -> str:
@@ -50,63 +49,38 @@ ELLIPSE = "ellipse = {load = 1.0, force_amplitude = 0.1, phase = "
 MISTAKES = [
     # [asperities]
     (layout("spacing = -0.1"), "[asperities] spacing: found -0.1, expected a positive number"),
-    (layout("spacing = nan"), "[asperities] spacing: found nan, expected a positive number"),
-    (layout("spacing = true"), "[asperities] spacing: found true, expected a positive number"),
     (layout("spacing = 1e-61"), "[asperities] spacing: found 1e-61, expected a size from 1e-60"),
     (layout("spacing = 1\nspaceing = 1"),
      '[asperities] spaceing: unknown key, did you mean "spacing"?'),
-    (layout("spacing = 1\nzzz = 1"), "[asperities] zzz: unknown key, valid: pattern, spacing,"),
     (layout("spacing = 1\ntip_radius = [1, -2]"),
      "[asperities] tip_radius[1]: found -2, expected a positive"),
     (layout("spacing = 1\nheight_std = 1"), "[asperities] seed: missing, needed with height_std"),
     (layout("spacing = 1\ntip_radius_cv = 10\nseed = 1"),
      "[asperities] tip_radius_cv: found 10, expected a standard deviation over the mean"),
-    (layout("spacing = 1\nseed = 1.5"), "[asperities] seed: found 1.5, expected a whole number"),
-    (layout("spacing = 1\nwithin = -1"),
-     "[asperities] within: found -1, expected a number that is not negative"),
-    (layout("spacing = 1\ngeometry = 3"),
-     '[asperities] geometry: found 3, expected "summit" or "closest"'),
     (layout('spacing = 1\npath = "a.csv"'), "[asperities] path: not used with this pattern"),
-    (layout(""), "[asperities] spacing: missing"),
     (layout("spacing = 1e-9\ntip_radius = 1"), "[asperities] within / spacing = 1.41e+07: found 7"),
     (layout("spacing = 0.0025\ntip_radius = 1", "approach = 0.1", '[solver]\ninfluence = "dense"'),
      "asperities that could touch"),
     # [sphere] and [material]
     (sphere("[1.0, -2.0]"), "[sphere] radius[1]: found -2.0, expected a positive number, or"),
-    (sphere("1e99"), "[sphere] radius: found 1e+99, expected a size from"),
     (sphere("inf"), "[asperities] within: missing, needed with a flat"),
-    (sphere("[inf, 1.0]"), "[asperities] within: missing, needed with a flat"),
     (bodies(f"contact_modulus = 1.0\n{TWO}"),
      "[material] contact_modulus: not used with two bodies"),
     (bodies(TWO.replace("70e3", "-70e3")),
      "[material] base.youngs_modulus: found -70000.0, expected a positive number"),
-    (bodies(TWO.replace("hardness", "hardnes")),
-     '[material] sphere.hardnes: unknown key, did you mean "hardness"?'),
-    (bodies(f"sphere = 3\n{TWO[BASE:]}"), "[material] sphere: found 3, expected a table"),
-    (bodies(TWO[:BASE]), "[material] base: missing"),
-    (bodies(TWO.replace("poisson_ratio = 0.33\n", "")), "[material] base.poisson_ratio: missing"),
     (layout("spacing = 1\ntip_radius = [1, 2]", "load = 1"),
      "[asperities] within: missing, needed with a list of tip radii under a given load"),
     (scene_text(more=PASCALS), "[material] contact_modulus: found 1 N/m², which is 1 Pa, expected"),
-    (bodies(TWO.replace("8e3", "8")) + PASCALS, "[material.sphere] hardness: found 8 N/m², which"),
     # [normal], [solver], [units], and which tables there are
     (scene_text(normal=""), "[normal] approach, load: found neither, expected exactly one of the"),
-    (scene_text(normal="approach = 1\nload = 1"),
-     "[normal] approach, load: found both, expected exactly"),
-    (scene_text(normal="load = 0"), "[normal] load: found 0, expected a positive number"),
-    (scene_text(normal="approach = nan"), "[normal] approach: found nan, expected a finite number"),
     (scene_text(more="[frictoin]"), '[frictoin]: unknown table, did you mean "friction"?'),
     (scene_text(more="[shear]\nfractions = [0.1]"),
      "[friction]: missing table, needed with [shear]"),
     (scene_text(more="[solver]\nname = 'newtn'"),
      "[solver] name: found 'newtn', expected one of"),
-    (scene_text(more='[solver]\ninfluence = "fft"'), "[solver] influence: found 'fft'"),
-    (scene_text(more="[units]\nlength = 1"), "[units] length: found 1, expected text in quotes"),
     # stages
     (stage("[shear]\nfractions = [0.1, -0.1]"),
      "[shear] fractions[1]: found -0.1, expected a number from 0 to 1"),
-    (stage("[shear]\nfractions = []"),
-     "[shear] fractions: found [], expected a list of numbers from 0 to 1"),
     (stage("[history]\nfractions = [1.1]"),
      "[history] fractions[0]: found 1.1, expected a number from -1 to 1"),
     (stage("[cycle]\nmaximum_fraction = [0.1, 0.2]\nminimum_fraction = [0]"),
@@ -115,62 +89,37 @@ MISTAKES = [
      "[cycle] maximum_fraction[0]: found 0.1, expected a number above its minimum, 0.1"),
     (stage(f"{LOOPS}points = 3"),
      "[cycle] loop_points: found 3, expected a whole number, at least 4"),
-    (stage(f'{LOOPS}asperities = "some"'),
-     "[cycle] loop_asperities: found 'some', expected \"all\" or"),
-    (stage(f"{LOOPS}asperities = [-1]"), "[cycle] loop_asperities"),
     (stage(f"{LOOPS}asperities = [61]"),
      "[cycle] loop_asperities[0]: found 61, expected an index from 0"),
-    (stage("[path]\nloads = [1e-7]"), "[path] loads, forces: missing"),
     (stage("[path]\nloads = [1e-7]\nforces = [0.0, 0.0]"),
      "[path] loads, forces: found 1 and 2 values"),
-    (stage("[path]\nloads = [-1e-7]\nforces = [0.0]"),
-     "[path] loads[0]: found -1e-07, expected a number that is not negative"),
     (stage("[path]\nloads = [1e-7]\nforces = [1e-7]"), "[path]: forces[0]"),
-    (stage("[steady]\nloads = []\nforces = []"),
-     "[steady] loads, forces: found 0 and 0 values, expected equally many, at least one"),
     (stage(f"[steady]\n{ELLIPSE}90}}"), f"[steady] ellipse.phase: found 90, {DEGREES}"),
     (stage(f"[steady]\n{ELLIPSE}0.0}}\nphases = [3.1416, 180.0]"),
      f"[steady] phases[1]: found 180.0, {DEGREES}"),
-    *(
-        (stage(f'[shakedown]\nloads = 1e-8\nforce_amplitudes = {none}\nkind = "{kind}"'),
-         f"[shakedown]: force_amplitudes: found {found}, expected a path that moves")
-        for none, found in (("[]", "none"), ("[0.0]", "one point")) for kind in ("exact", "elastic")
-    ),
+    (stage("[shakedown]\nloads = 1e-8\nforce_amplitudes = [0.0]"),
+     "[shakedown]: force_amplitudes: found one point, expected a path that moves"),
     (stage('[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"'),
      "[shakedown] kind: found 'x', expected \"exact\", \"elastic\" or \"vector\""),
     (stage("[shakedown]\nloads = 1\nforce_amplitudes = [[1, 0]]"),
      "[shakedown] force_amplitudes[0]: found [1.0, 0.0], expected a number with this kind"),
-    (stage(f"{VECTOR}[1.0]"),
-     "[shakedown] force_amplitudes[0]: found 1.0, expected a pair [x, y]"),
     (stage(f"{VECTOR}[[1, 0]]\nforces = 0.1"),
      "[shakedown] forces: found 0.1, expected a pair [x, y]"),
-    (stage(f"{VECTOR}[[1, 0, 0]]"),
-     "[shakedown] force_amplitudes[0]: found [1, 0, 0], expected a pair [x, y] of finite numbers"),
     (stage('[gradient]\nof = "los"'),
      "[gradient] of: found 'los', expected one of: loss, displacement, approach, load"),
-    (stage('[gradient]\nof = "loss"'), "[gradient] fraction: missing, needed with the loss"),
     (stage('[gradient]\nof = "load"\nfraction = 0.1'),
      "[gradient] fraction: found 0.1, expected none with the load"),
-    (stage('[gradient]\nof = "loss"\nfraction = 2.0'),
-     "[gradient] fraction: found 2.0, expected a number from 0 to 1"),
     (stage('[gradient]\nof = "load"\nby = ["height"]'),
      "[gradient] by: found ['height'], expected a list of some of: heights, tip_radii"),
-    (stage('[gradient]\nof = "load"\nby = []'),
-     "[gradient] by: found [], expected a list of some of: heights, tip_radii"),
-    (stage('[gradient]\nof = "load"\nholding = "gap"'),
-     "[gradient] holding: found 'gap', expected \"load\" or \"approach\""),
     # files that are no TOML
     ("", "empty"),
-    ("# nothing\n", "empty"),
     ("[sphere]\nradius = \n", "not a TOML file: Invalid value (at line 2, column 10)"),
-    ("[sphere\n", "not a TOML file"),
     (b"\xff\xfe[sphere]", "not UTF-8"),
     ("a = " + "[" * 5000, "not a TOML file"),
-    ("a = " + "9" * 5000, "not a TOML file"),
 ]  # fmt: skip
 
 
-@pytest.mark.sample(25)
+@pytest.mark.sample(15)
 @pytest.mark.parametrize(("scene", "message"), MISTAKES)
 def test_bad_scenes(command: Any, tmp_path: Path, scene: str | bytes, message: str) -> None:
     path = tmp_path / "a.toml"

@@ -7,7 +7,6 @@ import pytest
 from scene_files import scene_text
 
 import convexrough as cr
-from convexrough.run import scene_file
 from convexrough.run.scene_file import read_scene
 
 
@@ -48,18 +47,6 @@ def test_a_slip(tmp_path: Path, wrong: str, meant: str, why: str) -> None:
     assert why in line
 
 
-def test_all_slips_at_once(tmp_path: Path) -> None:
-    text = "[sphere]\nradius = 1,0\n[normal]\napproach = 5e-5 m\n[friction]\ncoefficient 0.5\n"
-    lines = refused(tmp_path, text)
-    assert (
-        lines[0] == "line 2: found radius = 1,0, expected radius = 1.0: a decimal point, no comma"
-    )
-    assert lines[1].startswith("line 4: found approach = 5e-5 m, expected approach = 5e-5: ")
-    assert lines[2].startswith("not a TOML file: ")
-    assert lines[2].endswith("(at line 6, column 13): coefficient 0.5")
-    assert len(lines) == 3
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("unit", ["1", "a", " ", "1,", "a ", "= "])
 def test_a_long_line_is_shown_in_part(tmp_path: Path, unit: str) -> None:
@@ -75,17 +62,6 @@ def test_a_key_of_many_parts(tmp_path: Path, text: str) -> None:
     assert "line 1" in said
 
 
-def test_a_scene_file_of_many_megabytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scene_file, "MOST_BYTES", 2**20)
-    assert refused(tmp_path, scene_text() + "#" * 2**20) == ["more than 1 MiB"]
-
-
-def test_a_thousand_mistakes_are_counted(tmp_path: Path) -> None:
-    said = refused(tmp_path, scene_text() + "".join(f"[t{i}]\na = 1\n" for i in range(1000)))
-    assert len(said) == 51
-    assert said[-1] == "and 950 more mistakes"
-
-
 STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
 STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 
@@ -97,3 +73,15 @@ def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any)
     outcome = command("run", "a.toml", "--no-figures")
     assert outcome.status == 3
     assert "nan" not in outcome.out
+
+
+def test_all_slips_at_once(tmp_path: Path) -> None:
+    text = "[sphere]\nradius = 1,0\n[normal]\napproach = 5e-5 m\n[friction]\ncoefficient 0.5\n"
+    lines = refused(tmp_path, text)
+    assert (
+        lines[0] == "line 2: found radius = 1,0, expected radius = 1.0: a decimal point, no comma"
+    )
+    assert lines[1].startswith("line 4: found approach = 5e-5 m, expected approach = 5e-5: ")
+    assert lines[2].startswith("not a TOML file: ")
+    assert lines[2].endswith("(at line 6, column 13): coefficient 0.5")
+    assert len(lines) == 3

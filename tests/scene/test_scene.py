@@ -10,7 +10,6 @@ from scenes import MATERIAL, paper
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
 from convexrough.scene.patterns import CUT_DEVIATIONS
-from convexrough.scene.scene import reach
 
 
 def test_hexagonal_lattice() -> None:
@@ -40,18 +39,6 @@ def test_random_heights_and_radii() -> None:
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
 
 
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_reach(geometry: Any) -> None:
-    """Just inside the reach an asperity could touch, just outside it cannot."""
-    edge = reach(1e-4, sphere_radius=2.0, tip_radius=0.1, height=1e-5, geometry=geometry)
-    for factor, sign in ((0.999, 1), (1.001, -1)):
-        asperity = cr.Asperities([[edge * factor, 0]], 0.1, 1e-5)
-        scene = cr.Scene(2.0, asperity, MATERIAL, geometry=geometry)
-        assert np.sign(1e-4 + scene.offsets[0]) == sign
-        assert scene.reach(1e-4) == edge
-    assert reach(-1.0, sphere_radius=2.0, tip_radius=0.1, height=0.0, geometry=geometry) == 0
-
-
 def square(**options: Any) -> cr.Asperities:
     return cr.Asperities.square(**({"spacing": 1, "tip_radius": 1, "within": 1} | options))
 
@@ -62,46 +49,29 @@ def one(radius: float = 1.0, **options: Any) -> cr.Scene:
 
 BAD = [
     (lambda: cr.Material(0.0, 0.3), "contact_modulus: found 0.0, expected a positive number"),
-    (lambda: cr.Material(float("nan"), 0.3), "contact_modulus: found nan"),
     (lambda: cr.Material(1.0, 0.51), "poisson_ratio: found 0.51, expected a number from 0.0 to 0"),
-    (lambda: cr.Material(1.0, -0.1), "poisson_ratio: found -0.1"),
-    (lambda: cr.Material("soft", 0.3), "contact_modulus: found 'soft'"),  # type: ignore[arg-type]
-    (lambda: cr.Material(True, 0.3), "contact_modulus: found True"),
-    (lambda: cr.Material.from_youngs(-1.0, 0.3), "youngs_modulus: found -1.0"),
+    # type: ignore[arg-type]
     (lambda: cr.Asperities([], 1.0), "positions: found no asperity"),
     (lambda: cr.Asperities([[0, 0, 0]], 1.0), r"positions: found shape \(1, 3\)"),
     (lambda: cr.Asperities([[0, 0], [0, np.nan]], 1.0), r"positions\[1\]: found"),
-    (lambda: cr.Asperities([["a", 0]], 1.0), "positions: .* expected numbers"),
     (lambda: cr.Asperities([[0, 0]], 0.0), r"tip_radii\[0\]: found 0.0, expected a positive"),
-    (lambda: cr.Asperities([[0, 0]], [1.0, 2.0]), "tip_radii: .* expected 1 values"),
-    (lambda: cr.Asperities([[0, 0]], 1.0, np.inf), r"heights\[0\]: found inf"),
     (
         lambda: cr.Asperities([[0, 1], [2, 3], [0, 1]], 1.0),
         r"asperities 0 and 2 \(from 0\) at a distance of 0",
     ),
-    (lambda: cr.Asperities.hexagonal(spacing=0, tip_radius=1, within=1), "spacing: found 0.0"),
-    (lambda: square(tip_radius=-1), r"tip_radius\[0\]"),
-    (lambda: square(within=-1), "within: found -1.0"),
     (lambda: square(height_std=1), "seed: found None"),
-    (lambda: square(height_std=1, seed="a"), "seed: found a"),
-    (lambda: cr.Scene(1.0, [[0, 0]], MATERIAL, geometry="summit"), "asperities: found"),  # type: ignore[arg-type]
-    (lambda: cr.Asperities([[0, 0]], 1 + 2j), "tip_radii: .* expected numbers"),
+    # type: ignore[arg-type]
     (lambda: cr.press(paper(), approach=1e-80), "choose other units"),
-    (lambda: square(tip_radius=[1, 2]), "tip_radius: .* expected 5 values"),
     (
         lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
         r"within / spacing = 1e\+09: found 3.63e\+18 asperities .* memory",
     ),
-    (lambda: one(-1.0), "sphere_radius: found -1.0"),
-    (lambda: one(friction=0.0), "friction: found 0.0"),
     (lambda: one(geometry="tip"), "geometry: found 'tip'"),
     (
         lambda: cr.Scene(1.0, cr.Asperities([[2, 0], [3, 0]], [1.0, 2.0]), MATERIAL),
         "asperities 0 and 1",
     ),
-    (lambda: cr.press(paper(), approach=float("nan")), "approach: found nan"),
     (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
-    (lambda: cr.press(paper(), load=-1.0), "load: found -1.0"),
     (lambda: cr.press(paper()), "approach, load: found neither"),
     (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),
 ]
@@ -114,29 +84,3 @@ def test_bad_values(call: Any, message: str) -> None:
         call()
     assert isinstance(caught.value, ValueError)
     assert isinstance(caught.value, cr.ConvexroughError)
-
-
-def test_arrays_are_copies_and_read_only() -> None:
-    positions = np.zeros((1, 2))
-    asperities = cr.Asperities(positions, 1.0)
-    positions[0] = 5.0
-    assert (asperities.positions == 0).all()
-    for values in (asperities.positions, asperities.tip_radii, asperities.heights):
-        assert not values.flags.writeable
-
-
-def test_roughened_is_what_the_patterns_draw() -> None:
-    lattice = {"spacing": 0.0025, "tip_radius": 0.02, "within": 0.0102}
-    rough = {"height_std": 1e-6, "tip_radius_cv": 0.1, "seed": 5}
-    regular = cr.Asperities.hexagonal(**lattice)
-    one, other = regular.roughened(**rough), cr.Asperities.hexagonal(**lattice, **rough)
-    for name in ("positions", "tip_radii", "heights"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert not getattr(one, name).flags.writeable
-    assert one.layout is regular.layout
-    assert one.lattice is regular.lattice
-    assert regular.roughened() is regular
-    with pytest.raises(cr.InputError, match="seed: found None"):
-        regular.roughened(height_std=1e-6)
-    with pytest.raises(cr.InputError, match="height_std: found -1"):
-        regular.roughened(height_std=-1, seed=1)

@@ -1,12 +1,10 @@
-"""The bristle program: its order of convergence, its convexity, what it refuses."""
+"""The bristle program: its order of convergence, its convexity."""
 
-import sys
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, scattered
+from scenes import MATERIAL, NAMED
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
@@ -55,73 +53,4 @@ def test_a_box_cut_to_the_convex_range(control: str) -> None:
         assert contact.certificate.scope == reference.certificate.scope
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-def test_too_dense(control: str) -> None:
-    """Refused by name: the asperities that Newton's method also finds beyond the convex range."""
-    scene, approach = scattered(4, 5, 3.0, 0.0)
-    reference, prescribed = pressed(scene, approach, control)
-    assert reference.crowding > 1
-    with pytest.raises(cr.solvers.TooDenseError, match="bristles") as caught:
-        cr.press(scene, solver=BristleQP(), **prescribed)
-    points = scene.contact_points
-    apart = np.hypot(*(points[:, None] - points).T)
-    np.fill_diagonal(apart, np.inf)
-    ratio = reference.contact_radii / (np.pi / 4 * apart.min(axis=0))
-    assert set(np.flatnonzero(ratio > 1.05)) <= set(caught.value.asperities)
-    assert set(caught.value.asperities) <= set(np.flatnonzero(ratio > 0.9))
-    assert (caught.value.ratios > 0.98).all()
-
-
 # What stops it, in words.
-
-
-def press_with(solver: BristleQP) -> None:
-    cr.press(paper(), approach=PAPER_APPROACH, solver=solver)
-
-
-def test_without_osqp(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "osqp", None)
-    with pytest.raises(cr.SolverError, match=r"bristles.* osqp.*pip install"):
-        press_with(BristleQP())
-
-
-def test_with_an_old_osqp(monkeypatch: pytest.MonkeyPatch) -> None:
-    old = ModuleType("osqp")
-    old.__version__ = "0.6.7"  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "osqp", old)
-    with pytest.raises(cr.SolverError, match=r"OSQP 0\.6\.7 is too old; pip install"):
-        press_with(BristleQP())
-
-
-def test_osqp_that_gives_up() -> None:
-    with pytest.raises(cr.SolverError, match=r"bristles.*did not solve.*MAX_ITER_REACHED"):
-        press_with(BristleQP(max_iterations=3))
-
-
-@pytest.mark.parametrize(("status", "raised"), [(10, KeyboardInterrupt), (3, cr.SolverError)])
-def test_osqp_stopped(monkeypatch: pytest.MonkeyPatch, status: int, raised: Any) -> None:
-    """Status 10 is an interrupt from the keyboard, which OSQP takes for itself."""
-    import osqp
-
-    def solve(*_: Any, **__: Any) -> None:
-        raise osqp.OSQPException(status)
-
-    monkeypatch.setattr(osqp.OSQP, "solve", solve)
-    with pytest.raises(raised):
-        press_with(BristleQP())
-
-
-@pytest.mark.parametrize(
-    ("setting", "value"),
-    [
-        ("bristles", 0),
-        ("bristles", 2.5),
-        ("bristles", True),
-        ("tolerance", 0.0),
-        ("tolerance", np.nan),
-        ("max_iterations", -1),
-    ],
-)
-def test_settings(setting: str, value: Any) -> None:
-    with pytest.raises(cr.InputError, match=f"{setting}: found"):
-        BristleQP(**{setting: value})

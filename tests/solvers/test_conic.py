@@ -1,6 +1,5 @@
 """The cone programs against 50 digits, Newton's method, the certificate and each other."""
 
-import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,8 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
-from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes
+from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
@@ -44,24 +42,6 @@ def hexagonal(density: float, tip_radius: float = 0.02) -> cr.Scene:
 def disagreement(found: Solution, expected: Solution) -> float:
     """Largest difference of the loads over the largest load."""
     return float(np.abs(found.loads - expected.loads).max() / expected.loads.max())
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("name", NAMED)
-@pytest.mark.parametrize("control", CONTROLS)
-def test_gaps_and_approach_from_the_multipliers(name: str, control: str) -> None:
-    scene, approach = NAMED[name]
-    problem = problem_of(scene, approach, control)
-    model = ConicCVXPY().model(problem)
-    model.solve()
-    contact = cr.press(scene, approach=approach)
-    gaps = contact.gaps[problem.candidates[model.boxes.members]]
-    assert_allclose(model.gaps * problem.units.length, gaps, atol=1e-7 * contact.gaps.max())
-    assert model.approach * problem.units.length == pytest.approx(approach, rel=1e-7)
-    # y2 is the contact area, in that of the box.
-    y2 = model.variables["y2"].value[model.loads > 1e-3]
-    area = np.cbrt(model.loads / model.boxes.loads)[model.loads > 1e-3] ** 2
-    assert_allclose(y2, area, atol=1e-6)
 
 
 @pytest.mark.sample(2)
@@ -103,12 +83,6 @@ def test_too_dense_is_refused(solver: Any, control: str) -> None:
     assert refusal.value.ratios.max() == pytest.approx(theta.max(), rel=0.15)
 
 
-def test_a_load_that_no_convex_state_carries_is_refused() -> None:
-    load = cr.press(hexagonal(1, tip_radius=0.02), approach=PAPER_APPROACH).load
-    with pytest.raises(TooDenseError, match="less than 1"):
-        cr.press(hexagonal(1, tip_radius=0.02), load=1e4 * load, solver=Conic())
-
-
 @settings(max_examples=30, deadline=None)
 @given(random_scenes(crowding=1.4), st.sampled_from(CONTROLS))
 def test_any_scene_is_solved_or_refused(sampled: tuple[cr.Scene, float], control: str) -> None:
@@ -126,35 +100,6 @@ def test_any_scene_is_solved_or_refused(sampled: tuple[cr.Scene, float], control
     else:
         assert theta < 1 + 1e-6
         assert disagreement(found, expected) < 1e-11
-
-
-@pytest.mark.parametrize(
-    ("solver", "library"),
-    [(Conic(), "clarabel"), (ConicCVXPY(), "cvxpy")],
-    ids=by_name,
-)
-def test_a_missing_library(solver: Any, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(cr.SolverError, match=rf"^{solver.name[:5]}.*pip install {library}$"):
-        cr.press(paper(), approach=PAPER_APPROACH, solver=solver)
-
-
-@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
-def test_a_solver_that_stops_early(solver: Any) -> None:
-    few = replace(solver, max_iterations=3)
-    problem = problem_of(paper(), PAPER_APPROACH)
-    with pytest.raises(
-        cr.SolverError, match=r"^conic.*(MaxIterations|user_limit); try more"
-    ) as stopped:
-        few.solve(problem)
-    assert stopped.value.solver == few.name
-    if isinstance(few, Conic):  # CVXPY keeps its last iterate to itself
-        boxes = ConeBoxes.choose(problem)
-        assert stopped.value.iterate is not None
-        assert stopped.value.iterate.max() > 0
-        assert (stopped.value.iterate <= boxes.to_candidates(problem, boxes.loads)).all()
-    else:
-        assert stopped.value.iterate is None
 
 
 def test_a_first_order_solver_is_judged_by_the_contact_law() -> None:
@@ -175,24 +120,6 @@ def test_a_first_order_solver_is_judged_by_the_contact_law() -> None:
     assert disagreement(loose.solve(problem), expected) < 10 * np.sqrt(loose.tolerance)
 
 
-def test_solvers_that_cvxpy_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unknown, not installed, or not one for cones: an error that says which there are."""
-    problem = problem_of(paper(), PAPER_APPROACH)
-    for name, said in (
-        ("none", r"^conic in CVXPY \(NONE\).*: CVXPY has no solver NONE; valid: .*CLARABEL"),
-        ("scss", r'has no solver SCSS; did you mean "SCS"'),
-        ("OSQP", r"OSQP has no second-order cones; choose one of .*, or solvers.BristleQP"),
-        ("highs", "HIGHS has no second-order cones"),
-        ("gurobi", "GUROBI is not installed; .*; pip install gurobipy, or"),
-    ):
-        with pytest.raises(cr.SolverError, match=said):
-            ConicCVXPY(solver=name).solve(problem)
-    monkeypatch.setitem(sys.modules, "scs", None)
-    has = r"is not installed; CVXPY finds (?=.*CLARABEL).*; pip install"
-    with pytest.raises(cr.SolverError, match=rf"SCS {has} scs, or"):
-        ConicCVXPY(solver="SCS").solve(problem)
-
-
 @dataclass(frozen=True)
 class Wrong(Conic):
     """A solver that claims to have solved it."""
@@ -210,26 +137,3 @@ def test_wrong_loads_are_not_returned(factor: float) -> None:
     solver = Wrong(newton_step=False, factor=factor)
     with pytest.raises(cr.SolverError, match=r"^conic: loads.*; try"):
         solver.solve(problem)
-
-
-@pytest.mark.parametrize("solver", [Conic, ConicCVXPY])
-def test_settings_are_checked(solver: Any) -> None:
-    with pytest.raises(cr.InputError, match="tolerance"):
-        solver(tolerance=0.0)
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("solver", [ConicCVXPY(), *OTHERS], ids=by_name)
-def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None:
-    problem = problem_of(paper(), PAPER_APPROACH)
-    model = solver.model(problem)
-    for part in (1.0, 0.9, 0.2, 0.7):
-        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
-        found = model.solve(part * problem.approach_bound)
-        assert_allclose(
-            problem.to_scene(found.loads) * problem.units.force,
-            expected.loads,
-            atol=1e-12 * expected.loads.max(),
-        )
-    with pytest.raises(cr.InputError, match="approach: found"):
-        model.solve(1.01 * problem.approach_bound)

@@ -1,16 +1,14 @@
-"""The smooth ellipsoid: Legendre's integrals, quadrature, a fine bed of asperities, its losses."""
+"""The smooth ellipsoid: Legendre's integrals, and its losses by quadrature."""
 
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from scenes import MATERIAL
 from scipy.integrate import quad
 from scipy.special import ellipe, ellipk
 
 import convexrough as cr
-from convexrough.sphere import ellipse
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 
 ALONE = cr.Asperities([(0.0, 0.0)], 1.0)  # of no consequence
@@ -42,17 +40,6 @@ def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float
     assert hertz.peak_pressure * 2 / 3 * np.pi * a * b == pytest.approx(2e-6, rel=1e-14)
 
 
-def test_equal_radii_give_the_sphere() -> None:
-    sphere = cr.smooth(
-        cr.Scene(2.0, ALONE, cr.Material(3.0, 0.3), 0.4, geometry="summit"), load=1e-6
-    )
-    for off in (0.0, 1e-9):
-        a, b = ellipse.semi_axes(1e-6, 3.0, (2.0, 2.0 * (1 + off)))
-        assert_allclose([a, b], sphere.contact_radius, rtol=1e-9 if off else 1e-14)
-        approach = ellipse.approach(1e-6, 3.0, (a, b))
-        assert approach == pytest.approx(sphere.approach, rel=1e-9 if off else 1e-14)
-
-
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_loss_is_eight_times_the_error_of_the_trapezoid(share: float) -> None:
     """W = 8 c_t f^2 {V(P) - V(L) - (P - L) (D0(P) + D0(L)) / 2}, L = P - Q / f, V' = D0."""
@@ -71,29 +58,6 @@ def test_loss_is_eight_times_the_error_of_the_trapezoid(share: float) -> None:
     assert stick == pytest.approx(np.cbrt(1 - share), rel=1e-14)
 
 
-def test_a_fine_bed_of_asperities_is_smooth() -> None:
-    """Twice as fine, half the excess approach: extrapolated to none it is Hertz's ellipse."""
-    radii, load = (1.0, 2.5), 1e-6
-    hertz = cr.smooth(cr.Scene(radii, ALONE, MATERIAL, geometry="summit"), load=load)
-    assert isinstance(hertz, SmoothEllipsoid)
-    axes, approaches = np.array(hertz.semi_axes), []
-    for finer in (2, 4):
-        spacing = 0.0025 / finer
-        bed = cr.Asperities.hexagonal(
-            spacing=spacing, tip_radius=0.02 / finer, within=1.3 * axes.max()
-        )
-        contact = cr.press(cr.Scene(radii, bed, MATERIAL, geometry="summit"), load=load)
-        assert contact.certificate.scope == "global"
-        approaches.append(contact.approach)
-        s = np.hypot(*(bed.positions / axes).T)
-        inside = s < 0.9
-        pressures = contact.loads / (spacing**2 * np.sqrt(0.75))
-        expected = hertz.pressure(s * hertz.contact_radius)
-        off = np.abs(pressures - expected)[inside] / hertz.peak_pressure
-        assert off.max() < 0.11 / finer
-    assert 2 * approaches[1] - approaches[0] == pytest.approx(hertz.approach, rel=1e-3)
-
-
 @pytest.mark.parametrize(("base", "name"), [(np.inf, "a flat"), ((np.inf, 1.0), "a cylinder")])
 def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
     scene = cr.Scene(base, ALONE, MATERIAL, friction=0.5, geometry="summit")
@@ -103,8 +67,3 @@ def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
     cycle = cr.cycle(cr.press(scene, load=1e-6), maximum=1e-7)
     assert cycle.loss > 0
     assert np.isnan([cycle.loss_normalised, cycle.smooth_normalised]).all()
-
-
-def test_the_displacement_outside_is_of_spheres_alone() -> None:
-    with pytest.raises(cr.InputError, match="normal_displacement: found an ellipsoid"):
-        smooth((1.0, 2.0), 1e-6).normal_displacement(0.0)

@@ -96,17 +96,3 @@ def test_a_plateau_is_one_hill() -> None:
     assert found.prominences.tolist() == [1.0, 0.5]
     assert heights[tuple(found.pixels[0])] == 1.0
     assert found.pixels[1].tolist() == [6, 1]
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("seed", range(4))
-def test_whole_numbers_have_ties(seed: int) -> None:
-    """Of quantised heights each connected plateau that is a maximum counts once."""
-    heights = np.round(3 * rough(200 + seed, (20, 20)))
-    plateaus = 0
-    for level in np.unique(heights):
-        land, count = ndimage.label(heights == level, structure=EIGHT)
-        for n in range(1, count + 1):
-            around = ndimage.binary_dilation(land == n, structure=EIGHT) & (land != n)
-            plateaus += bool((heights[around] < level).all())
-    assert len(hills(heights).pixels) == plateaus

@@ -1,13 +1,10 @@
-"""How strongly to prune: the curve, and who is named."""
-
-from itertools import combinations
+"""How strongly to prune: the curve, and what trust needs."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
-from convexrough.errors import SolverError
 from convexrough.surface import Provability, crowded, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
@@ -33,21 +30,11 @@ def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
         assert_allclose(curve.crowding[i], contact.crowding, rtol=1e-9)
         assert_allclose(curve.model_error[i], contact.model_error, rtol=1e-6)
         assert_allclose(curve.approaches[i], contact.approach, rtol=1e-9)
+        _, values = crowded(contact, above=0.1)
+        assert_allclose(values[0], contact.crowding, rtol=1e-12)
         if contact.certificate.holds:
             assert curve.contacts[i] == (contact.status == "contact").sum()
             assert curve.undecided[i] == 0
-
-
-def test_stronger_pruning_leaves_the_model_room() -> None:
-    """Here the weakest pruning overlaps, and the default is the other way."""
-    curve = provability(MAP.summits(0.0), press)
-    assert curve.crowding[0] > 1
-    assert not curve.trusted[0]
-    assert curve.trusted[-1]
-    first = curve.prune.tolist().index(curve.trusted_from)
-    assert curve.trusted[first:].all()
-    assert not curve.trusted[first - 1]
-    assert (np.diff(curve.summits) < 0).all()
 
 
 def test_what_trust_needs() -> None:
@@ -60,35 +47,3 @@ def test_what_trust_needs() -> None:
         trusted = change in fine
         curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})
         assert (curve.trusted.tolist(), curve.trusted_from == 0.1) == ([trusted], trusted)
-
-
-def test_a_solver_that_fails_is_a_level_without_trust() -> None:
-    def fails(asperities: cr.Asperities) -> cr.Contact:
-        if len(asperities) > 100:
-            raise SolverError("no step", solver="newton")
-        return press(asperities)
-
-    curve = provability(MAP.summits(0.0), fails, levels=[0.0, 0.2])
-    assert curve.scope.tolist() == ["failed", "global"]
-    assert curve.trusted.tolist() == [False, True]
-    assert np.isnan(curve.crowding[0])
-    assert curve.trusted_from == 0.2
-    curve.plot().figure.canvas.draw()
-    never = provability(MAP.summits(0.0), fails, levels=[0.0])
-    assert np.isnan(never.trusted_from)
-
-
-def test_crowded_pairs_are_all_of_them() -> None:
-    contact = press(MAP.summits(0.0))
-    points, a = contact.scene.contact_points, contact.contact_radii
-    expected = {
-        (i, j): (a[i] + a[j]) / np.hypot(*(points[i] - points[j]))
-        for i, j in combinations(np.flatnonzero(a).tolist(), 2)
-    }
-    expected = {pair: value for pair, value in expected.items() if value > 0.5}
-    pairs, values = crowded(contact, above=0.5)
-    assert {tuple(sorted(pair)) for pair in pairs.tolist()} == set(expected)
-    assert (np.diff(values) <= 0).all()
-    for (i, j), value in zip(pairs.tolist(), values, strict=True):
-        assert_allclose(value, expected[min(i, j), max(i, j)], rtol=1e-12)
-    assert_allclose(values[0], contact.crowding, rtol=1e-12)

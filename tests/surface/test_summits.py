@@ -3,7 +3,6 @@
 import pickle
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
@@ -37,25 +36,6 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert not again.prominences.flags.writeable
 
 
-@pytest.mark.parametrize("prune", [0.02, 0.05, 0.3, 1.0])
-def test_pruning_later_is_pruning_at_once(prune: float) -> None:
-    later, once = MAP.summits(0.0).pruned(prune), MAP.summits(prune)
-    for name in ("positions", "tip_radii", "heights", "prominences", "deviations", "pixels"):
-        assert_allclose(getattr(later, name), getattr(once, name), rtol=1e-12, atol=1e-12)
-    assert later.origin.threshold == once.origin.threshold == prune * MAP.max_height
-    assert later.origin.maxima == once.origin.maxima
-
-
-def test_a_map_turned_or_scaled_has_the_same_summits() -> None:
-    first = MAP.summits()
-    turned = cr.surface.Surface(MAP.heights.T, 1.0).summits()
-    order = np.argsort(-first.prominences), np.argsort(-turned.prominences)
-    assert_allclose(turned.positions[order[1]][:, ::-1], first.positions[order[0]], atol=1e-9)
-    large = cr.surface.Surface(1e-6 * MAP.heights, 1e-6).summits()
-    assert_allclose(large.tip_radii, 1e-6 * first.tip_radii, rtol=1e-9)
-    assert_allclose(large.elliptic_loads, first.elliptic_loads, rtol=1e-9)
-
-
 def test_the_map_has_the_moments_of_its_spectrum() -> None:
     """Amplitudes are not random: variances are those of the waves to rounding, of every seed."""
     exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=256)
@@ -86,23 +66,3 @@ def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     assert_allclose(curvature, exact.mean_curvature, rtol=0.04)
     assert_allclose(height, exact.mean_height, rtol=0.02)
     assert_allclose(spread, exact.height_std, rtol=0.03)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"hurst": 1.5}, "hurst"),
-        ({"rms_slope": 0.0}, "rms_slope"),
-        ({"rolloff": -1.0}, "rolloff"),
-        ({"seed": -1}, "seed"),
-        ({"seed": None}, "seed"),
-        ({"pixels": 4}, "pixels: found 4, expected a whole number, at least 8"),
-        ({"pixels": 10**7}, "GiB"),
-        ({"cutoff": 2.0}, "cutoff: found 2, expected more than two pixels of 1"),
-        ({"cutoff": 300.0}, "cutoff: found 300, expected at most the size, 256"),
-    ],
-)
-def test_no_self_affine_map(options: dict[str, object], message: str) -> None:
-    plain: dict[str, object] = dict(hurst=0.8, rms_slope=0.1, rolloff=32.0, seed=1)
-    with pytest.raises(cr.InputError, match=message):
-        cr.surface.self_affine(**(plain | options))  # type: ignore[arg-type]

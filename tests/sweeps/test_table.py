@@ -1,9 +1,7 @@
 """What is in the table of a sweep, and the forms in which it is had."""
 
-import json
 import logging
 import shutil
-import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -15,7 +13,6 @@ from scenes import MATERIAL
 from sweep_files import SMALL, numbers, same, sweeping, tables, toml
 
 import convexrough as cr
-from convexrough.errors import ExtraError
 
 
 @pytest.fixture(scope="module")
@@ -101,16 +98,6 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
             assert rows[name][i] == value, name
 
 
-def test_onsets_are_quantiles_over_the_loaded_asperities(here: Executor) -> None:
-    contents = sweeping(measure=["onset"], over={"normal.load": [3e-7]})
-    rows = cr.sweep(contents, executor=here).read()
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit"), load=3e-7)
-    onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
-    for q in (0.0, 0.25, 0.5, 0.75, 1.0):
-        assert rows[f"onset_{q:g}"][0] == np.nanquantile(onsets, q)
-
-
 def test_scenes_made_in_python(here: Executor) -> None:
     base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scenes = [cr.Scene(R, base, MATERIAL, 0.5, geometry="summit") for R in (0.9, 1.0, 1.1)]
@@ -123,24 +110,6 @@ def test_scenes_made_in_python(here: Executor) -> None:
         row = {name: values[i] for name, values in table.read(["approach", "loss_0.3"]).items()}
         loss = cr.cycle(contact, maximum=0.3 * 0.5 * contact.load).loss
         assert row == {"approach": contact.approach, "loss_0.3": loss}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [({"measure": ["load"]}, "approach, load: found neither"),
-     ({"measure": ["loss"], "load": 1e-7}, '[sweep] measure: found "loss"'),
-     ({"load": 1e-7}, "measure: found None, expected a list"),
-     ({"load": [1e-7, 2e-7], "measure": ["load"]}, "expected 1 values"),
-     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "[cycle] maximum_fraction[0]"),
-     ({"load": 1e-7, "measure": ["load"], "workers": 0}, "workers: found 0"),
-     ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
-     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found type int")],
-)  # fmt: skip
-def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    with pytest.raises(cr.InputError) as caught:
-        cr.sweep([cr.Scene(1.0, asperities, MATERIAL, geometry="summit")], **arguments)
-    assert said in str(caught.value)
 
 
 def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
@@ -186,17 +155,6 @@ def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
     assert sorted(rows["scene"].to_pylist()) == list(range(16))
 
 
-def test_quantiles_are_those_of_each_point(whole: cr.SweepTable) -> None:
-    found = whole.quantiles(["loss_0.37"], [0.1, 0.5])
-    groups = whole.to_dataframe().groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
-    for i, (point, values) in enumerate(groups):
-        assert (found["asperities.height_std"][i], found["normal.load"][i]) == point
-        assert (found["scenes"][i], found["failed"][i]) == (4, 0)
-        assert found["0.1"][i] == np.quantile(values, 0.1)
-        assert found["0.5"][i] == np.quantile(values, 0.5)
-    assert i == 3
-
-
 def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path) -> None:
     for k in (2, 3, 1):
         table = cr.sweep(SMALL, executor=here, out=tmp_path / "a", part=(k, 3))
@@ -204,39 +162,6 @@ def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path)
     assert same(table, whole)
     second = cr.sweep(SMALL, executor=here, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
-
-
-def test_other_versions_are_refused(here: Executor, folder: Path) -> None:
-    said = json.loads((folder / "manifest.json").read_text())
-    said["versions"]["scipy"] = "1.0"
-    (folder / "manifest.json").write_text(json.dumps(said))
-    with pytest.raises(cr.FileError, match=r"was begun with scipy 1\.0 instead of "):
-        cr.sweep(SMALL, executor=here, out=folder, resume=True)
-
-
-def test_parts_without_a_manifest_are_refused(here: Executor, folder: Path) -> None:
-    (folder / "manifest.json").unlink()
-    for how in ({"resume": True}, {"overwrite": True}):
-        with pytest.raises(cr.FileError, match=r"holds parts, but no manifest\.json"):
-            cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=folder, **how)
-    assert not (folder / "manifest.json").exists()
-
-
-def test_a_part_under_the_name_of_another(
-    here: Executor, whole: cr.SweepTable, folder: Path
-) -> None:
-    first, second, *_ = sorted((folder / "parts").iterdir())
-    shutil.copy(first, second)
-    with pytest.raises(cr.FileError, match=f"{second.name}: has rows of other scenes"):
-        cr.open_sweep(folder).read(["load"])
-    assert same(cr.sweep(SMALL, executor=here, out=folder, resume=True), whole)
-
-
-def test_a_folder_with_other_files_is_left_alone(here: Executor, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").touch()
-    with pytest.raises(cr.FileError, match=r"holds notes\.txt, but no sweep"):
-        cr.sweep(SMALL, executor=here, out=tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
 def test_a_folder_of_another_sweep_is_refused(here: Executor, folder: Path) -> None:
@@ -275,15 +200,6 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
     assert same(again, whole)
 
 
-def test_without_pyarrow_no_folder_is_left(
-    here: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ExtraError, match="needs pyarrow: pip install pyarrow"):
-        cr.sweep(tables(), executor=here, out=tmp_path / "out")
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.usefixtures("no_processes")
 def test_the_command(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
@@ -307,13 +223,3 @@ def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: P
     status, _, err = command("sweep", "a.toml", "--workers", "1")
     assert status == 4
     assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")
-
-
-def test_a_contact_with_nothing_loaded_has_numbers_all_the_same(here: Executor) -> None:
-    nothing = tables(normal=None)
-    nothing["normal"] = {"approach": -1e-6}
-    nothing["sweep"] = {"measure": ["contact", "loss", "onset", "loss_factor"]}
-    table = cr.sweep(nothing, executor=here)
-    rows = {name: values[0] for name, values in table.read().items()}
-    assert (rows["status"], rows["contact"], rows["loss_0.37"]) == ("certified", 0.0, 0.0)
-    assert np.isnan(rows["onset_0.5"])

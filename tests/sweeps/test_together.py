@@ -6,14 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sweep_files import sweeping, toml
+from sweep_files import sweeping
 
-import convexrough as cr
-from convexrough import plausibility
 from convexrough.sweeps import batch, together
 from convexrough.sweeps.batch import Columns, compute
 from convexrough.sweeps.file import plan_of
-from convexrough.sweeps.report import cautions
 
 #: Numbers that rows know, but for errors, which are bounds of their own.
 KNOWN = [f"normal.{name}" for name in together.NORMAL if "error" not in name]
@@ -66,47 +63,3 @@ def test_rows_together_are_those_of_scenes_one_by_one(
             assert np.all(found[name] <= 1e3 * alone[name] + 1e-25), name
         elif not name.endswith("message"):
             assert_allclose(found[name], alone[name], rtol=1e-12, atol=1e-30, err_msg=name)
-
-
-def test_scenes_that_are_clear_of_cautions_have_none() -> None:
-    """And most that have none are found clear."""
-    rng, clear, none = np.random.default_rng(5), 0, 0
-    for seed in range(20):
-        array = cr.Asperities.hexagonal(
-            spacing=10 ** rng.uniform(-3.3, -2.3),
-            tip_radius=10 ** rng.uniform(-3, -1),
-            within=0.0102,
-            height_std=1e-6 * rng.random(),
-            seed=seed,
-        )
-        scene = cr.Scene(10 ** rng.uniform(-1.5, 1.5), array, cr.Material(1.0, 0.3))
-        try:
-            contact = cr.press(scene, load=10 ** rng.uniform(-9, -5))
-        except cr.SolverError:  # far too crowded
-            continue
-        found = [*plausibility.cautions_of(contact)]
-        if plausibility.clear_of_cautions(scene, contact.loads, contact.contact_radii):
-            assert found == []
-            clear += 1
-        none += not found
-    assert 0.8 * none <= clear
-    assert 0 < none < 20
-
-
-@pytest.mark.usefixtures("no_processes")
-def test_cautions_are_messages_of_certified_scenes(tmp_path: Path) -> None:
-    crowded = tables(SCENES["crowded"], ["normal.load"])
-    (tmp_path / "a.toml").write_text(toml(crowded))
-    table = cr.sweep(tmp_path / "a.toml", workers=1)
-    found = table.read()
-    assert all("contact discs overlap" in each for each in found["message"])
-    (line,) = cautions(table)
-    assert line.startswith("2 certified scenes of 2 have warnings, the first scene 0: ")
-
-
-def test_where_rows_fail_each_scene_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(*_: Any) -> Any:
-        raise np.linalg.LinAlgError
-
-    monkeypatch.setattr(together, "in_rows", failing)
-    assert set(rows({}, ["load", "loss"])["status"].tolist()) == {"certified"}

@@ -1,6 +1,4 @@
-"""Vector friction: states against their own equations, their limits and their symmetries."""
-
-import sys
+"""Vector friction: states without Poisson's ratio, near gross sliding and at it."""
 
 import numpy as np
 import pytest
@@ -13,10 +11,10 @@ from friction_scenes import (
     pressed,
 )
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper
+from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
-from convexrough import FrictionConic, FrictionNewton, shear_vector
+from convexrough import shear_vector
 from convexrough.sphere import mindlin
 
 
@@ -41,12 +39,8 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
 @pytest.mark.parametrize(
     ("nu", "fraction", "forces", "transverse", "travel", "sliding"),
     [
-        (0.3, 1e-9, 0.0328, 2.5e-11, 1.21366, 0),
-        (0.3, 0.3, 0.0293, 0.0068, 1.21374, 0),
         (0.3, 0.5, 0.0272, 0.0128, 1.21373, 6),
         (0.3, 0.8, 0.0228, 0.0169, 1.21375, 18),
-        (0.5, 1e-9, 0.0638, 4.7e-11, 1.49719, 0),
-        (0.5, 0.3, 0.0570, 0.0130, 1.49756, 0),
         (0.5, 0.5, 0.0526, 0.0245, 1.49751, 6),
         (0.5, 0.8, 0.0441, 0.0323, 1.49760, 18),
     ],
@@ -107,51 +101,6 @@ def test_gross_sliding() -> None:
     assert finite.residual < 1e-13
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("conic", [False, True])
-@pytest.mark.parametrize("fraction", [1e-6, 0.5, 0.95])
-def test_turning_the_force_turns_the_answer(fraction: float, conic: bool) -> None:
-    """By 60 degrees on the hexagonal array; and by any angle if the asperities turn too."""
-    contact, state = pressed("paper"), found("paper", 0.3, fraction, conic)
-    Q = fraction * FRICTION * contact.load
-    solver = FrictionConic() if conic else FrictionNewton()
-    tolerance = 1e-6 if conic else 1e-11
-    points = contact.scene.asperities.positions
-    for angle, scene in ((np.pi / 3, None), (1.0, "turned")):
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        other, same = contact, np.zeros(len(points), dtype=int)
-        if scene is None:
-            off = np.abs(points[None] - (points @ turn.T)[:, None]).max(axis=2)
-            same = off.argmin(axis=1)  # where each asperity is turned to
-            assert off.min(axis=1).max() < 1e-12
-        else:
-            asperities = cr.Asperities(points @ turn.T, 0.02)
-            other = cr.press(
-                cr.Scene(1.0, asperities, MATERIAL, FRICTION, geometry="summit"),
-                approach=PAPER_APPROACH,
-            )
-            same = np.arange(len(points))
-        turned = shear_vector(other, force=turn @ [Q, 0.0], solver=solver)
-        size = lengths(state.forces).max()
-        assert_allclose(turned.forces[same], state.forces @ turn.T, atol=tolerance * size)
-        travel = np.hypot(*state.displacement)
-        assert_allclose(turned.slips[same], state.slips @ turn.T, atol=tolerance * travel)
-        assert_allclose(turned.displacement, turn @ state.displacement, atol=tolerance * travel)
-        assert (turned.status[same] == state.status).all()
-
-
-def test_a_solver_that_is_missing_or_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    contact = pressed("paper")
-    force = 0.5 * FRICTION * contact.load
-    with pytest.raises(cr.SolverError, match=r"friction \(conic\): clarabel stopped after .*"):
-        shear_vector(contact, force=force, solver=FrictionConic(accepted=1e-18))
-    with pytest.raises(cr.SolverError, match=r"friction \(newton\): residual .* after 2 steps"):
-        shear_vector(contact, force=force, solver=FrictionNewton(max_iterations=2))
-    monkeypatch.setitem(sys.modules, "clarabel", None)
-    with pytest.raises(cr.SolverError, match=r"friction \(conic\).*pip install clarabel"):
-        shear_vector(contact, force=force, solver=FrictionConic())
-
-
 def test_bad_input() -> None:
     contact = pressed("paper")
     limit = FRICTION * contact.load
@@ -161,31 +110,6 @@ def test_bad_input() -> None:
     for force in (float("nan"), (0.0, float("inf")), "much", None):
         with pytest.raises(cr.InputError, match="force"):
             shear_vector(contact, force=force)
-    for force in ([1e-9], [1e-9, 0.0, 0.0], [[1e-9, 0.0]]):
-        with pytest.raises(cr.InputError, match=r"force: found .* expected"):
-            shear_vector(contact, force=force)
     frictionless = cr.press(paper(), approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match="coefficient of friction"):
         shear_vector(frictionless, force=1e-9)
-
-
-def test_rest_and_nothing_loaded() -> None:
-    contact = pressed("paper")
-    rest = shear_vector(contact, force=(0.0, 0.0))
-    assert (rest.forces == 0).all()
-    assert (rest.displacement == 0).all()
-    assert (rest.status[contact.loads > 0] == "partial").all()
-    assert rest.certificate.holds
-    assert rest.disagreement == rest.residual == 0
-    assert rest.duality_gap < 1e-300
-    assert_allclose(rest.stick_radii, contact.contact_radii)
-    with pytest.raises(ValueError, match="read-only"):
-        rest.forces[0, 0] = 1.0
-    scene = cr.Scene(
-        1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL, FRICTION, geometry="summit"
-    )
-    empty = shear_vector(cr.press(scene, approach=1e-7), force=0.0)
-    assert (empty.status == "open").all()
-    assert empty.forces.shape == (2, 2)
-    with pytest.raises(cr.InputError, match=r"at most f P = 0\.0"):
-        shear_vector(cr.press(scene, approach=1e-7), force=1e-9)
