@@ -143,6 +143,12 @@ def patches(case: Case) -> dict[str, Any]:
     return dict(x=points[:, 0], y=points[:, 1], load=np.repeat(case.loads[touched] / 4, 4))
 
 
+def fine_and_coarse() -> Any:
+    """The pixels on the left, and every third one of every third row on the right."""
+    row, column = np.divmod(np.arange(121**2), 121)
+    return (column < 60) | ((column % 3 == 0) & (row % 3 == 0))
+
+
 def tributary(case: Case) -> dict[str, Any]:
     """Nodes of a mesh without order, each with its pressure and its area."""
     nodes = patches(case)
@@ -217,6 +223,9 @@ READ: dict[str, tuple[Any, ...]] = {
     "titles above the header": (
         lambda case: "Project: plate\nDate;1 May 2026\n\n" + german(case.table()),),
     "pixels of a map": (Case.pixels, "a.csv", "--within 1e-9"),
+    "pixels under pressure": (
+        lambda case: {name: each[case.pixels()["pressure"] > 0]
+                      for name, each in case.pixels().items()}, "a.csv", "--within 1e-9"),
     "nodes with areas": (tributary,),
     "areas of 0 without pressure": (
         lambda case: {name: [*each, 0.0] for name, each in tributary(case).items()},),
@@ -348,6 +357,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "half a gzip": (lambda _: gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz", "ended before"),
     "pressures without areas": (lambda case: case.table("x y pressure"), "",
                                 "expected a column 'area', or x and y on a regular grid"),
+    "pixels of two sizes": (
+        lambda case: {name: each[fine_and_coarse()] for name, each in case.pixels().items()}, "",
+        "expected a column 'area', or x and y on a regular grid: x, y pixels of several sizes"),
     "another name, not said": (lambda case: case.table("x y Fz"), "",
                                "expected a column 'load'; --column load=Fz names another"),
     "another name below titles": (lambda case: ansys(case).replace("load", "FZ"), "a.lis",
