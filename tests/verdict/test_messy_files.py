@@ -354,6 +354,12 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                                       "from 3 to 5: from 0 or from 1?"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",
                       "save(..., '-v7')"),
+    "MATLAB's two matrices": (
+        lambda case: {"A": matrix(case.table()), "B": matrix(case.table())}, "a.mat",
+        "a.mat: found A, B, expected vectors by name, or only one matrix or structure\n"),
+    "MATLAB's two structures": (
+        lambda case: {"res": case.table(), "other": case.table()}, "a.mat",
+        "a.mat: found res, other, expected vectors by name, or only one matrix or structure\n"),
     "half a gzip": (lambda _: gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz", "ended before"),
     "pressures without areas": (lambda case: case.table("x y pressure"), "",
                                 "expected a column 'area', or x and y on a regular grid"),
