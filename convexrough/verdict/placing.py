@@ -18,7 +18,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.tabular.table import INDEX, ReadTable
+from convexrough.tabular.table import INDEX, ReadTable, in_sheet
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import rounded_up
 
@@ -97,7 +97,8 @@ class Placing:
         elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes adds up rows at their nearest asperity"
         expected = f"expected {count}, one per asperity of the scene{advice}"
-        self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+        where = in_sheet(self.table.style)
+        self.mistakes.insert(0, f"rows: found {rows}{where}, {expected}")
         return found
 
     def nearest(self, values: Array) -> Indices:

@@ -360,6 +360,12 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "MATLAB's two structures": (
         lambda case: {"res": case.table(), "other": case.table()}, "a.mat",
         "a.mat: found res, other, expected vectors by name, or only one matrix or structure\n"),
+    "the wrong sheet": (
+        lambda case: [[["load", "E"], [3.0, 70e9]], rows(case.table())], "a.xlsx",
+        'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
+    "a sheet without loads": (
+        lambda case: [[["x", "y"], [0.0, 0.0]], rows(case.table())], "a.xlsx",
+        "found x, y in sheet \"Sheet\", not \"Sheet1\", expected a column 'load'"),
     "half a gzip": (lambda _: gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz", "ended before"),
     "pressures without areas": (lambda case: case.table("x y pressure"), "",
                                 "expected a column 'area', or x and y on a regular grid"),
