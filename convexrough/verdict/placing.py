@@ -156,7 +156,9 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            if cells.dtype.kind != "f" or not ((cells >= 0) & (cells % 1 == 0)).all():
+            if cells.dtype.kind != "f" or (cells >= 2**53).any():
+                continue
+            if not ((cells >= 0) & (cells % 1 == 0)).all():
                 continue
             index = cells.astype(np.intp)
             if bare(name).lower() in INDEX:

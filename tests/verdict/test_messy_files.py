@@ -374,6 +374,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         "expected a column 'area', or x and y on a regular grid: x, y pixels of several sizes"),
     "another name, not said": (lambda case: case.table("x y Fz"), "",
                                "expected a column 'load'; --column load=Fz names another"),
+    "pixels under another name": (
+        lambda case: case.pixels("x y CPRESS"), "", "expected a column 'load'; --column load=CPRE",
+        "names another, --column pressure=CPRESS that of pixels"),
     "another name below titles": (lambda case: ansys(case).replace("load", "FZ"), "a.lis",
                                   "found NODE, x, y, FZ, expected a column 'load'"),
     "a row of totals": (lambda case: lines(case.table()) + f"Sum:,,{case.loads.sum()}\n", "",
