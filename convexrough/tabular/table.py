@@ -182,6 +182,7 @@ def read_table(
         else:
             places = {each: place for each, place in places.items() if each not in others}
     missing = [name for name in required if name not in places]
+    pixels = instead if how.scalable and {"x", "y"} <= places.keys() else {}
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
@@ -189,6 +190,7 @@ def read_table(
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
         + (f"; --column {each}={other} names another" if how.scalable else "")
+        + (f", --column {instead[each][0]}={other} that of pixels" if each in pixels else "")
         for each in missing
         if each not in how.columns
     ]
