@@ -122,9 +122,10 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
             return f"load of asperity {i}{what}"
         return table.mistake(i, f", column {name}{what}")
 
-    place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
-    if name == "load" and not summed:
-        place.mistakes += _contradicted(columns, values, floor, table)
+    if not any(" in another order: --column" in each for each in place.mistakes):
+        place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
+        if name == "load" and not summed:
+            place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = None

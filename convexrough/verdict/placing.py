@@ -279,11 +279,12 @@ class Placing:
         """Other readings of x and y: what to say of each, and its points."""
         held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
         called = {name: quote(bare(self.table.called[name])) for name in held}
+        headed = not all(map(str.isdecimal, called.values()))
+        found = f"{'the header names' if headed else 'no header, and'} the columns in another order"
         for order in permutations(held):
             a, b, _ = order
             if {a, b} != {"x", "y"}:
                 named = dict(zip(held, map(called.__getitem__, order), strict=True))
-                found = "the header names the columns in another order"
                 yield f"{found}: {_options('column', named)}", np.column_stack((held[a], held[b]))
         points = np.column_stack((held["x"], held["y"]))[rows]
         exchange = _options("column", {"x": called["y"], "y": called["x"]})

@@ -315,6 +315,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a header in another order": (
         lambda case: lines(case.table()).replace("x,y,load", "load,x,y"), "",
         "the header names the columns in another order: --column x=load --column y=x --column lo"),
+    "no header, and another order": (
+        lambda case: matrix(case.table())[:, [2, 0, 1]], "a.npy",
+        "positions: no header, and the columns in another order: --column x=2 --column y=3 --c"),
     "areas of 0 under pressure": (
         lambda case: {name: [*each, each[0] * 0.0 if "area" in name else each[0]]
                       for name, each in tributary(case).items()},
@@ -406,7 +409,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
 #: One cause is all there is to say.
 MOVED = ("x and y exchanged", "x mirrored", "shifted", "places in mm", "places in km",
          "pixels in mm", "pixels shifted", "nodes in km", "nodes mirrored",
-         "nodes exchanged")  # fmt: skip
+         "nodes exchanged", "no header, and another order")  # fmt: skip
 
 
 @pytest.mark.sample(8)
