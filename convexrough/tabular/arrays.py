@@ -105,6 +105,9 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
         arrays = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
                   if isinstance(each, np.ndarray) and each.ndim}  # fmt: skip
         columns = _of_one_shape(path, arrays, known)
+        if not columns:
+            expected = "vectors by name, or only one matrix or structure"
+            raise FileError(f"{path}: found {', '.join(named)}, expected {expected}")
     wanted = [name for name in columns if name.lower() in known] or list(columns)
     lengths = {len(columns[name]) for name in wanted}
     if len(lengths) > 1:

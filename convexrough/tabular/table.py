@@ -18,7 +18,7 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import HOLES, WORKBOOKS, TextTable, bare, read_text_table, unit
+from convexrough.tabular.text import HOLES, TextTable, bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
 
@@ -172,7 +172,7 @@ def read_table(
     wanted = (*required, *optional, *(each for names in instead.values() for each in names))
     known = [*wanted, *INDEX[:-1], *(each.lower() for each in how.columns.values())]
     with reading(path):
-        source = _source(path, known) if table is None else _text_source(path, table)
+        source = _source(path, known) if table is None else _text_source(table)
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
@@ -182,6 +182,7 @@ def read_table(
         else:
             places = {each: place for each, place in places.items() if each not in others}
     missing = [name for name in required if name not in places]
+    pixels = instead if how.scalable and {"x", "y"} <= places.keys() else {}
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
@@ -189,6 +190,7 @@ def read_table(
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
         + (f"; --column {each}={other} names another" if how.scalable else "")
+        + (f", --column {instead[each][0]}={other} that of pixels" if each in pixels else "")
         for each in missing
         if each not in how.columns
     ]
@@ -227,7 +229,7 @@ def read_table(
 
 def matrix(path: Path, table: TextTable) -> Array:
     """The numbers of a table without a header; `HOLES` are nan. Raises TableError."""
-    source, mistakes = _text_source(path, table), list[str]()
+    source, mistakes = _text_source(table), list[str]()
     columns = [
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
@@ -301,12 +303,11 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             numbers=_as_numbers,
             mistakes=[],
         )
-    return _text_source(path, read_text_table(path, known))
+    return _text_source(read_text_table(path, known))
 
 
-def _text_source(path: Path, table: TextTable) -> _Source:
-    header = table.header.cells if table.header else None
-    named = path.suffix.lower() not in WORKBOOKS or table.style.sheet
+def _text_source(table: TextTable) -> _Source:
+    header, style = table.header.cells if table.header else None, table.style
     counts = [len(row.cells) for row in table.rows]
     width = len(header) if header else Counter(counts).most_common(1)[0][0]
     mistakes, whole = [], []
@@ -317,7 +318,7 @@ def _text_source(path: Path, table: TextTable) -> _Source:
             whole.append(row)
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    if table.style.separator == "," and doubled and pointless:
+    if style.separator == "," and doubled and pointless:
         found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
@@ -325,9 +326,9 @@ def _text_source(path: Path, table: TextTable) -> _Source:
         columns=[[row.cells[i] for row in whole] for i in range(width)],
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],
-        style=str(table.style) if named and (width > 1 or table.style.decimal == ",") else "",
-        number=table.style.number,
-        numbers=table.style.numbers,
+        style=str(style) if style.sheet or width > 1 or style.decimal == "," else "",
+        number=style.number,
+        numbers=style.numbers,
         mistakes=mistakes,
     )
 
@@ -406,7 +407,12 @@ def _named(source: _Source) -> str:
         columns, rows = len(source.columns), len(source.rows)
         turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
         return f"no header and {columns} columns{turned}"
-    return _cut(", ".join(source.header))
+    return _cut(", ".join(source.header)) + in_sheet(source.style)
+
+
+def in_sheet(style: str) -> str:
+    """The end of a message that names the sheet read, and others; "" if the file has none."""
+    return f" in {style}" if style.startswith("sheet ") else ""
 
 
 def _numbers(

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError, TableError
+from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
@@ -110,7 +111,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if mistakes:
         raise TableError(str(path), mistakes)
     read = name if name in columns else "pressure"
-    areas = _areas(path, table) if read == "pressure" else 1.0
+    areas = _areas(path, table, len(scene)) if read == "pressure" else 1.0
     values = columns[read] * areas * (how.sign if name == "load" else 1)
     place = Placing(scene, table, read, how.tolerance, how.missing_open)
     owners = place.nearest(values) if summed else place.owners()
@@ -121,9 +122,10 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
             return f"load of asperity {i}{what}"
         return table.mistake(i, f", column {name}{what}")
 
-    place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
-    if name == "load" and not summed:
-        place.mistakes += _contradicted(columns, values, floor, table)
+    if not any(" in another order: --column" in each for each in place.mistakes):
+        place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
+        if name == "load" and not summed:
+            place.mistakes += _contradicted(columns, values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = None
@@ -183,8 +185,8 @@ def _not_compared(columns: dict[str, NDArray[Any]], loaded: NDArray[np.bool_]) -
             yield f"column {name} not compared ({with_load} with a load, {without} without)"
 
 
-def _areas(path: Path, table: ReadTable) -> Any:
-    """The areas of nodes, or the one area of a regular grid."""
+def _areas(path: Path, table: ReadTable, count: int) -> Any:
+    """The areas of nodes, or the one area of a regular grid; `count` asperities."""
     columns = table.columns
     if "area" in columns:
         areas = columns["area"]
@@ -195,11 +197,25 @@ def _areas(path: Path, table: ReadTable) -> Any:
         return areas
     try:
         (i, dx), (j, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
+        _check_one_size(i, j, count)
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
         mistake = f"columns: found pressure without areas, expected {expected}"
         raise TableError(str(path), [mistake]) from error
     return dx * dy * (1 if np.ptp((i + j) % 2) else 2)
+
+
+def _check_one_size(i: Indices, j: Indices, count: int) -> None:
+    """Raise InputError if pixels without neighbours, more than `count`, are on a coarser grid.
+
+    A contact of one pixel may have no neighbour, too: at most one for each asperity.
+    """
+    if len(i) == (i.max() + 1) * (j.max() + 1):
+        return  # a full grid
+    pixels = np.column_stack((i, j))
+    alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
+    if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
+        raise InputError("x, y", found="pixels of several sizes", expected="one size")
 
 
 def _explained(table: ReadTable) -> Iterator[str]:

@@ -18,7 +18,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.tabular.table import INDEX, ReadTable
+from convexrough.tabular.table import INDEX, ReadTable, in_sheet
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import rounded_up
 
@@ -97,7 +97,8 @@ class Placing:
         elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes adds up rows at their nearest asperity"
         expected = f"expected {count}, one per asperity of the scene{advice}"
-        self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+        where = in_sheet(self.table.style)
+        self.mistakes.insert(0, f"rows: found {rows}{where}, {expected}")
         return found
 
     def nearest(self, values: Array) -> Indices:
@@ -155,7 +156,9 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            if cells.dtype.kind != "f" or not ((cells >= 0) & (cells % 1 == 0)).all():
+            if cells.dtype.kind != "f" or (cells >= 2**53).any():
+                continue
+            if not ((cells >= 0) & (cells % 1 == 0)).all():
                 continue
             index = cells.astype(np.intp)
             if bare(name).lower() in INDEX:
@@ -276,11 +279,12 @@ class Placing:
         """Other readings of x and y: what to say of each, and its points."""
         held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
         called = {name: quote(bare(self.table.called[name])) for name in held}
+        headed = not all(map(str.isdecimal, called.values()))
+        found = f"{'the header names' if headed else 'no header, and'} the columns in another order"
         for order in permutations(held):
             a, b, _ = order
             if {a, b} != {"x", "y"}:
                 named = dict(zip(held, map(called.__getitem__, order), strict=True))
-                found = "the header names the columns in another order"
                 yield f"{found}: {_options('column', named)}", np.column_stack((held[a], held[b]))
         points = np.column_stack((held["x"], held["y"]))[rows]
         exchange = _options("column", {"x": called["y"], "y": called["x"]})

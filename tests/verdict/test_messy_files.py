@@ -143,6 +143,12 @@ def patches(case: Case) -> dict[str, Any]:
     return dict(x=points[:, 0], y=points[:, 1], load=np.repeat(case.loads[touched] / 4, 4))
 
 
+def fine_and_coarse() -> Any:
+    """The pixels on the left, and every third one of every third row on the right."""
+    row, column = np.divmod(np.arange(121**2), 121)
+    return (column < 60) | ((column % 3 == 0) & (row % 3 == 0))
+
+
 def tributary(case: Case) -> dict[str, Any]:
     """Nodes of a mesh without order, each with its pressure and its area."""
     nodes = patches(case)
@@ -217,6 +223,9 @@ READ: dict[str, tuple[Any, ...]] = {
     "titles above the header": (
         lambda case: "Project: plate\nDate;1 May 2026\n\n" + german(case.table()),),
     "pixels of a map": (Case.pixels, "a.csv", "--within 1e-9"),
+    "pixels under pressure": (
+        lambda case: {name: each[case.pixels()["pressure"] > 0]
+                      for name, each in case.pixels().items()}, "a.csv", "--within 1e-9"),
     "nodes with areas": (tributary,),
     "areas of 0 without pressure": (
         lambda case: {name: [*each, 0.0] for name, each in tributary(case).items()},),
@@ -306,6 +315,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a header in another order": (
         lambda case: lines(case.table()).replace("x,y,load", "load,x,y"), "",
         "the header names the columns in another order: --column x=load --column y=x --column lo"),
+    "no header, and another order": (
+        lambda case: matrix(case.table())[:, [2, 0, 1]], "a.npy",
+        "positions: no header, and the columns in another order: --column x=2 --column y=3 --c"),
     "areas of 0 under pressure": (
         lambda case: {name: [*each, each[0] * 0.0 if "area" in name else each[0]]
                       for name, each in tributary(case).items()},
@@ -343,13 +355,33 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
                                       "from 3 to 5: from 0 or from 1?"),
+    "an index beyond the largest integers": (lambda _: {"index": [1e19, 2], "load": [1, 2]}, "",
+                                             "rows: found 2, expected 12, one per asperity of th"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",
                       "save(..., '-v7')"),
+    "MATLAB's two matrices": (
+        lambda case: {"A": matrix(case.table()), "B": matrix(case.table())}, "a.mat",
+        "a.mat: found A, B, expected vectors by name, or only one matrix or structure\n"),
+    "MATLAB's two structures": (
+        lambda case: {"res": case.table(), "other": case.table()}, "a.mat",
+        "a.mat: found res, other, expected vectors by name, or only one matrix or structure\n"),
+    "the wrong sheet": (
+        lambda case: [[["load", "E"], [3.0, 70e9]], rows(case.table())], "a.xlsx",
+        'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
+    "a sheet without loads": (
+        lambda case: [[["x", "y"], [0.0, 0.0]], rows(case.table())], "a.xlsx",
+        "found x, y in sheet \"Sheet\", not \"Sheet1\", expected a column 'load'"),
     "half a gzip": (lambda _: gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz", "ended before"),
     "pressures without areas": (lambda case: case.table("x y pressure"), "",
                                 "expected a column 'area', or x and y on a regular grid"),
+    "pixels of two sizes": (
+        lambda case: {name: each[fine_and_coarse()] for name, each in case.pixels().items()}, "",
+        "expected a column 'area', or x and y on a regular grid: x, y pixels of several sizes"),
     "another name, not said": (lambda case: case.table("x y Fz"), "",
                                "expected a column 'load'; --column load=Fz names another"),
+    "pixels under another name": (
+        lambda case: case.pixels("x y CPRESS"), "", "expected a column 'load'; --column load=CPRE",
+        "names another, --column pressure=CPRESS that of pixels"),
     "another name below titles": (lambda case: ansys(case).replace("load", "FZ"), "a.lis",
                                   "found NODE, x, y, FZ, expected a column 'load'"),
     "a row of totals": (lambda case: lines(case.table()) + f"Sum:,,{case.loads.sum()}\n", "",
@@ -377,7 +409,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
 #: One cause is all there is to say.
 MOVED = ("x and y exchanged", "x mirrored", "shifted", "places in mm", "places in km",
          "pixels in mm", "pixels shifted", "nodes in km", "nodes mirrored",
-         "nodes exchanged")  # fmt: skip
+         "nodes exchanged", "no header, and another order")  # fmt: skip
 
 
 @pytest.mark.sample(8)
