@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from scenes import MATERIAL, OPERATORS, operators, solve_exactly
 
 import convexrough as cr
+from convexrough.arithmetic.pairs import Pair
 from convexrough.bench.scenes import scene as bench
+from convexrough.contact import levels_of
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
@@ -23,6 +25,8 @@ from convexrough.normal.boxes import CROWDED_MARGINS
 from convexrough.normal.other_solutions import OtherSolutions
 from convexrough.normal.overlap import overlapping_margin, overlaps
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.proved import solution_in
+from convexrough.normal.refine import trial
 from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
@@ -86,6 +90,18 @@ def test_random_points_are_proved(seed: int) -> None:
         assert certificate.fixed_open == (contact.status == "open").sum()
         assert certificate.load_error < 1e-6 * contact.loads.max()
         assert "fixed open" in certificate.meaning
+
+
+def test_a_box_that_fixes_an_asperity_open_holds_no_load_on_it() -> None:
+    contact = cr.press(random_points(0, 300), approach=5e-5)
+    known = levels_of(contact).top.solution
+    assert known is not None
+    box, loads = known.box, known.trial.loads.high.copy()
+    assert solution_in(known.problem, box, known.trial).inside
+    loads[np.flatnonzero(box.fixed_open)[0]] = 1e-30 * loads.max()
+    pair = Pair.exact(loads)
+    spoiled = trial(known.problem, pair, known.trial.missing, known.problem.product(pair))
+    assert not solution_in(known.problem, box, spoiled).inside
 
 
 def all_states(scene: cr.Scene, approach: float) -> list[Any]:
