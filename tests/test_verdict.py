@@ -196,5 +196,8 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
     state = cr.shear(contact, force=0.1 * contact.load)
     sheared = verify_shear(contact, state.forces[partners], force=0.1 * contact.load)
     assert f"the shear forces are right with {said}" in list(sheared.hints())
+    wrong = verify_shear(contact, state.forces, force=0.1 * contact.load, sliding=False)
+    assert not wrong.holds
+    assert list(wrong.hints()) == []  # the forces are right, the statuses are not
     unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
     assert not any("the loads are right" in hint for hint in unlike.hints())

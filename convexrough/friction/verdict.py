@@ -80,7 +80,8 @@ class ShearVerdict(Claim, Record):
         yield from super().hints()
         limits = checks.friction(self.contact.scene.friction) * self.contact.loads
         close = np.abs(self.forces) >= (1.0 - WITHIN) * limits
-        if count := int(close[self.wrongly_sticking].sum()):
+        by_forces = (self.claimed == claims_sliding(self.contact, self.forces)).all()
+        if by_forces and (count := int(close[self.wrongly_sticking].sum())):
             yield (
                 f"{count:,} of the shear forces, on asperities proved to slide, are less than "
                 f"{100 * WITHIN:g} % below f P, but not within {100 * CLAIMS_SLIDING:g} %: without "

@@ -129,6 +129,8 @@ class Claim(ABC):
         if self.holds or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
+        if np.abs(values - true).max() <= CORRECTED:  # the statuses are wrong, not the forces
+            return
         if moved := self._moved(values, true):
             yield f"the {self.many} are right with {moved}"
             return
@@ -140,7 +142,9 @@ class Claim(ABC):
         left, apart, most = (
             float(np.abs(each).max()) for each in (values - factor * true, values - true, values)
         )
-        if left > REMAINING * min(apart, most):  # the forces differ by more than a factor
+        scale = np.maximum(np.abs(factor * true), WITHIN * most)
+        uneven = (np.abs(values - factor * true) > 0.5 * scale).any()
+        if uneven or left > REMAINING * min(apart, most):  # the forces differ by more than a factor
             factor = self.total_given / (self.total_prescribed or math.inf)
             if not _power_of_ten(factor):
                 return
