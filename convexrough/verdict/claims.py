@@ -19,7 +19,7 @@ from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
-from convexrough.tabular.text import bare
+from convexrough.tabular.text import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import rounded_up
 
@@ -37,6 +37,9 @@ CLAIMS = {
     "contact": WORDS | FLAGS,
     "no_contact": {flag: "open" if it == "contact" else "contact" for flag, it in FLAGS.items()},
 }
+
+#: Difference of heights or tip radii, over the largest, that may be due to rounding.
+ROUNDED = 1e-2
 
 #: Largest number of unknown words of a column in a note.
 MOST = 3
@@ -145,6 +148,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
         units.append(f"column {name}, not pressure")
     read_how = [*(_not_compared(table, values > floor) if name == "load" else ()), place.how]
+    read_how += () if summed else _of_another_scene(table, scene, owners)
     note = ", ".join(filter(None, [table.style, *units, *read_how]))
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
 
@@ -194,6 +198,17 @@ def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
             here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
             with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
             yield f"column {header} not compared ({with_load} with a load, {without} without)"
+
+
+def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterator[str]:
+    """A note for each column of heights or tip radii that are not those of the scene."""
+    own = {"height": scene.asperities.heights, "tip_radius": scene.asperities.tip_radii}
+    for header, cells in table.others.items():
+        name = bare(header).lower()
+        if name in own and cells.dtype.kind == "f" and unit(header) in ("", scene.units.length):
+            allowed = ROUNDED * float(np.abs(own[name]).max())
+            if (np.abs(cells - own[name][owners]) > allowed).any():
+                yield f"column {name} differs from the scene's: loads of another scene?"
 
 
 def _areas(path: Path, table: ReadTable, count: int) -> Any:
