@@ -26,7 +26,7 @@ ARRAY, ON_LATTICE = 20, 7
 #: `array_extent` below which an array is cut off: smooth pressure there is 0.7 of the peak.
 CUT_OFF = 0.7
 
-#: Number of directions in which the rim of an array is sought, and the largest share of asperities
+#: Number of sectors in which the rim of an array is sought, and the largest share of asperities
 #: there that may touch. Single tall ones do also at the rim of a wide array.
 DIRECTIONS, CUT_RIM = 16, 0.5
 
@@ -48,7 +48,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
         widths a and b of the contact of a smooth body at this load; None without such a contact,
         and where the asperities are too few for an array (`is_array`)
-    rim_touching : share of the asperities farthest out, in `DIRECTIONS` directions, that touch
+    rim_touching : share that touches of the asperities farthest out in `DIRECTIONS` sectors
     axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -207,10 +207,13 @@ def axis_outside(scene: Scene) -> bool:
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """The share of the asperities farthest out that touch, in equally spaced directions."""
-    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    along = scene.asperities.positions @ np.array([np.cos(angles), np.sin(angles)])
-    return float(touching[along.argmax(axis=0)].mean())
+    """The share that touches of the asperities farthest from the middle, one in each sector."""
+    positions = scene.asperities.positions
+    x, y = (positions - (positions.min(axis=0) + positions.max(axis=0)) / 2).T
+    sectors = np.rint(np.arctan2(y, x) * (DIRECTIONS / (2.0 * np.pi))).astype(np.intp) % DIRECTIONS
+    outwards, farthest = np.argsort(x * x + y * y), np.full(DIRECTIONS, -1)
+    farthest[sectors[outwards]] = outwards  # the last of each sector remains
+    return float(touching[farthest[farthest >= 0]].mean())
 
 
 def at_the_rim(extent: float) -> str:

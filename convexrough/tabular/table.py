@@ -41,7 +41,8 @@ COLUMNS = {
     "pressure": Column("pressure"),
     "area": Column("area"),
     "status": Column(""),
-    "contact": Column(""),
+    "contact": Column("", also=("touching", "in_contact")),
+    "no_contact": Column("", also=("open",)),
 }
 
 #: Names of columns with row numbers.

@@ -19,7 +19,7 @@ from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
-from convexrough.tabular.text import bare
+from convexrough.tabular.text import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import rounded_up
 
@@ -30,6 +30,16 @@ SMALL = 1e-3
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
+
+#: What the entries of each column claim.
+CLAIMS = {
+    "status": WORDS,
+    "contact": WORDS | FLAGS,
+    "no_contact": {flag: "open" if it == "contact" else "contact" for flag, it in FLAGS.items()},
+}
+
+#: Difference of heights or tip radii, over the largest, that may be due to rounding.
+ROUNDED = 1e-2
 
 #: Largest number of unknown words of a column in a note.
 MOST = 3
@@ -94,7 +104,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     table = read_table(
         path,
         required=(name,),
-        optional=("x", "y", "status", "contact"),
+        optional=("x", "y", *CLAIMS),
         instead={"load": ("pressure", "area")},
         unnamed=((name,), ("x", "y", name)),
         how=how,
@@ -125,7 +135,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if not any(" in another order: --column" in each for each in place.mistakes):
         place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
         if name == "load" and not summed:
-            place.mistakes += _contradicted(columns, values, floor, table)
+            place.mistakes += _contradicted(values, floor, table)
     if place.mistakes:
         raise TableError(str(path), few(place.mistakes))
     status = None
@@ -137,7 +147,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
     if name in columns and "pressure" in {bare(each).lower() for each in table.others}:
         units.append(f"column {name}, not pressure")
-    read_how = [*(_not_compared(columns, values > floor) if name == "load" else ()), place.how]
+    read_how = [*(_not_compared(table, values > floor) if name == "load" else ()), place.how]
+    read_how += () if summed else _of_another_scene(table, scene, owners)
     note = ", ".join(filter(None, [table.style, *units, *read_how]))
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
 
@@ -160,29 +171,44 @@ def _negative(
         yield mistake(int(i), found)
 
 
-def _contradicted(
-    columns: dict[str, NDArray[Any]], loads: Array, floor: float, table: ReadTable
-) -> Iterator[str]:
+def _claims(table: ReadTable) -> list[tuple[str, str]]:
+    """The columns of claims, each with its header."""
+    return [(name, bare(table.called[name]).lower()) for name in CLAIMS if name in table.columns]
+
+
+def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]:
     """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
     touches = loads > floor
-    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
-        found = np.char.lower(np.char.strip(columns.get(name, np.full(len(loads), ""))))
-        said = np.array([known.get(each, "") for each in found])
+    for name, header in _claims(table):
+        found = np.char.lower(np.char.strip(table.columns[name]))
+        said = np.array([CLAIMS[name].get(each, "") for each in found])
         for i in np.flatnonzero(said == np.where(touches, "open", "contact")):
-            right = (("0", "1") if found[i] in FLAGS else ("open", "contact"))[int(touches[i])]
+            right = next(each for each, it in CLAIMS[name].items()
+                         if it != said[i] and (each in FLAGS) == (found[i] in FLAGS))  # fmt: skip
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
-            yield table.mistake(int(i), f', column {name}: found "{found[i]}", {expected}')
+            yield table.mistake(int(i), f', column {header}: found "{found[i]}", {expected}')
 
 
-def _not_compared(columns: dict[str, NDArray[Any]], loaded: NDArray[np.bool_]) -> Iterator[str]:
+def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
     """A note for each column of statuses with other words: which occur with a load, and without."""
-    for name, known in (("status", WORDS), ("contact", WORDS | FLAGS)):
-        found = np.array([each.strip() for each in columns.get(name, [])], dtype=str)
-        other = np.array([each.lower() not in (*known, "", "undecided") for each in found])
+    for name, header in _claims(table):
+        found = np.array([each.strip() for each in table.columns[name]], dtype=str)
+        other = np.array([each.lower() not in (*CLAIMS[name], "", "undecided") for each in found])
         if other.any():
             here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
             with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
-            yield f"column {name} not compared ({with_load} with a load, {without} without)"
+            yield f"column {header} not compared ({with_load} with a load, {without} without)"
+
+
+def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterator[str]:
+    """A note for each column of heights or tip radii that are not those of the scene."""
+    own = {"height": scene.asperities.heights, "tip_radius": scene.asperities.tip_radii}
+    for header, cells in table.others.items():
+        name = bare(header).lower()
+        if name in own and cells.dtype.kind == "f" and unit(header) in ("", scene.units.length):
+            allowed = ROUNDED * float(np.abs(own[name]).max())
+            if (np.abs(cells - own[name][owners]) > allowed).any():
+                yield f"column {name} differs from the scene's: loads of another scene?"
 
 
 def _areas(path: Path, table: ReadTable, count: int) -> Any:

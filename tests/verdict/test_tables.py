@@ -116,6 +116,25 @@ def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: 
     assert ("not compared" in found.note) == bool(said)
 
 
+@pytest.mark.parametrize(
+    ("column", "cells", "same"),
+    [
+        ("height", (0, 0, 1e-9), False),
+        ("tip_radius [m]", (0.1, 0.2, 0.1), True),
+        ("Tip_radius", (0.1, 0.2, 0.1), False),
+        ("tip_radius", (0.1, 0.1004, 0.1), True),
+    ],
+)
+def test_heights_and_radii_of_another_scene_are_told(
+    tmp_path: Path, column: str, cells: Sequence[float], same: bool
+) -> None:
+    """A unit is not converted here: such a column is not compared."""
+    lines = "".join(f"{it},{cell}\n" for it, cell in zip(LOADS, cells, strict=True))
+    found = read_loads(written(tmp_path, f"load,{column}\n{lines}"), small())
+    said = f"column {column.lower()} differs from the scene's: loads of another scene?"
+    assert (said in found.note) == (not same)
+
+
 def test_a_line_of_numbers(tmp_path: Path) -> None:
     """As MATLAB writes a row vector."""
     row = cr.Asperities([[i, 0] for i in range(5)], 0.1)

@@ -144,6 +144,9 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
     for said, column, asperity, word in (
         *((texts, "status", asperity, word) for asperity, word in ((0, "open"), (60, "contact"))),
         (flags, "Contact", 0, "0"),
+        (flags, "touching", 60, "1"),
+        (np.where(flags == "1", "True", "False"), "in_contact", 0, "False"),
+        (np.where(flags == "1", "0", "1"), "open", 0, "1"),
         (np.where(texts == "open", "open", "closed"), "contact", 0, "open"),
         (np.where(flags == "1", "TRUE", "FALSE"), "contact", 60, "TRUE"),
     ):
