@@ -1,8 +1,9 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
 One code certifies all results, independently of the solver. If a certified result contradicts one
-of global scope, the mathematics or the code of the package has a mistake. Two certificates of local
-scope may differ: each box may contain a solution of its own.
+of global scope, the mathematics or the code of the package has a mistake. Two results of local
+scope may differ without a mistake: each certificate proves that its own box of loads contains a
+solution, and these may be different ones.
 """
 
 from __future__ import annotations
@@ -178,7 +179,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers, also without their final Newton step; SCS and QOCO where they are installed."""
+    """All solvers, those that end with a Newton step also without it; SCS and QOCO if installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),

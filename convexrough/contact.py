@@ -365,11 +365,12 @@ def covered(scene: Scene, radii: Array) -> int:
 def closest_changes(contact: Contact) -> Array:
     """(n,) [force] first-order load changes on a change to the "closest" geometry.
 
-    They are 0 if the scene has this geometry already. In it an asperity of tip radius rho, at the
-    distance r from the axis of a sphere of radius R, touches the sphere at r R / (R + rho). So its
-    offset is greater by r^2 rho / (2 R (R + rho)) than in the geometry "summit". The contact points
-    are closer to each other by a fraction of about rho / R, and the compliances between them are
-    greater by this fraction. At the same approach, with the compliance operator A,
+    They are 0 if the scene has this geometry already. In this geometry an asperity of tip radius
+    rho at the distance r from the axis of a sphere of radius R touches the sphere at the distance r
+    R / (R + rho) from the axis. So its offset is greater by r^2 rho / (2 R (R + rho)) than in the
+    geometry "summit". The contact points are closer to each other by a fraction of about rho / R,
+    and the compliances between them are greater by this fraction. At the same approach, with the
+    compliance operator A,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 

@@ -96,7 +96,7 @@ class Table(Record):
         """A pandas data frame with a row for each asperity, step, point or solver.
 
         Columns are named in the singular, components of vectors with _x and _y. Fields that are one
-        number or text are in `attrs`. Other two-dimensional arrays, such as the forces of
+        number or text are in `attrs`. All other two-dimensional arrays, such as the forces of
         asperities at each step of a history, are only in `to_xarray`.
 
         Raises ExtraError where pandas is not installed.

@@ -141,10 +141,10 @@ def summits(
     """Find the summits of a measured surface.
 
     SURFACE is .npy, .npz, .mat, a text file with a matrix or columns x, y, height, or an
-    instrument's file. With --scene, with --radius and --approach, or with --radius, --load and
-    --modulus, the command presses a sphere on the middle of the map, reports contacts, certificate,
-    crowding and model error for several values of --prune, and recommends one. With --whole it also
-    presses every pixel at the same approach, for comparison.
+    instrument's file. The command can also press a sphere on the middle of the map: give --scene;
+    or --radius and --approach; or --radius, --load and --modulus. It then reports contacts,
+    certificate, crowding and model error for several values of --prune, and recommends one of these
+    values. With --whole it also presses every pixel at the same approach, for comparison.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

@@ -67,8 +67,8 @@ def sweep(
     """Compute every scene of a sweep file.
 
     Results go to a folder named after the file (rough.toml: rough-sweep) unless --out names
-    another. --summary DIR prints quantiles of the results in DIR instead; with --out it also writes
-    them, and figures.
+    another. With --summary DIR in place of SWEEP the command computes no scenes, but prints
+    quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
     Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or
     workers died twice while computing the same scenes; 130 interrupted. Completed parts are kept,

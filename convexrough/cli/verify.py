@@ -105,8 +105,9 @@ def verify(
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
     Columns x and y, or an index, name the asperity of each row; without them the rows are in the
     order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
-    is a column pressure, rows are nodes or pixels. Pressure times area is summed at the nearest
-    asperities; the area is that of a column area, or of a pixel of a regular grid.
+    is a column pressure, rows are nodes or pixels. Pressure times area is added to the load of the
+    nearest asperity. The areas are in the column named area; without it, each row is a pixel of a
+    regular grid.
 
     Exit status: 0 only if the claimed set is proved right, every load and shear force is close
     enough, and prescribed totals agree; 2 wrong input; 4 if the shear problem could not be solved;

@@ -1,7 +1,8 @@
 """One theorem: how far the solution of a convex problem can be from any trial point.
 
-docs/theory/one-theorem.md states and proves it, with the symbols of this module. For a trial point
-x with the violations e and the solution x*, on a box where the Hessian is at least mu H, (1) is
+docs/theory/one-theorem.md states and proves it, with the symbols of this module. Let x be a trial
+point, e its violations of the first-order conditions, x* the solution, and H a positive diagonal
+matrix. On a box with both, where the Hessian is at least mu H with mu > 0, (1) is
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.
 
@@ -21,7 +22,8 @@ from convexrough.roundoff import SAFETY
 
 
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
-    """(n,) violations e for residuals F - beta.
+    """(n,) violations e of the first-order conditions, for residuals F - beta:
+    docs/theory/one-theorem.md.
 
     inside : (n,) False where x is on a lower face of K. True is also valid on an upper face: the e
         of an interior point, |F - beta|, is at least as large as that of a point on an upper face

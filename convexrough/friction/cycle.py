@@ -206,8 +206,8 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative. In gross sliding it has none if several
-        asperities start to slide at the same force, as the last ones, or if the approach is kept
+        Raises InputError if the loss has no derivative. In gross sliding it has none in two cases:
+        if several asperities are together the last to start sliding, or if the approach is kept
         constant.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")

@@ -132,8 +132,8 @@ class ShearState(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if there is no derivative. In gross sliding there is none if several
-        asperities start to slide at the same force, as the last ones, or if the approach is kept
+        Raises InputError if there is no derivative. In gross sliding there is none in two cases: if
+        several asperities are together the last to start sliding, or if the approach is kept
         constant.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)

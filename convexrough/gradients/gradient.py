@@ -1,7 +1,8 @@
 """`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
 
 The number is a weighted sum of energies V, approaches D0, loads and indentations at some load
-levels (`gradients.pulled`). The loads of these levels depend on loads, forces and friction.
+levels (`gradients.pulled`). The total loads of these levels depend on the prescribed loads and
+shear forces and on the coefficient of friction.
 """
 
 from __future__ import annotations
@@ -38,11 +39,12 @@ class Number(NamedTuple):
     """A number J that depends on a contact, with derivatives at constant forces and load.
 
     value    : J
-    scaled   : the part of J that is proportional to forces if all forces are scaled
-    pulled   : derivatives from each level, for the candidates of `problem`
+    scaled   : the part of J that consists of energies and loads: it is multiplied by c if the
+        modulus and all loads are
+    pulled : for each level the derivatives of its part of J, for the candidates of `problem`
     slopes   : derivatives of J by parameters outside the scene's geometry
-    steep    : coefficients of infinite derivatives, where J depends on D0 at the load 0
-    sides    : (m, 2) derivatives from below and from above
+    steep : where J depends on D0 at the load 0, the factors of dD0/dL, which is infinite there
+    sides : by "forces" or "loads": (m, 2) derivatives by those of a path, from below and from above
     """
 
     contact: Contact

@@ -67,8 +67,8 @@ class LatticeInfluence:
 
     array       : (N, 2) [length] points, with errors of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact summits; `array` is these times `lattice.shrink`, rounded. The factor
-        is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
+    layout      : the exact positions of the summits; `array` contains them times `lattice.shrink`,
+        rounded. The factor is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
     lattice     : the lattice of the points
     scale       : A_ij r_ij, which is 1 / (pi E*)
     """

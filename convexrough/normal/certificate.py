@@ -53,13 +53,14 @@ class Certificate(Table):
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
     duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
-        prescribed, the loads are first scaled to it, without those of asperities that cannot touch
+        prescribed, loads on asperities that cannot touch are first dropped, and the others scaled
+        to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
         of them touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
-        the largest (a_i + a_j) / r_ij, with contact radii a and distances r. It is infinite where
-        there is no other solution, and 0 where nothing is known
+        the largest (a_i + a_j) / r_ij, with contact radii a and distances r. This bound is infinite
+        if there is no other solution, and 0 if nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
     in_the_way : (m,) indices of asperities that prevent a proof; empty where there is one

@@ -49,7 +49,8 @@ class Program(Record):
     count       : number of asperities of the scene
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
-    objective   : minimum of the objective, in energy_unit; for bristles as OSQP finds it, or nan
+    objective   : minimum of the objective, in energy_unit; for bristles the value that OSQP finds,
+        nan if OSQP fails
     constant    : the energy, in energy_unit, is constant + objective; for the dual it is constant -
         objective. The constant is 0 for bristles, and if the approach is prescribed
     load_error_estimate : estimated error of the loads that minimise the objective exactly, as a
@@ -148,8 +149,8 @@ def program(
     220
 
     Raises TooDenseError if the solution lies outside the boxes in which the program is exact.
-    Raises SolverError if Newton's method finds no solution: its loads show whether the solution
-    lies in the boxes.
+    Newton's method solves the problem first, to check that the solution lies in the boxes;
+    SolverError is raised if it finds none.
     """
     checks.instance("scene", scene, Scene)
     checks.whole("bristles", bristles)
@@ -157,7 +158,7 @@ def program(
 
 
 def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
-    """The problem of a scene, with the matrix stored, and the scaled loads of its solution."""
+    """The problem of a scene with a dense matrix, and the loads that solve it, in scaled units."""
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:
         expected = "an approach at which an asperity touches"

@@ -112,7 +112,7 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, or the attribute of this name.
+    """The number of asperities with the status `name` if it is one, else the attribute `name`.
 
     The attribute is that of `found`, or of `found.certificate` where `found` has none.
     """
@@ -184,7 +184,7 @@ class Result(Table, Plottable):
 
     @property
     def orders(self) -> set[str]:
-        """What is proved about order (docs/theory/states.md), for each in `found`."""
+        """The different values of `order` (docs/theory/states.md) in `found`."""
         return {each.order for each in self.found if getattr(each, "order", None)}
 
     @property

@@ -47,8 +47,8 @@ class Surface(Record, Plottable):
     unit    : unit of all lengths, "" if unknown
     removed : forms subtracted from the heights, in this order
     filled  : number of pixels that were holes
-    clipped : number of pixels at the largest height, if the map seems to be cut off there, else 0;
-        by default counted in the heights
+    clipped : number of pixels at the largest height if the map seems to be cut off there, else 0;
+        by default determined from `heights`
     repeated : number of pixels below it with one height, if these are surprisingly many, else 0; by
         default counted in the heights
     source  : the file, or a description
@@ -126,8 +126,8 @@ class Surface(Record, Plottable):
     def warnings(self) -> tuple[str, ...]:
         """Warnings of a form that explains most of the variance, and of wrong pixels.
 
-        Forms are fitted to at most 256 by 256 of the pixels. Spikes are single pixels or pairs far
-        from all others.
+        Forms are fitted to at most 256 by 256 of the pixels. A spike is a pixel or a pair of pixels
+        whose height differs much from the median and from all neighbours.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3

@@ -58,7 +58,8 @@ def sweep(
         number for all scenes or one for each
     cycle, shear : only if `what` is scenes: amplitudes of cycles and shear forces, as fractions of
         the friction limit (coefficient of friction times load)
-    measure  : names in summary.json, or their last parts; overrides the list in a sweep file
+    measure  : names of numbers in summary.json, such as "cycle.loss", or their last parts ("loss");
+        replaces the list of a sweep file
     out      : folder for the results; default: they are only returned
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: number of processors
@@ -118,7 +119,7 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> Done:
-    """The computed table of a plan; arguments as for `sweep`."""
+    """The table of a plan, computed now, with a message and counts; arguments as for `sweep`."""
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:

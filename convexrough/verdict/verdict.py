@@ -135,8 +135,8 @@ def verify(
 
     loads : (n,) [force] in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed of a load, over the largest load, and of the total load, over the
-        total; with 1, little but the contact set is checked
+    within : largest error allowed: of a load, as a fraction of the largest load, and of a
+        prescribed total, as a fraction of this total. 1 checks hardly more than the contact set
     floor  : [force] a load up to this size, also a negative one, counts as 0, and its asperity
         as open
     influence : compliance operator; None for the cheapest
