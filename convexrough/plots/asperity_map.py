@@ -35,7 +35,7 @@ DENSE, CROWDED = 200, 3000
 PIXELS = 400
 
 #: Colour and label of each status: more slip is darker, also in grey.
-STICK, SLIP, SLIDING, UNKNOWN = "#b9d0e5", "#e0842a", "#701c05", "white"
+STICK, SLIP, SLIDING, UNKNOWN = "#b9d0e5", "#e0842a", "#701c05", "0.85"
 LOOKS = {
     "stuck": (STICK, "sticks"),
     "partial": (SLIP, "slips in part"),

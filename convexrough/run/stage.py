@@ -214,13 +214,13 @@ class Result(Table, Plottable):
     def printed_table(
         self, name: str, rows: list[Summary], printed: Mapping[str, str], title: str, most: int
     ) -> list[str]:
-        """The lines of the last `most` rows of the table in NAME.csv, with a title and units."""
+        """The lines of the last `most` rows of a table, with a title and units."""
         units = (f"{it} {unit}" for key, it in printed.items()
                  if (unit := unit_of(key, self.units)))  # fmt: skip
         named, cut = ", ".join(units), rows[-most:]
         said = [f"{title or name}  ({named})" if named else title or name]
         if len(cut) < len(rows):
-            said.append(f"(the last {len(cut)} of {len(rows)} rows; all are in {name}.csv)")
+            said.append(f"(the last {len(cut)} of {len(rows)} rows; all are in the table {name})")
         cells = [[row[key] for key in printed] for row in cut]
         return [*said, *aligned([list(printed.values()), *cells], digits=self.digits)]
 
