@@ -134,9 +134,9 @@ class Surface(Record, Plottable):
         >>> print(cr.surface.Surface(rough, pixel=1.0).warnings[0].partition(",")[0])
         a sphere of radius 49.9828
         """
-        every = -(-max(self.heights.shape) // FITTED)
-        few = self.heights[::every, ::every]
-        pixel = (self.pixel[0] * every, self.pixel[1] * every)
+        down, across = (-(-length // FITTED) for length in self.heights.shape)
+        few = self.heights[::down, ::across]
+        pixel = (self.pixel[0] * across, self.pixel[1] * down)
         left, found = float(np.var(few)), ""
         for kind in TRENDS if min(few.shape) >= 3 else ():
             try:
