@@ -1,9 +1,15 @@
-"""The slider page: what is in the file."""
+"""The slider page: what is in the file, and what a browser makes of it."""
 
+import json
 import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
 
 import convexrough as cr
 from convexrough.paper import example
@@ -11,25 +17,56 @@ from convexrough.plots import slider
 from convexrough.run.results import slider_page
 from convexrough.run.stages.normal import NormalResult, NormalStage
 
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
+in_browser = pytest.mark.skipif(
+    BROWSER is None, reason=f"no browser to open the page in: none of {', '.join(NAMES)}"
+)
+
+
+def pressed(scene: cr.Scene, approach: float = example.APPROACH) -> cr.Contact:
+    return cr.press(scene, approach=approach)
+
+
+def page_of(contact: cr.Contact) -> str:
+    return slider_page(pressed_result(contact))
+
 
 def pressed_result(contact: cr.Contact) -> NormalResult:
     return NormalStage(approach=contact.approach).compute(contact)
 
 
+def said(contact: cr.Contact) -> list[str]:
+    """What a run says of the contact."""
+    return pressed_result(contact).lines()
+
+
+def inside(text: str) -> Any:
+    """The data that a page carries."""
+    (found,) = re.findall(r'id="data">(.*?)</script>', text, re.S)
+    return json.loads(found)
+
+
+def data_of(contact: cr.Contact) -> Any:
+    return slider.slider_data(slider.Slides.of(contact), said(contact))
+
+
 @pytest.fixture(scope="module")
 def contact() -> cr.Contact:
-    return cr.press(example.scene(), approach=example.APPROACH)
+    return pressed(example.scene())
+
+
+# What is in the file.
 
 
 def test_the_file_needs_nothing_else_and_is_small(contact: cr.Contact) -> None:
-    text = slider_page(pressed_result(contact))
+    text = page_of(contact)
     assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", text)
     assert len(text.encode()) < 200_000  # of 1 MB
 
 
 def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
-    said = pressed_result(contact).lines()
-    data, limit = slider.slider_data(slider.Slides.of(contact), said), 0.5 * contact.load
+    data, limit = data_of(contact), 0.5 * contact.load
     states, discs = data["states"], data["discs"]
     assert states["fraction"] == [round(k / 100, 2) for k in range(101)]
     a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
@@ -52,3 +89,123 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         part = texts == "partial"
         stuck = state.stick_radii[touching] / radii
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
+
+
+# What the command line writes.
+
+
+# In a browser.
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as player:
+        running = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield running
+        running.close()
+
+
+class Opened:
+    """A page in the browser, which must ask for nothing and complain of nothing."""
+
+    def __init__(self, browser: Browser, file: Path, **options: Any) -> None:
+        self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
+        self.context.set_default_timeout(5000)
+        self.page: Page = self.context.new_page()
+        self.asked: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(file.as_uri())
+        self.address = file.as_uri()
+
+    def close(self) -> None:
+        self.context.close()
+        assert self.asked == [self.address]
+        assert self.complaints == []
+
+    def text(self, name: str) -> str:
+        return self.page.locator(f"#{name}").inner_text()
+
+    def number(self, name: str) -> float:
+        """As Python found it; what is shown has its powers of ten typeset."""
+        return float(self.page.locator(f"#{name}").get_attribute("data-value") or "nan")
+
+    def points(self, curve: str) -> np.ndarray[Any, Any]:
+        pairs = self.page.locator(curve).get_attribute("points") or ""
+        return np.array([pair.split(",") for pair in pairs.split()], dtype=float)
+
+
+@pytest.fixture
+def opened(browser: Browser, contact: cr.Contact, tmp_path: Path) -> Iterator[Opened]:
+    (tmp_path / "slider.html").write_text(page_of(contact), encoding="utf-8")
+    shown = Opened(browser, tmp_path / "slider.html")
+    follow(shown, 36)
+    yield shown
+    shown.close()
+
+
+def follow(shown: Opened, index: int) -> None:
+    options = shown.page.locator("#follow option").all_inner_texts()
+    (label,) = [option for option in options if option.startswith(f"{index}:")]
+    shown.page.locator("#follow").select_option(label=label)
+
+
+def near(values: Any) -> Any:
+    """A point of a loop is v_k - 2 v_i, each of five digits: off by 3 x 5e-5 at most."""
+    return pytest.approx(values, rel=0.0, abs=1.5e-4 * np.abs(values).max())
+
+
+def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int) -> None:
+    """Every number in sight is Python's."""
+    limit = 0.5 * contact.load
+    state = cr.shear(contact, force=fraction * limit)
+    steady = cr.cycle(contact, maximum=fraction * limit)
+    sphere = cr.smooth(contact.scene, load=contact.load)
+    X0 = sphere.displacement(limit)
+    assert float(shown.text("fraction")) == fraction
+    assert shown.number("q") == float(f"{fraction * limit:.5g}")
+    assert shown.number("x") == float(f"{state.displacement:.5g}")
+    assert shown.number("x_part") == float(f"{state.displacement / X0:.5g}")
+    assert shown.number("x_error") >= steady.displacement_error
+    assert shown.number("w") == float(f"{steady.loss_normalised:.5g}")
+    assert shown.number("w_smooth") == float(f"{steady.smooth_normalised:.5g}")
+    slide = (state.status == "sliding").sum()
+    assert shown.text("said").startswith(f"{slide} of 37 slide")
+    assert shown.page.locator("#map circle.sliding").count() == slide
+
+    load = contact.loads[index]
+    assert shown.number("load") == float(f"{load:.5g}")
+    assert shown.number("share") == float(f"{state.forces[index] / (0.5 * load):.5g}")
+    assert shown.number("moved") == float(f"{state.displacements[index] / X0:.5g}")
+    status = {"partial": "partial slip"}.get(state.status[index], state.status[index])
+    assert (shown.text("status"), shown.text("state")) == (contact.status[index], status)
+    stick = state.stick_radii[index] / contact.contact_radii[index]
+    assert shown.number("stick") == pytest.approx(stick, abs=5e-4)
+
+    # The loops: every point of them is where the force is sheared back and forth to it.
+    moved, share = shown.points("#whole .line").T
+    past = cr.history(contact, forces=limit * share.clip(-fraction, fraction))
+    assert moved == near(past.displacements / X0)
+    own_moved, own_share = shown.points("#own .line").T
+    assert own_share == near(past.asperity_forces[:, index] / (0.5 * load))
+    assert own_moved == near(past.asperity_displacements[:, index] / X0)
+    at = shown.page.locator("#whole .now").first.get_attribute("d")
+    assert at == f"M{moved[0]:g} {share[0]:g}h0"
+
+
+@in_browser
+def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> None:
+    opened.page.keyboard.press("Tab")
+    assert opened.page.evaluate("document.activeElement.id") == "force"
+    assert_shown(opened, contact, 0.5, 36)
+    for key, fraction in (("ArrowRight", 0.51), ("ArrowLeft", 0.5), ("PageDown", 0.4)):
+        opened.page.keyboard.press(key)
+        assert_shown(opened, contact, fraction, 36)
+    opened.page.keyboard.press("End")
+    assert_shown(opened, contact, 1.0, 36)
+    opened.page.keyboard.press("Home")
+    assert opened.text("said") == "0 of 37 slide, 37 stick"
+    said = opened.page.locator("#force").get_attribute("aria-valuetext")
+    assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick"
