@@ -199,7 +199,6 @@ def walk(
             expected = "a contact whose scene is this very object: pass start.scene"
             raise InputError("start", found="a contact of another scene", expected=expected)
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
-        influence = influence or start.influence
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     levels = contact.cached(FrictionLevels)
     return _path(

@@ -285,7 +285,7 @@ class NormalProblem:
         coefficients = hertz.local_coefficient(
             scene.material.contact_modulus, scene.relative_radii[which]
         )
-        influence = couple(scene, which, self.influence.scale, self.influence.name)
+        influence = couple(scene, which, self.influence.scale, None)
         return replace(
             self,
             candidates=which,
