@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough.errors import FileError, InputError, blamed_on
 from convexrough.scene.asperities import Asperities
@@ -52,10 +53,15 @@ def read_summits(
         named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
         raise InputError("columns", found=f"{', '.join(unread)}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip
-    if (said := table.units.get("x", "")) and parsed(said) and not how.units.length:
-        expected = f'[units] length in the scene file, as "{said}"'
-        raise InputError("column x", found=f"{said}, and a scene without units", expected=expected,
-                         where=str(path))  # fmt: skip
+    for name, said in table.units.items():
+        if parsed(said) and not how.units.length:
+            expected = f'[units] length in the scene file, as "{said}"'
+            raise InputError(f"column {name}", found=f"{said}, and a scene without units",
+                             expected=expected, where=str(path))  # fmt: skip
+    for name, cells in table.others.items():
+        if bare(name).lower() in INDEX and is_permuted(cells):
+            found, expected = f"{cells[0]:g}, {cells[1]:g}, ...", "the rows in this order"
+            raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
     given = columns.get("tip_radius")
     if (given is None) == (tip_radius is None):
         found = "neither" if given is None else "both"
@@ -66,3 +72,12 @@ def read_summits(
     assert radii is not None  # one of the two
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
+
+
+def is_permuted(cells: NDArray[Any]) -> bool:
+    """True for the numbers 0, 1, ... or 1, 2, ... in another order."""
+    if cells.dtype.kind != "f" or len(cells) < 2:
+        return False
+    ordered = np.sort(cells)
+    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
+    return bool(counts and (ordered != cells).any())

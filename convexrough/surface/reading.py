@@ -150,6 +150,10 @@ def _arrays(path: Path) -> HeightGrid:
     if chosen is None:
         names = ", ".join(found) or "none"
         raise InputError("arrays", found=names, expected='one called "heights"', where=str(path))
+    masks = [name for name in found if name.lower() in ("mask", "valid")]
+    if masks and found[masks[0]].shape == named[chosen].shape:
+        expected = "none: nan in the heights where they are not valid"
+        raise InputError("arrays", found=masks[0], expected=expected, where=str(path))
     size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
     both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
     units = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]

@@ -369,16 +369,16 @@ def _places(
     mistakes: list[str] = []
     for name in wanted:
         called = columns.get(name, name)
+        alike = [each for each in bared if each.lower() in (name, *COLUMNS[name].also)]
+        if name not in columns and len(alike) > 1 and bared.count(name) < 2:
+            choice = f": --column {name}={alike[0]}" if how.scalable else ""
+            found = " and ".join(map(repr, alike))
+            mistakes.append(f"columns: found {found}, expected one of them{choice}")
         for known in (names, bared, lowered):
             if count := known.count(called):
                 places[name] = known.index(called)
                 if count > 1:
                     mistakes.append(f"columns: found {called!r} twice, expected once")
-                elif name not in columns and lowered.count(name) > 1:
-                    alike = [each for each in bared if each.lower() == name]
-                    choice = f": --column {name}={alike[0]}" if how.scalable else ""
-                    found = " and ".join(map(repr, alike))
-                    mistakes.append(f"columns: found {found}, expected one of them{choice}")
                 break
         else:
             if name not in columns:

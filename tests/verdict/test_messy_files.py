@@ -499,6 +499,25 @@ def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None
         cr.read_scene(tmp_path / "scene.toml")
 
 
+@pytest.mark.parametrize(
+    ("more", "units", "said"),
+    [
+        ({"z": HEIGHTS, "h": 2 * HEIGHTS}, METRES, "found 'z' and 'h', expected one of them"),
+        ({"height": HEIGHTS, "z": HEIGHTS}, METRES, "found 'height' and 'z', expected one"),
+        ({"height [nm]": HEIGHTS}, "", "column height: found nm, and a scene without units"),
+        ({"id": np.roll(np.arange(len(HEIGHTS)), 1)}, METRES, "column id: found .*, expected the"),
+    ],
+)
+def test_summits_with_columns_that_contradict(
+    tmp_path: Path, case: Case, more: Columns, units: str, said: str
+) -> None:
+    write_scene(tmp_path, units=units)
+    columns = {"x": PLACES[:, 0], "y": PLACES[:, 1], **more}
+    (tmp_path / "summits.csv").write_text(lines(columns))
+    with pytest.raises(cr.InputError, match=said):
+        cr.read_scene(tmp_path / "scene.toml")
+
+
 @pytest.mark.parametrize("named", ['height = "z"', 'z = "height"'])
 def test_summits_by_other_names(tmp_path: Path, case: Case, named: str) -> None:
     columns = {"x": PLACES[:, 0], "y": PLACES[:, 1], "z": HEIGHTS}
