@@ -61,6 +61,7 @@ def wrong(call: str) -> Any:
         ("cr.certify(scene, ['1'] * 61, approach=5e-5)", r"loads: found \['1'.*expected numbers"),
         ("cr.Scene('1', scene.asperities, scene.material)", "sphere_radius: found '1'"),
         ("cr.shear(scene, force=0.0)", "contact: found type Scene, expected a Contact"),
+        ("cr.testing.assert_shear_certified(scene, [0.0], force=0.0)", "expected a Contact"),
         ("cr.Material(youngs_modulus=2.0, poisson_ratio=0.3)", r"Material\.from_youngs\("),
         ("cr.Material(1.0)", "poisson_ratio: found None, expected a number from 0"),
         ("cr.Asperities(pd.DataFrame({'y': [0.0], 'x': [1.0]}), 1.0)", "found columns y, x"),

@@ -120,6 +120,7 @@ def verify_shear(
 
     Raises InputError for the same reasons as `certify_shear`.
     """
+    checks.instance("contact", contact, Contact)
     within = tolerance("within", within)
     checks.in_order("forces", forces)
     given = checks.array("forces", forces, length=len(contact.scene))

@@ -246,6 +246,8 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
     """The tables of a parsed file, or None and all messages, in the order of the file."""
+    if "" in contents:
+        return None, ['[""]: unknown table, expected a name']
     model = _model(tuple(STAGES.values()))
     try:
         return model.model_validate(dict(contents)), []

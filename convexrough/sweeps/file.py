@@ -50,6 +50,7 @@ _Seeds = Annotated[
     expected("how many (1 or more), or a list of whole numbers, none of them twice", _are_seeds),
 ]
 _Values = Annotated[list[Any], expected("a list of values, none of them twice", _different)]
+_List = Annotated[list[Any], expected("a list of values", bool)]
 _Laws = Annotated[
     dict[Law, list[float]],
     expected(
@@ -66,7 +67,7 @@ class Keys(FileTable):
 
     measure: _Names = Field(default_factory=list)
     seeds: _Seeds | None = None
-    together: Annotated[dict[str, _Values], _KEYS] = Field(default_factory=dict)
+    together: Annotated[dict[str, _List], _KEYS] = Field(default_factory=dict)
     over: Annotated[dict[str, _Values], _KEYS] = Field(default_factory=dict)
     draw: Annotated[dict[str, _Laws], _KEYS] = Field(default_factory=dict)
 
@@ -82,6 +83,8 @@ class Keys(FileTable):
             if not rest or "." in rest:
                 expects = 'expected a table and a key of it, such as "asperities.height_std"'
                 yield f"{where}.{key}", expects
+            elif name == "sweep":
+                yield f"{where}.{key}", "expected a key of a scene"
             elif name in FIXED:
                 yield f"{where}.{key}", f"values of [{name}] are columns, the same for every scene"
             elif key in first or (key == "asperities.seed" and "seeds" in keys):

@@ -73,6 +73,7 @@ MISTAKES = [
     (scene_text(more=PASCALS), "[material] contact_modulus: found 1 N/m², which is 1 Pa, expected"),
     # [normal], [solver], [units], and which tables there are
     (scene_text(normal=""), "[normal] approach, load: found neither, expected exactly one of the"),
+    (scene_text(more='[""]'), '[""]: unknown table, expected a name'),
     (scene_text(more="[frictoin]"), '[frictoin]: unknown table, did you mean "friction"?'),
     (scene_text(more="[shear]\nfractions = [0.1]"),
      "[friction]: missing table, needed with [shear]"),

@@ -82,6 +82,10 @@ WRONG = {
         sweeping(over={"normal.load": [1e-7, -1.0]}),
         "[sweep] over.normal.load[1]: [normal] load: found -1.0, expected a positive number",
     ),
+    "its own key": (
+        sweeping(over={"sweep.seeds": [1, 2]}),
+        "over.sweep.seeds: expected a key of a",
+    ),
     "a value twice": (sweeping(over={"normal.load": [1e-7, 1e-7]}), "values, none of them twice"),
     "two ways of one key": (
         sweeping(over={"normal.load": [1e-7]}, together={"normal.load": [2e-7]}),
