@@ -103,12 +103,12 @@ def assert_agree(
         expected = f"as many asperities as in the first, {len(one.loads)}"
         raise InputError("second", found=len(other.loads), expected=expected)
     if isinstance(first, Contact) and isinstance(second, Contact):
-        wanted, found = (
+        wanted, given = (
             f"approach {each.approach!r}" if (P := each.prescribed_load) is None else f"load {P!r}"
             for each in (first, second)
         )
-        if found != wanted:
-            raise InputError("second", found=f"prescribed {found}", expected=f"{wanted}, as first")
+        if given != wanted:
+            raise InputError("second", found=f"prescribed {given}", expected=f"{wanted}, as first")
     for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
