@@ -1,0 +1,64 @@
+"""Numbers that rest on an assumption that fails are not returned; mismatched data are refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import convexrough as cr
+from convexrough.friction import order
+from convexrough.friction.levels import FrictionLevels
+
+MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+
+
+def test_no_onset_where_an_indentation_falls() -> None:
+    case = cr.gallery.case("losing-contact-after")
+    contact = cr.press(replace(case.scene, friction=0.5), load=0.98 * case.control["load"])
+    assert cr.prove_order(contact) == "fails"
+    assert np.isnan(cr.onset_of_sliding(contact)).all()
+    with pytest.raises(cr.ProofError, match="an indentation falls as the load rises"):
+        cr.onset_gradient(contact, 0)
+
+
+def test_equal_asperities_slide_last_together() -> None:
+    angles = 2 * np.pi * np.arange(6) / 6
+    ring = cr.Asperities(0.002 * np.stack((np.cos(angles), np.sin(angles)), axis=1), 0.02)
+    contact = cr.press(cr.Scene(1.0, ring, MATERIAL, 0.5, geometry="summit"), approach=1e-5)
+    np.testing.assert_array_equal(cr.onset_of_sliding(contact), 0.5 * contact.load)
+    with pytest.raises(cr.InputError, match="which slides last, together with others"):
+        cr.onset_gradient(contact, 1)
+
+
+def test_gradients_of_losses_have_bounds_only_where_order_is_proved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asperities = cr.Asperities.hexagonal(spacing=0.002, tip_radius=0.02, within=0.0102)
+    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5), approach=5e-5)
+    monkeypatch.setattr(order, "INVERTED", 0)
+    monkeypatch.setattr(FrictionLevels.order, "__defaults__", (0,))
+    cycle = cr.cycle(contact, maximum=0.1 * contact.load)
+    assert cycle.order == "proved for one step"
+    gradient = cycle.gradient()
+    assert np.isfinite(gradient.heights).all()
+    assert gradient.value_error == np.inf
+    assert np.isinf(gradient.height_errors[contact.loads > 0]).all()
+
+
+def test_summits_of_a_map_stay_with_it(tmp_path: Path) -> None:
+    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
+    summits = surface.summits()
+    rougher = summits.roughened(height_std=1e-3, seed=1)
+    assert type(rougher) is cr.Asperities
+    assert "positions" in repr(rougher)
+    contact = cr.press(cr.Scene(1e4, summits, MATERIAL), load=10.0)
+    with pytest.raises(cr.InputError, match="contact: found summits of another map"):
+        cr.surface.press_whole(cr.surface.self_affine(0.8, 0.1, 32.0, seed=2), contact)
+    named = cr.surface.Surface(surface.heights, surface.pixel, "µm").summits()
+    with pytest.raises(cr.InputError, match="units: found summits in µm, expected"):
+        cr.Scene(1e4, named, MATERIAL, units=("mm", "N"))
+    assert len(cr.Scene(1e4, named, MATERIAL, units=("um", "N"))) == len(named)
+    np.savez(tmp_path / "a.npz", heights=surface.heights, mask=surface.heights > 0, pixel=1.0)
+    with pytest.raises(cr.InputError, match="arrays: found mask, expected none"):
+        cr.surface.read(tmp_path / "a.npz")
