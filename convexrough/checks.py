@@ -133,7 +133,8 @@ def in_order(what: str, values: Any) -> None:
     """Raise InputError for a pandas object that is sorted otherwise than its index 0, 1, ..."""
     if hasattr(values, "iloc"):
         index = np.asarray(values.index)
-        if (np.sort(index) == np.arange(len(index))).all() and (np.diff(index) < 0).any():
+        counts = index.dtype.kind in "iu" and (np.sort(index) == np.arange(len(index))).all()
+        if counts and (np.diff(index) < 0).any():
             expected = "the order of the asperities: .sort_index(), or .to_numpy() if they have it"
             raise InputError(what, found="an index in another order", expected=expected)
 

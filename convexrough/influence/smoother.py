@@ -38,7 +38,7 @@ WINDOW = 8
 
 #: Mean number of points in the cell of a point above which cells are made smaller, most cells per
 #: point, and largest difference between the numbers of rows or columns that contain points.
-MOST_COMPANY, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
+MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
 #: Lower limit of 1 + d A, as the spectrum of A is negative at short waves.
 LEAST = 0.2
@@ -53,7 +53,7 @@ def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
     width, height = away.max(axis=0).tolist()
     side = max(np.sqrt(width * height / n), (width + height) / n)
     cells = _packed_cells(away / side)
-    while _company(cells) > MOST_COMPANY:
+    while _mean_sharing(cells) > MOST_SHARING:
         finer = _packed_cells(away / (0.5 * side))
         if np.prod(finer.max(axis=1) + 1) > MOST_CELLS * n:
             break
@@ -70,7 +70,7 @@ def _packed_cells(places: Array) -> Indices:
     return np.array(cells)
 
 
-def _company(cells: Indices) -> float:
+def _mean_sharing(cells: Indices) -> float:
     """The mean number of points in the cell of a point."""
     counts = np.bincount(cells[0] * (cells[1].max() + 1) + cells[1])
     return float(counts @ counts / cells.shape[1])
@@ -96,9 +96,9 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     total = sums(root * root)  # D^2
     touching = total > 0
     counts = sums(root > 0)[touching].astype(np.float64)
-    count, crowd = float(counts.mean()), float(counts @ counts / counts.sum())
+    count, sharing = float(counts.mean()), float(counts @ counts / counts.sum())
     # Where blocks hold many asperities: A W r within a block, as if signs were random.
-    rough = scale / m * np.sqrt(np.pi * crowd * np.log(max(0.5 * crowd / (m * m), 1.0)))
+    rough = scale / m * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / (m * m), 1.0)))
     size, spectrum = _block_spectrum(shape, basis, m, count, workers)
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)

@@ -60,7 +60,8 @@ def read_summits(
                              expected=expected, where=str(path))  # fmt: skip
     for name, cells in table.others.items():
         if bare(name).lower() in INDEX and is_permuted(cells):
-            found, expected = f"{cells[0]:g}, {cells[1]:g}, ...", "the rows in this order"
+            found = f"{cells[0]:g}, {cells[1]:g}, ..."
+            expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
     given = columns.get("tip_radius")
     if (given is None) == (tip_radius is None):
