@@ -54,8 +54,6 @@ class Contact(Cached, Table, Plottable):
         to point forces in place of pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; above 1
         contact discs overlap and the model fails
-    covered       : number of open summits under the contact disc of a neighbour, where a point
-        force does not represent the pressure
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     seconds       : [s] time of `press` or `solve`
 
@@ -77,7 +75,6 @@ class Contact(Cached, Table, Plottable):
     certificate: Certificate
     model_error: float
     crowding: float
-    covered: int
     candidates: int
     influence: Kind
     solver: str
@@ -94,6 +91,11 @@ class Contact(Cached, Table, Plottable):
     def status(self) -> NDArray[np.str_]:
         """(n,) "contact" or "open" where that is proved, else "undecided"."""
         return self.certificate.status
+
+    @cached_property
+    def covered(self) -> int:
+        """Number of open summits under contact discs, where point forces misplace the pressure."""
+        return covered(self.scene, self.contact_radii)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -304,7 +306,6 @@ def _contact(
         certificate=certificate,
         model_error=model_error,
         crowding=crowding,
-        covered=covered(scene, radii),
         candidates=len(problem),
         influence=problem.influence.name,
         solver=solver.name,
