@@ -133,10 +133,10 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     cut_off = normal["contact"] >= FEW and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
         yield at_the_rim(normal["array_extent"])
-    elif cut_off and normal["rim_touching"] > CUT_RIM and normal["contact"] >= ARRAY:
+    elif cut_off and normal["rim_touching"] > CUT_RIM:
         yield (
             f"of the asperities at the rim of the array {normal['rim_touching']:.0%} touch: others "
-            "beyond it would carry load, too; use a larger array"
+            "beyond it could carry load, too; use a larger array"
         )
     if normal["steepness"] > STEEP:
         yield (
@@ -207,7 +207,12 @@ def axis_outside(scene: Scene) -> bool:
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """The share that touches of the asperities farthest from the middle, one in each sector."""
+    """The share that touches of the asperities farthest from the middle, one in each sector.
+
+    It is 0 where the asperities are too few for an array.
+    """
+    if not is_array(scene):
+        return 0.0
     positions = scene.asperities.positions
     x, y = (positions - (positions.min(axis=0) + positions.max(axis=0)) / 2).T
     sectors = np.rint(np.arctan2(y, x) * (DIRECTIONS / (2.0 * np.pi))).astype(np.intp) % DIRECTIONS

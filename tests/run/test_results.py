@@ -118,7 +118,10 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     """Every asperity touches; on a flat base that is meant. Corners of a square may be open."""
     inner = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
-    wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    wide, few = (
+        cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
+        for within in (0.0102, 0.0045)
+    )
     material = cr.Material(1.0, 0.3)
     for base, approach, told in (
         (1.0, 9e-5, "of the asperities at the rim of the array 100% touch: others beyond it"),
@@ -132,6 +135,10 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
             if told
             else (not contact.warnings)
         )
+    for approach, touching in ((1e-5, 7), (1.5e-5, 13)):  # of 13
+        contact = cr.press(cr.Scene(1.0, few, material), approach=approach)
+        assert np.count_nonzero(contact.loads) == touching
+        assert any("rim of the array 100%" in each for each in contact.warnings) == (touching == 13)
     contact = cr.press(cr.Scene(1.0, cr.Asperities(inner, 0.02), material), approach=7e-5)
     assert contact.loads[np.argmax(inner @ [1, 1])] == 0
     assert any("rim of the array 75% touch" in each for each in contact.warnings)
