@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -223,16 +223,18 @@ class Kernel:
 
 
 def through_waves(
-    fields: Sequence[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
+    fields: Iterable[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
 ) -> list[NDArray[Any]]:
     """The fields (rows, padded columns) whose transforms `mix` computes.
 
-    fields : (rows, columns) each; `mix` gets their transforms, after padding with zeros
+    fields : (rows, columns) each, needed one by one; `mix` gets their transforms, after padding
+        with zeros
     """
     from scipy import fft
 
-    rows, (height, width) = len(fields[0]), padded
+    height, width = padded
     halves = [fft.rfft(field, width, axis=1, workers=workers) for field in fields]
+    rows = len(halves[0])
 
     def work(each: slice) -> None:
         waves = mix([fft.fft(half[:, each], height, axis=0) for half in halves], each)

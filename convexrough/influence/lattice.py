@@ -251,8 +251,10 @@ class LatticeInfluence:
         Pairs are searched up to the distance beyond which none can exceed the largest found."""
         if not self._filled:
             return crowding(self.points, radii)
-        field = np.full(self.box.shape, -np.inf)
-        field[tuple(self.cells)] = radii
+        (rows, columns), places = self.box.shape, self._boxed[1]
+        field = np.full((rows, self.box.padded[1]), -np.inf)
+        field.ravel()[places] = radii
+        field = field[:, :columns]
         most, worst = 2.0 * float(radii.max()), 0.0
         for distance, i, j in self._pairs():
             if most <= worst * distance:
@@ -325,8 +327,8 @@ class LatticeInfluence:
             whole, *moments = waves
             return [along * whole, across * whole, along * moments[0] + across * moments[1]]
 
-        fields = [self._laid_out(values) for values in (shares, x * shares, y * shares)]
-        fields = through_waves(fields, self.box.padded, self.box.workers, pull)
+        given = (self._laid_out(weight * shares) for weight in (1.0, x, y))
+        fields = through_waves(given, self.box.padded, self.box.workers, pull)
         change = fields[2].ravel()[places]
         change -= x * fields[0].ravel()[places]
         change -= y * fields[1].ravel()[places]

@@ -169,9 +169,8 @@ class Sliced:
             field.ravel()[at] = values
             return field
 
-        fields = [laid_out(slices.pop(0)) for _ in range(count)]
+        fields = (laid_out(slices.pop(0)) for _ in range(count))
         levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
-        del fields
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
         def add_up(some: slice) -> Pair:

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, even
 from convexrough.convex.definite import largest, proved_margin
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
@@ -88,7 +88,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.compliance(corner)
-    nowhere, none = np.full(len(problem), np.inf), np.zeros(len(problem), dtype=bool)
+    nowhere, none = even(np.inf, len(problem)), np.zeros(len(problem), dtype=bool)
     if (theta := problem.convexity_at(h)) < 1:
         yield Box("global", problem, corner, h, theta, nowhere, none)
         return

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
@@ -31,7 +31,9 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
+#: Statuses by their codes.
 STATUSES = np.array(["undecided", "contact", "open"])
+TOUCHING, OPEN = 1, 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,8 +46,7 @@ class Certificate(Table):
     convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
         the smallest eigenvalue of the Hessian, scaled by each asperity's local compliance, is at
         least 1 - convexity_number
-    status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
-        "undecided"
+    codes : index of each status in `STATUSES`
     load_errors : [force] bounds on |load - solution|
     gaps : [length] gaps that remain under these loads; 0 where an asperity touches
     gap_errors : [length] bounds on |gap - solution|
@@ -71,12 +72,12 @@ class Certificate(Table):
     ('global', True, True)
     """
 
-    _shown = ("holds", "meaning", "load_error", "gap_error")
+    _shown = ("holds", "meaning", "status", "load_error", "gap_error")
     _along: ClassVar[Along] = {("asperity",): ("status", "load_errors", "gaps", "gap_errors")}
 
     scope: Scope
     convexity_number: float
-    status: NDArray[np.str_]
+    codes: NDArray[np.int8] = field(repr=False)
     load_errors: Array
     gaps: Array
     gap_errors: Array
@@ -88,6 +89,11 @@ class Certificate(Table):
     other_solutions_cover: bool = False
     in_the_way: Indices = field(default_factory=lambda: frozen(np.zeros(0, dtype=np.intp)))
     obstacle: str = ""
+
+    @cached_property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) "contact" (its load is proved positive), "open" (its gap is) or "undecided"."""
+        return frozen(STATUSES[self.codes])
 
     @property
     def meaning(self) -> str:
@@ -118,7 +124,7 @@ class Certificate(Table):
     @property
     def holds(self) -> bool:
         """True if every asperity is proved to touch or proved to be open."""
-        return self.scope != "none" and not bool((self.status == "undecided").any())
+        return self.scope != "none" and bool(self.codes.all())
 
     @property
     def load_error(self) -> float:
@@ -183,6 +189,10 @@ def certificate_of(
     start : the loads of the asperities that can touch, scaled to a prescribed total
     """
     length, force = problem.units.length, problem.units.force
+    others = NO_OTHERS
+    if isinstance(found, Proved) and found.box.scope != "global":
+        approach_bound = lowest_approach_bound(problem, found.loads.value, start.product.value)
+        others = OtherSolutions.of(problem, found.loads.upper, approach_bound)
     screened = _screened(problem, start)
     here = isinstance(found, Proved) and start is found.trial
     known = found.indentation if isinstance(found, Proved) and here else start.indentation
@@ -190,39 +200,27 @@ def certificate_of(
     indentation[screened.which] = screened.indentation
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
-    given = loads[problem.candidates]
-    if here and np.array_equal(given / force, found.loads.value):  # the proof is for these loads
-        off = found.loads.error
-        moved = off + np.abs(start.loads.low)
-        errors, shift = found.indentation.error, float(found.approach.error)
-    else:
-        off = (Ball.exact(given / force) - found.loads).size
-        moved = (Ball.exact(start.loads) - found.loads).size
-        errors = (found.indentation - known.value).size
-        shift = float((found.approach - start.approach.value).size)
-    # Asperities that cannot touch have no load. Tiny loads underflow in scaled units.
-    load_errors = loads.copy()
-    load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
-    errors = problem.to_scene(errors)
+    load_errors = _load_errors(problem, loads, found)
+    moved = _apart(start.loads.high, found) + np.abs(start.loads.low)
+    shift = float((found.approach - start.approach.value).size)
+    energy = _energy_error(problem, start, found, moved)
+    errors = problem.to_scene(
+        found.indentation.error if here else (found.indentation - known.value).size
+    )
     errors[screened.which] = screened.rounding + shift
     if screened.coupling is not None:
         coupled = screened.coupling.apply(moved)
         errors[screened.which] += coupled + screened.coupling.rounding(moved).of(coupled)
     errors *= 1 + SAFETY
-    statuses = 2 * (indentation < -errors)
-    statuses[screened.which[screened.below]] = 2
-    statuses[problem.candidates[found.touching]] = 1
-    statuses[problem.candidates[found.open]] = 2
-    others = NO_OTHERS
-    if found.box.scope != "global":
-        approach_bound = lowest_approach_bound(problem, found.loads.value, start.product.value)
-        others = OtherSolutions.of(problem, found.loads.upper, approach_bound)
-    energy = _energy_error(problem, start, found, moved)
+    codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
+    codes[screened.which[screened.below]] = OPEN
+    codes[problem.candidates[found.touching]] = TOUCHING
+    codes[problem.candidates[found.open]] = OPEN
     energy += _screened_energy(problem, loads, indentation, errors)
     return Certificate(
         scope="local" if others.possible else "global",
         convexity_number=found.box.convexity_number,
-        status=frozen(STATUSES[statuses]),
+        codes=frozen(codes),
         load_errors=frozen(load_errors),
         gaps=frozen(np.maximum(-indentation, 0.0) * length),
         gap_errors=frozen(errors * length),
@@ -235,26 +233,39 @@ def certificate_of(
     )
 
 
+def _apart(loads: Array, found: Proved) -> Array:
+    """(n,) bounds on the errors of loads in scaled units."""
+    return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
+
+
+def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
+    """(N,) bounds on the errors of loads. Those of asperities that cannot touch are the loads."""
+    errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
+    scaled = given / force  # tiny loads underflow
+    errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
+    return errors
+
+
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
     """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| if Phi is convex from P to P*.
 
     P are the loads, P* the solution, and e the violations of the contact law at P. Loads q on
     asperities fixed open add at most e'q, and removing them changes the residuals by A q.
     """
-    box = found.box
-    violations = start.excess
+    box, loads, excess = found.box, start.loads.high, start.excess
     if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
-        violations = violations + 2 * ROUNDOFF * (start.local + start.product.upper)
-        moved = moved + ROUNDOFF * start.loads.high
-    excess = np.where(box.fixed_open & (start.loads.high == 0), 0.0, violations)
-    q = np.where(box.fixed_open, start.loads.high * (1 + SAFETY), 0.0)
-    if q.any():
+        excess += 2 * ROUNDOFF * (start.local + start.product.size)
+        moved = moved + ROUNDOFF * loads
+    excess[box.fixed_open & (loads == 0)] = 0.0
+    if (box.fixed_open & (loads > 0)).any():
+        q = np.where(box.fixed_open, loads * (1 + SAFETY), 0.0)
         displacement = problem.influence.apply(q)
         excess += displacement + problem.influence.rounding(q).of(displacement)
-    most = np.where(box.fixed_open, 0.0, np.maximum(box.loads, start.loads.high * (1 + SAFETY)))
+    most = np.maximum(box.loads, loads * (1 + SAFETY))
+    most[box.fixed_open] = 0.0
     # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
-    part = np.cbrt(np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0))
-    convex = part.min(initial=1.0) > box.convexity_number * (1 + SAFETY)
+    part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min(initial=1.0)
+    convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
     if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
         return np.inf
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
@@ -317,7 +328,7 @@ def _unproved(
     return Certificate(
         scope="none",
         convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
-        status=frozen(np.full(n, STATUSES[0])),
+        codes=frozen(np.zeros(n, dtype=np.int8)),
         load_errors=frozen(np.full(n, np.inf)),
         gaps=frozen(np.maximum(-indentation, 0.0) * length),
         gap_errors=frozen(np.full(n, np.inf)),

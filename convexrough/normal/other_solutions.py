@@ -25,11 +25,13 @@ class OtherSolutions(NamedTuple):
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
         """The bounds for loads (n,) up to `near`, and approaches up to `approach_bound`."""
+        def radii(loads: Array) -> Array:
+            return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
+
         A = problem.influence
         perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
-        both = near, problem.bounds(approach_bound)
-        a, most = (problem.radii(problem.compliance(loads)) * (1 + SAFETY) for loads in both)
-        t = 2.0 / np.pi * _mean(a, most)
+        a = radii(near)
+        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(approach_bound)))
         if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
             return NO_OTHERS
         crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed

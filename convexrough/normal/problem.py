@@ -156,7 +156,7 @@ class NormalProblem:
         places[self.candidates] = np.arange(len(self))
         return places
 
-    @cached_property
+    @property
     def exact_depths(self) -> Ball:
         """(n,) D, at a prescribed approach."""
         return self.exact.offsets + self.depth

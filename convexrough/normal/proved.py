@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, elementwise, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, summed
 from convexrough.convex.theorem import distance
@@ -208,18 +208,17 @@ class _Missing(NamedTuple):
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     """The loads; the ball (indentation / k)^(3/2) replaces an inexact load if it is smaller."""
-    which = np.nonzero(loads.radius > POOR * loads.mid.high)
-    if len(which[0]) == 0:
+    if not (loads.radius > POOR * loads.mid.high).any():
         return loads
-    k = problem.exact.coefficients
-    high, low, radius = (np.broadcast_to(it, loads.shape)[which] for it in (*k.mid, k.radius))
-    ratio = indentation[which] / Ball(Pair(high, low), radius)
+    return elementwise(_smaller, loads, indentation, problem.exact.coefficients)
+
+
+def _smaller(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
+    ratio = Ball(n, dn) / Ball(k, dk)
     by_law = ratio.positive_part() * ratio.sqrt()
-    better = by_law.radius < loads.radius[which]
-    parts = np.array((*loads.mid, loads.radius))
-    places: Any = (slice(None), *(each[better] for each in which))
-    parts[places] = np.array((*by_law.mid, by_law.radius))[:, better]
-    return Ball(Pair(parts[0], parts[1]), parts[2])
+    better = (dP > POOR * P.high) & (by_law.radius < dP)
+    found = where(better, by_law, Ball(P, dP))
+    return found.mid, found.radius
 
 
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:

@@ -68,12 +68,12 @@ class Trial:
         """(n,) True where the load is not 0."""
         return np.asarray(self.loads.high > 0)
 
-    @cached_property
+    @property
     def excess(self) -> Array:
         """(n,) violations of the contact law: |gap| where loaded, and the overlap elsewhere."""
         return excess(self.gap, self.inside)
 
-    @cached_property
+    @property
     def defect(self) -> Array:
         """(n,) the residual of the contact law: the gap where loaded, and minus the overlap."""
         gap = self.gap.value

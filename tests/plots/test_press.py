@@ -13,6 +13,7 @@ from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
 import convexrough as cr
 from convexrough import fields
+from convexrough.normal.certificate import OPEN, TOUCHING
 from convexrough.plots import press_figures, shear_figures
 from convexrough.sphere import hertz
 
@@ -35,9 +36,9 @@ def dense(spacing: float) -> cr.Contact:
     loads = hertz.pressure(asperities.distances, 7e-3, 1.0)
     loads *= hertz.load(7e-3**2, hertz.local_coefficient(1.0, 1.0)) / loads.sum()
     nothing = np.zeros(len(scene))
-    status = np.where(loads > 0, "contact", "open")
+    codes = np.where(loads > 0, np.int8(TOUCHING), np.int8(OPEN))
     certificate = cr.Certificate(
-        "global", 0.5, status, nothing, nothing, nothing, 4.9e-5, approach_error=0, duality_gap=0
+        "global", 0.5, codes, nothing, nothing, nothing, 4.9e-5, approach_error=0, duality_gap=0
     )
     radii = hertz.contact_radius(loads, 1.0, scene.relative_radii)
     return dataclasses.replace(
@@ -49,11 +50,11 @@ def dense(spacing: float) -> cr.Contact:
 def doubted(scope: Any, undecided: int) -> cr.Contact:
     """The paper's contact with doubt cast on the last of its touching asperities."""
     contact = cr.press(paper(), approach=PAPER_APPROACH)
-    status = contact.status.copy().astype("U9")
-    status[37 - undecided : 37] = "undecided"
+    codes = contact.certificate.codes.copy()
+    codes[37 - undecided : 37] = 0
     if scope == "none":
-        status[:] = "undecided"
-    certificate = dataclasses.replace(contact.certificate, scope=scope, status=status)
+        codes[:] = 0
+    certificate = dataclasses.replace(contact.certificate, scope=scope, codes=codes)
     return dataclasses.replace(contact, certificate=certificate)
 
 
