@@ -165,8 +165,8 @@ assert energy_of(reference) <= energy_of(loads) * (1 - 1e-12)
 # Exercise
 # --------
 #
-# Insert :math:`p = 0` into the dual bound. Of which contact is it the energy? How far is it from
-# the minimum here?
+# Insert :math:`p = 0` into the dual bound. Of which contact is this bound the minimum of the
+# energy? How far is it from the minimum of the energy here?
 #
 # *Answer.* :math:`\min \Phi \ge -\tfrac 2 5 \sum k^{-3/2} D_i^{5/2}`, the energy of seven tips
 # without stems that do not interact. Neighbours and stems make the contact more compliant, so they

@@ -3,8 +3,8 @@ r"""
 ===============================
 
 **Claim.** A modelling language does not accept the energy of interacting asperities as convex, and
-indeed the energy is not convex everywhere. An argument with charged shells shows where it is: up to
-contact radii 57 % larger than those at which neighbouring discs touch.
+indeed the energy is not convex everywhere. An argument with charged shells shows where it is
+convex: up to contact radii 57 % larger than those at which neighbouring discs touch.
 
 The load :math:`P_j` of an asperity on an elastic half-space acts on asperity :math:`i` at the
 distance :math:`r_{ij}` as a point force, and displaces it by :math:`A_{ij} P_j` with
@@ -186,8 +186,8 @@ assert np.allclose(mutual, 1.0, atol=1e-4)
 # Exercise
 # --------
 #
-# Two equal asperities alone, at distance :math:`r`. Up to which contact radius is their energy
-# convex, and what does the lemma prove?
+# Take two equal asperities alone, at distance :math:`r`. Up to which contact radius is their energy
+# convex, and up to which radius does the lemma prove this?
 #
 # *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` off it, so
 # it is positive definite up to :math:`a = \tfrac \pi 2 r`. The lemma with :math:`s = r/2` proves

@@ -15,8 +15,8 @@ A sphere of radius :math:`R` (the relative radius of both surfaces) is pressed b
 # The naive form
 # --------------
 #
-# Solvers of quadratic programs are robust and fast. Try to minimise Hertz's energy with one,
-# :math:`\tfrac 3 5 k P^{5/3} - \delta P`.
+# Solvers of quadratic programs are robust and fast. Try to minimise Hertz's energy,
+# :math:`\tfrac 3 5 k P^{5/3} - \delta P`, with such a solver.
 
 from typing import Any
 
@@ -62,7 +62,8 @@ assert refused
 #           \qquad f \ge 0 .
 #
 # This is a quadratic program. A bristle that touches is shortened by :math:`\delta - x^2/R`; all
-# others have a gap. The sum over :math:`|x| \le a = \sqrt{R \delta}` is
+# others have a gap. For narrow bristles the sum of the forces over
+# :math:`|x| \le a = \sqrt{R \delta}` becomes
 #
 # .. math:: P = \int_{-a}^{a} E^* \Big( \delta - \frac{x^2}{R} \Big) dx
 #           = E^* \Big( 2 a \delta - \frac{2 a^3}{3 R} \Big)
@@ -161,8 +162,8 @@ print(f"energy / (delta P) = {energy / (delta * f.sum()):.6f}")
 assert abs(energy / (delta * f.sum()) + 0.4) < 1e-4
 
 # %%
-# The package has the same program for any number of asperities. Each has its own bristles, and the
-# total loads of the asperities interact.
+# The package has the same program for any number of asperities. Each asperity has its own bristles,
+# and the total loads of the asperities interact.
 
 material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)

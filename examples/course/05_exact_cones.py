@@ -127,10 +127,10 @@ plt.show()
 # An independent check: the identity
 # ----------------------------------
 #
-# Why does no lift have less energy than the true powers? A cone :math:`x y \ge w^2` implies
+# Why is the lifted energy never below that of the true powers? A cone :math:`x y \ge w^2` implies
 # :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s` (for the first cone take :math:`s^2`).
-# Multiply these four inequalities by weights that are not negative, and add them up. The sum is
-# the lifted energy minus the tangent of the energy at :math:`t = s`:
+# Multiply these four inequalities by weights that are not negative, and add them up. The sum is the
+# lifted energy minus the tangent of the energy at :math:`t = s`:
 #
 # .. math:: \big(\tfrac 3 5 - \tfrac S 3\big) y_5 + \tfrac S 3 z - \lambda y_3 + \mu
 #           = d\,[s^4 - 2 s^2 y_2 + y_4] + c\,[\cdot] + e\,[\cdot] + \tfrac S 3 [\cdot] \ge 0 .
@@ -194,9 +194,9 @@ assert (by_newton.status == "contact").sum() == 37
 # :math:`\lambda` for which the energy has its minimum at :math:`t = 0.9`.
 #
 # *Answer.* The minimum of the cone program is below that of the energy: one weight of the identity
-# is negative, and a lift that does not consist of powers has less energy. A fifth cone, with
-# :math:`t` itself as a variable, makes the program exact up to :math:`S = 1`, where the energy
-# stops being convex.
+# is negative, and values :math:`y_2, \dots, y_5, z` that are not powers of one number have less
+# energy. A fifth cone, with :math:`t` itself as a variable, makes the program exact up to
+# :math:`S = 1`, where the energy stops being convex.
 
 edge, at = 0.97, 0.9
 steep = at**2 - 2 / 3 * edge * at**3

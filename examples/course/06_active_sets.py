@@ -101,8 +101,8 @@ assert period > 1
 # Why? The loads on the other asperities lower one asperity so far that it only just touches. Alone
 # it would carry far more, and the loop starts from this larger load. From there Newton's method for
 # :math:`x^{2/3}`, which is concave, overshoots zero. The asperity is dropped; then it penetrates
-# and is added with the same large load, and so on for ever. The loop decides by the signs at an
-# intermediate point, not by those at the solution.
+# and is added with the same large load, and so on for ever. The loop decides by the signs of the
+# loads and gaps at an intermediate point, not by those at the solution.
 #
 # The repair: the normal map
 # --------------------------
@@ -206,12 +206,13 @@ assert ended < DRAWN == reached
 # Exercise
 # --------
 #
-# One asperity alone, :math:`x^{2/3} = \delta` with :math:`k = 1`. For which starting loads does
-# the first step of Newton's method for :math:`x` lead to a negative load?
+# Take one asperity alone with the load :math:`x`: :math:`x^{2/3} = \delta`, with :math:`k = 1`. For
+# which starting loads does the first step of Newton's method for :math:`x` lead to a negative load?
 #
-# *Answer.* The step goes to :math:`x - \tfrac 3 2 x^{1/3} (x^{2/3} - \delta) = \tfrac 1 2 x^{1/3}
-# (3 \delta - x^{2/3})`: below zero for all :math:`x > (3 \delta)^{3/2}`, 5.2 times the exact load.
-# In terms of :math:`\delta` the same problem is linear, and one step is enough.
+# *Answer.* The step goes to
+# :math:`x - \tfrac 3 2 x^{1/3} (x^{2/3} - \delta) = \tfrac 1 2 x^{1/3} (3 \delta - x^{2/3})`. This
+# is below zero for all :math:`x > (3 \delta)^{3/2}`, 5.2 times the exact load. In terms of
+# :math:`\delta` the same problem is linear, and one step is enough.
 
 start = np.linspace(1, 8, 70001)
 after = start - (start ** (2 / 3) - 1) / (2 / 3 * start ** (-1 / 3))

@@ -85,11 +85,12 @@ assert refused
 #
 # .. math:: Q_i = f (P_i - p_i), \qquad X = c_t f (D_0(P) - D_0(L)), \qquad s_i = c_t f g_i(L) .
 #
-# The reason: subtract the contact laws at the two loads of an asperity that touches at both. Its
-# own compression gives :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over
-# :math:`c_t f`; the coupling is :math:`A (P - p)`; the right side is the difference of approaches,
-# the same for all. An asperity that is open in the second pressing has :math:`p_i = 0`, so
-# :math:`Q_i = f P_i`. It slides, and its slip is :math:`c_t f` times its gap.
+# The reason: for an asperity that touches in both pressings, subtract its contact law at the total
+# load :math:`L` from that at :math:`P`. Its own compression gives
+# :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over :math:`c_t f`; the
+# coupling is :math:`A (P - p)`; the right side is the difference of approaches, the same for all.
+# An asperity that is open in the second pressing has :math:`p_i = 0`, so :math:`Q_i = f P_i`. It
+# slides, and its slip is :math:`c_t f` times its gap.
 
 second = cr.press(scene, load=pressed.load - Q / FRICTION)
 forces = FRICTION * (pressed.loads - second.loads)

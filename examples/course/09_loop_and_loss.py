@@ -150,10 +150,10 @@ assert 0 < half.loss - loop.area < 1e-3 * half.loss
 # Memory
 # ------
 #
-# The displacement is not a function of the force: at 0.3 it differs between the way up and the way
-# down. The state depends on the past through the turning points only, and a small loop that closes
-# removes its own two. After the detour to 0.4 and back the path continues as if there had been no
-# detour.
+# The displacement is not a function of the force: at :math:`Q / (f P) = 0.3` it differs between the
+# way up and the way down. The state depends on the past through the turning points only, and a
+# small loop that closes removes its own two. After the detour to 0.4 and back the path continues as
+# if there had been no detour.
 
 plain = cr.history(pressed, forces=np.array([0.3, 0.7, 0.3, -0.5, 0.7]) * limit)
 nested = cr.history(pressed, forces=np.array([0.7, -0.1, 0.4, -0.1, -0.5, 0.7]) * limit)
@@ -172,10 +172,10 @@ assert abs(lost / inner.loss - 1) < 1e-9
 # --------
 #
 # The amplitude of a small cycle is halved. By which factor does the loss fall? And what is the
-# smooth sphere's loss at small :math:`t = Q / (f P)`?
+# smooth sphere's loss, divided by :math:`W_0`, at small :math:`t = Q / (f P)`?
 #
 # *Answer.* The factor is 8, because the error of the trapezoid rule is
-# :math:`-\tfrac 1 {12} D_0'' (P - L)^3`. For the sphere, expand
+# :math:`-\tfrac 1 {12} D_0'' (P - L)^3`. For the sphere, expand its loss over :math:`W_0`,
 # :math:`e(t) = 1 - (1-t)^{5/3} - \tfrac{5 t}{6} [1 + (1-t)^{2/3}]`: the terms in :math:`t` and
 # :math:`t^2` cancel, and :math:`e = \tfrac 5 {162} t^3 + \dots`
 

@@ -153,18 +153,18 @@ plt.show()
 # Why it needs no elasticity
 # --------------------------
 #
-# Cut each contact into bristles, springs side by side, which carry the normal forces
-# :math:`N_b(s)` at the total load :math:`s`. Choose any slope :math:`\theta(s)` within
-# :math:`\pm 1`, and let bristle :math:`b` carry the shear force
-# :math:`q_b = f \int \theta\, dN_b`. By the contact law, the approach minus a constant is at every
-# load the bristle's own indentation plus the displacement due to the loads on the other
-# asperities. This law is *linear*. Multiply its derivative by :math:`c_t f\, \theta`, where
-# :math:`c_t` is the ratio of tangential to normal compliance, and integrate over :math:`s`: the
-# result is the balance of tangential displacements. So every curve is an equilibrium, for any
-# shapes, heights and elasticity. It also respects friction, :math:`|q_b| \le f N_b`, because no
-# slope exceeds 45 degrees. The bristles that slip determine the curve: they are those that come
-# into contact above :math:`L`. The level :math:`L` follows from the total shear force alone,
-# because the forces :math:`N_b` add up to :math:`P` on any scene.
+# Cut each contact into bristles, springs side by side, which carry the normal forces :math:`N_b(s)`
+# at the total load :math:`s`. Choose any slope :math:`\theta(s)` within :math:`\pm 1`, and let
+# bristle :math:`b` carry the shear force :math:`q_b = f \int \theta\, dN_b`. By the contact law, at
+# every load the approach minus a constant equals the bristle's own indentation plus the
+# displacement due to the loads on the other asperities. This law is *linear*. Multiply its
+# derivative by :math:`c_t f\, \theta`, where :math:`c_t` is the ratio of tangential to normal
+# compliance, and integrate over :math:`s`: the result is the balance of tangential displacements.
+# So every curve is an equilibrium, for any shapes, heights and elasticity. It also respects
+# friction, :math:`|q_b| \le f N_b`, because no slope exceeds 45 degrees. The bristles that slip
+# determine the curve: they are those that come into contact above :math:`L`. The level :math:`L`
+# follows from the total shear force alone, because the forces :math:`N_b` add up to :math:`P` on
+# any scene.
 #
 # The elastic problem is solved once per corner :math:`s_k`, as a normal contact with loads
 # :math:`P_i(s_k)` and approach :math:`D_0(s_k)`. With the change :math:`c_k` of slope at the
