@@ -12,15 +12,15 @@ from convexrough.cli.speech import DONE, echo, progress, written
 
 @click.command()
 @output_options
-@click.option("--quick", is_flag=True, help="Fewer and smaller sizes.")
+@click.option("--quick", is_flag=True, help="Use fewer and smaller scenes.")
 @click.option("--page", metavar="FILE", type=PATH, help="Also update this Markdown page.")
 def bench(
     out: Path | None, no_figures: bool, force: bool, as_json: bool, quick: bool, page: Path | None
 ) -> int:
-    """Measure time and error of every solver at many sizes.
+    """Measure time and error of solvers for many scene sizes.
 
-    Results go to the folder bench-results unless --out names another. With --page, the
-    command also replaces the text between the markers of FILE, and the figures in its folder.
+    Results go to the folder bench-results unless --out names another. With --page, the command also
+    replaces the text between the markers of the page FILE, and the figures in the folder of FILE.
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite

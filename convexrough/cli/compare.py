@@ -33,14 +33,14 @@ from convexrough.errors import FileError, blamed_on
 def compare(
     scene: Path, solvers: tuple[str, ...], within: float, log: Path | None, as_json: bool
 ) -> int:
-    """Compare all solvers on one scene: agreement, certificate, time.
+    """Solve a scene with all solvers; compare loads, proofs, times.
 
     If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
     solvers are compared with Newton's method.
 
     The exit status is 3 if a result is not certified, if a load differs from Newton's by more than
     --within, if a solver does not support the scene, or if two certified results contradict each
-    other, which would be a mistake in the mathematics or the code.
+    other, which would reveal a mistake in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -27,7 +27,7 @@ def gallery(
     names: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """List or export hard scenes with answers to 50 digits.
+    """List, export or time hard scenes with 50-digit answers.
 
     NAMES are names of cases or of families; default: all. --export writes each case as a quadratic
     program (.npz for qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index.

@@ -23,7 +23,7 @@ def paper(
     formats: tuple[str, ...],
     dpi: int,
 ) -> int:
-    """Reproduce the source paper's example (Dini and Hills 2009)."""
+    """Reproduce the example of Dini and Hills (2009)."""
     from convexrough.atomic import write_text
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data

@@ -36,7 +36,7 @@ def run(
     formats: tuple[str, ...],
     dpi: int,
 ) -> int:
-    """Compute the contact of a scene file; write tables, certificate and figures.
+    """Compute a scene; write tables, certificate and figures.
 
     Results go to the folder SCENE-results unless --out names another. If the file has a table
     [sweep], the command does the same as `convexrough sweep`.

@@ -106,7 +106,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 @click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load.")
 @click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
               help="Size of a pixel, if the file states none.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ...")
+@click.option("--unit", metavar="UNIT", help="Unit of pixel size and heights: µm, mm, ...")
 @click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different.")
 @click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
               default="plane", show_default=True,
@@ -115,7 +115,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Remove hills less prominent than this fraction of the height Sz.")  # fmt: skip
+              help="Remove hills less prominent than PART of the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,

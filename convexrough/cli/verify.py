@@ -70,7 +70,7 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
               help="Header or number (from 1) of the column with load, x, y, ...")  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
-              help="Multiply the numbers of a column.")  # fmt: skip
+              help="Multiply the numbers of a column by FACTOR.")  # fmt: skip
 @click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
               help="-1 if compression is negative in the file.")  # fmt: skip
 @click.option("--missing-open", is_flag=True, help="Asperities without a row in the file are open.")
@@ -103,15 +103,15 @@ def verify(
     """Check contact loads from another code.
 
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
-    Columns x and y, or an index, name the asperity of each row; without them the rows are in the
+    Columns x and y, or an index, assign each row to an asperity; without them the rows are in the
     order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
     is a column pressure, rows are nodes or pixels. Pressure times area is added to the load of the
     nearest asperity. The areas are in the column named area; without it, each row is a pixel of a
     regular grid.
 
-    Exit status: 0 only if the claimed set is proved right, every load and shear force is close
-    enough, and prescribed totals agree; 2 wrong input; 4 if the shear problem could not be solved;
-    3 otherwise. With --explain it is 0 if the files can be read.
+    Exit status: 0 if it is proved that exactly the claimed asperities touch, and that the errors of
+    loads, shear forces and prescribed totals are at most --within; 2 wrong input; 4 if the shear
+    problem could not be solved; 3 otherwise. With --explain it is 0 if the files can be read.
     """
     from convexrough.plausibility import cautions_about
     from convexrough.run.results import results_folder

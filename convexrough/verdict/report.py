@@ -138,7 +138,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
     lines += table(claim.off) if math.isfinite(claim.error) else []
     lines += labelled([(f"total {claim.one}", _total(claim, scene.units.force))])
     if len(claim.suspects):
-        lines += [*labelled([("suspects", "likeliest first")]), *table(claim.suspects)]
+        lines += [*labelled([("suspects", "most likely first")]), *table(claim.suspects)]
     return lines
 
 

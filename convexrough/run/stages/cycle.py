@@ -89,7 +89,10 @@ class CycleResult(Result):
     """The result of [cycle]: the steady cycles."""
 
     stage: CycleStage
-    title = "steady cycles: amplitudes Qa of the force and Xa of the displacement, loss W"
+    title = (
+        "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W; "
+        "W0: six times a smooth sphere's W at the onset of gross sliding"
+    )
     digits = 6
     printed: ClassVar[Mapping[str, str]] = {
         "maximum_fraction": "max/(fP)",

@@ -31,13 +31,13 @@ COUNTS = ("contact", "open", "undecided")
 FOUND = ("candidates", "influence", "solver", "iterations", "seconds", "model_error")
 SCOPES = {
     "global": "global: the scene has exactly one solution",
-    "local": "local: exactly one solution with contact radii near these",
+    "local": "local: exactly one solution with contact radii near those of these loads",
     "none": "none: nothing is proved",
 }
 INFLUENCES = {
-    "dense": "dense: a matrix",
-    "lattice": "lattice: Fourier transforms",
-    "scattered": "scattered: Fourier transforms on a mesh",
+    "dense": "dense: compliance as a matrix",
+    "lattice": "lattice: compliance by Fourier transforms",
+    "scattered": "scattered: compliance by Fourier transforms on a mesh",
 }
 
 
@@ -136,7 +136,8 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     model = f" (of a model that does not hold: crowding {crowding:.3g})" if crowding > 1 else ""
 
     def known(name: str) -> str:
-        return f"{bound(proof[name])} {unit_of(name, units)}".rstrip()
+        most = "at most " if math.isfinite(proof[name]) else ""
+        return f"{most}{bound(proof[name])} {unit_of(name, units)}".rstrip()
 
     lines = [
         ("asperities", f"{normal['asperities']}{able}"),
@@ -144,17 +145,17 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
         ("approach", f"{normal['approach']:.10g} {units.length}".rstrip()),
         ("load", f"{normal['load']:.10g} {units.force}".rstrip()),
         ("certificate", SCOPES[proof["scope"]] + model),
-        ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
+        ("convexity number", f"{proof['convexity_number']:.4g}  (below 1 the energy is convex)"),
         ("load error", f"{known('load_error')}{relative}"),
         ("gap error", known("gap_error")),
-        ("duality gap", f"{known('duality_gap')}  (bound on the excess energy)"),
+        ("duality gap", f"{known('duality_gap')}  (excess of the energy over its minimum)"),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
         beta, model_error = _neglected(normal), normal["model_error"]
         lines += [
-            ("model error", f"{model_error:.2g}  (from point forces in place of pressures)"),
-            ("crowding", f"{crowding:.3g}  (contact discs overlap above 1)"),
+            ("model error", f"about {model_error:.2g} of displacements  (due to point forces)"),
+            ("crowding", f"{crowding:.3g}  (above 1 contact discs overlap)"),
             *([("bodies", beta)] if beta else []),
             ("mean pressure", _described_pressure(normal, units)),
             ("geometry", _described_geometry(normal)),
