@@ -87,7 +87,7 @@ def describe_verdict(found: Verified) -> list[str]:
     """Aligned lines on each claim: what is wrong, undecided, or inaccurate, and the total."""
     lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
-        others = ": --json and --out have all"
+        others = ": --json and --out list all"
         lines += ["", *describe_claim(claim, found.verdict.scene, others)]
     return lines
 
@@ -103,9 +103,9 @@ def _proved(claim: Claim) -> str:
         return f"{claim.proved} wrong"
     if len(claim.undecided):
         return f"{claim.proved} not proved"
-    near = f"{claim.many} correct to {_size(claim)}"
+    near = f"{claim.many} correct to within {_size(claim)} {claim.one}"
     if not claim.near_enough:
-        near = f"errors of up to {_size(claim)}, more than allowed"
+        near = f"errors of up to {_size(claim)} {claim.one}, more than allowed"
     total = "" if claim.total_holds else f"; total {claim.one} differs"
     return f"{claim.proved} proved; {near}{total}"
 

@@ -46,7 +46,7 @@ def test_what_is_right(command: Any, contact: cr.Contact, scene: str) -> None:
     assert " ".join(line[:18].strip() for line in lines[1:8]) == (
         "geometry contact modulus result wrong statuses undecided load error total load"
     )
-    assert re.search(r" contact set proved; loads correct to \S+e-1\d of the largest$", lines[3])
+    assert re.search(r" contact set proved; loads correct to within \S+e-1\d of the largest load$", lines[3])
     assert [line[18:] for line in lines[4:6]] == ["none"] * 2
     assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", lines[6][18:])
     assert lines[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
@@ -128,7 +128,7 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     assert outcome.status == 3
     assert "hint: loads on 24 asperities proved open are at most 1.5e-20" in outcome.err
     assert "--floor 2e-20 counts them as 0" in outcome.err
-    assert "and 14 more: --json and --out have all" in outcome.out
+    assert "and 14 more: --json and --out list all" in outcome.out
     assert command("verify", "a.toml", claim(contact, noisy), "--floor", "2e-20").status == 0
     below = claim(contact, {40: -1e-20})
     refused = command("verify", "a.toml", below)
@@ -176,7 +176,7 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
     outcome = command(*asked, shear_file(state.forces))
     assert (outcome.status, outcome.err) == (0, "")
-    assert "shear forces      statuses proved; shear forces correct to " in outcome.out
+    assert "shear forces      statuses proved; shear forces correct to within " in outcome.out
     for asperity, word in ((0, "open"), (60, "sliding")):
         wrong = np.array(state.status)
         wrong[asperity] = word
