@@ -74,10 +74,11 @@ assert abs((k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[0] / D[0] - 1) > 1
 # ----------------------------------------
 #
 # For any trial loads :math:`p`, a square is not negative: :math:`(x - p)^\top M (x - p) \ge 0`, so
-# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Insert this into the
-# energy. The remaining minimum separates into one problem per tip, and each has a closed form:
-# :math:`\tfrac 3 5 k x^{5/3} - \lambda x` is smallest at :math:`x = (\lambda / k)^{3/2}`, with the
-# value :math:`-\tfrac 2 5 \lambda^{5/2} k^{-3/2}`, or 0 if :math:`\lambda < 0`. So
+# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Insert this into the energy.
+# The remaining minimum separates into one problem per tip, with :math:`\lambda = (D - M p)_i`, and
+# each has a closed form: :math:`\tfrac 3 5 k x^{5/3} - \lambda x` is smallest at
+# :math:`x = (\lambda / k)^{3/2}`, with the value :math:`-\tfrac 2 5 \lambda^{5/2} k^{-3/2}`, or 0
+# if :math:`\lambda < 0`. So
 #
 # .. math:: \min \Phi \; \ge \; - \tfrac 1 2 p^\top M p
 #           - \tfrac 2 5 \sum_i k^{-3/2} \max(D - M p, 0)_i^{5/2} \quad \text{for every } p.
@@ -113,11 +114,11 @@ assert 0 <= gap < 1e-6 * abs(energy_of(loads))
 # From a gap to loads
 # -------------------
 #
-# The Hessian of the energy is at least :math:`M`. So loads whose energy exceeds the minimum by no
-# more than the gap differ from the exact loads by at most :math:`\sqrt{2\, \text{gap} / \mu}`,
-# where :math:`\mu` is the smallest eigenvalue of :math:`M`. Because of the root, eight digits of
-# the energy give only four digits of the loads. The picture shows trial loads on the way from the
-# naive loads to the accurate ones.
+# The Hessian of the energy minus :math:`M` is positive semidefinite. So loads whose energy exceeds
+# the minimum by no more than the gap differ from the exact loads by at most
+# :math:`\sqrt{2\, \text{gap} / \mu}`, where :math:`\mu` is the smallest eigenvalue of :math:`M`.
+# Because of the root, eight digits of the energy give only four digits of the loads. The picture
+# shows trial loads on the way from the naive loads to the accurate ones.
 
 mu = float(np.linalg.eigvalsh(M)[0])
 rest = np.logspace(0, -5, 60)  # 1: the naive loads; 0: the accurate ones

@@ -128,9 +128,9 @@ plt.show()
 # ----------------------------------
 #
 # Why is the lifted energy never below that of the true powers? A cone :math:`x y \ge w^2` implies
-# :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s` (for the first cone take :math:`s^2`).
-# Multiply these four inequalities by weights that are not negative, and add them up. The sum is the
-# lifted energy minus the tangent of the energy at :math:`t = s`:
+# :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s` (for the first cone with :math:`s^2` in place
+# of :math:`s`). Multiply these four inequalities by weights that are not negative, and add them up.
+# The sum is the lifted energy minus the tangent of the energy at :math:`t = s`:
 #
 # .. math:: \big(\tfrac 3 5 - \tfrac S 3\big) y_5 + \tfrac S 3 z - \lambda y_3 + \mu
 #           = d\,[s^4 - 2 s^2 y_2 + y_4] + c\,[\cdot] + e\,[\cdot] + \tfrac S 3 [\cdot] \ge 0 .
@@ -166,10 +166,10 @@ assert len(checked) == 96
 assert all(value == 0 for value in checked)
 
 # %%
-# The weights are not negative for :math:`0 \le s \le 1` if :math:`e` is not. The weight :math:`e`
-# is concave in :math:`s`, with :math:`e = \tfrac 3 5 - \tfrac S 3` at 0 and
-# :math:`e = \tfrac 5 3 (\tfrac{21}{25} - S)` at 1. So four cones are exact up to
-# :math:`S = 21/25`; contacts whose discs do not overlap have :math:`S \le 2/\pi = 0.64`.
+# For :math:`0 \le s \le 1` the other weights are never negative, so only :math:`e` remains to be
+# checked. It is concave in :math:`s`, with :math:`e = \tfrac 3 5 - \tfrac S 3` at 0 and
+# :math:`e = \tfrac 5 3 (\tfrac{21}{25} - S)` at 1. So four cones are exact up to :math:`S = 21/25`;
+# contacts whose discs do not overlap have :math:`S \le 2/\pi = 0.64`.
 #
 # The program of a whole scene has these cones for every asperity, and one quadratic form. It finds
 # the 37 contacts of Dini and Hills (2009), and Newton's method, which uses no cones, finds the
