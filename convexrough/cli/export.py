@@ -29,9 +29,9 @@ def export(
     """Write a scene as cone and quadratic programs for other solvers.
 
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
-    contact law, and its dual, which bounds the energy. The format mps and a second npz (qpsolvers)
-    contain the quadratic program of bristles (springs that together follow Hertz's law). index.json
-    gives the minimum, and how to convert a solution to loads.
+    contact law, and its dual, which bounds the energy from below. The format mps and a second npz
+    (qpsolvers) contain the quadratic program of bristles (springs that together follow Hertz's
+    law). index.json gives the minimum, and how to convert a solution to loads.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

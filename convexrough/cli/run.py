@@ -100,7 +100,7 @@ def _proved(results: list[Result]) -> Proof | None:
 @click.command()
 @click.argument("scene", type=PATH)
 def new(scene: Path) -> int:
-    """Write a commented scene to start from."""
+    """Write an example of a scene file, with comments."""
     from importlib.resources import files
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")

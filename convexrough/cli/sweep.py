@@ -39,7 +39,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
 @json_option
-@click.option("--part", metavar="K/N", callback=_part, help="Compute only the K-th of N shares.")
+@click.option("--part", metavar="K/N", callback=_part, help="Compute the K-th of N sets of scenes.")
 @force_option
 @click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
 @click.option(
