@@ -14,9 +14,9 @@ surfaces apart.
     python examples/boundary_elements.py --pixels 1024
 
 For the scene of Dini and Hills (2009) the load converges to 3.59667e-7. The total load of the
-geometry "closest" differs from it by -0.016 %, and the worst ring by +0.25 %. For the geometry
-"summit" these are +0.33 % and -7.6 %. Coarse pixels change the loads of rings: with 512 pixels the
-+0.25 % becomes 0.29 %, with 384 0.36 %.
+geometry "closest" differs from it by -0.016 %, and the load of the worst ring by +0.25 %. For the
+geometry "summit" the differences are +0.33 % and -7.6 %. Coarse pixels change the loads of rings:
+the +0.25 % becomes +0.29 % with 512 pixels, and +0.36 % with 384 pixels.
 """
 
 from __future__ import annotations

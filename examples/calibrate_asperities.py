@@ -2,10 +2,10 @@
 
 Suppose the load was measured at twelve approaches. The asperities are known to be on a hexagonal
 lattice, but neither their tip radius nor their spacing is known. A least-squares fit needs the
-derivatives of each load by both parameters. One gradient per point of the curve gives them; finite
-differences would need three solutions per point. The same derivatives give the accuracy of the fit.
-The two parameters are strongly correlated, because sharper tips at a smaller spacing carry nearly
-the same load.
+derivatives of each load with respect to both parameters. One gradient per point of the curve gives
+them; finite differences would need three solutions per point. The same derivatives give the
+accuracy of the fit. The two parameters are strongly correlated, because sharper tips at a smaller
+spacing carry nearly the same load.
 
 Rings of asperities make contact one after the other. So the sum of squares has local minima, and
 from some starting values the fit ends in one. A large residual shows this.

@@ -4,8 +4,8 @@ The lattice of Dini and Hills (2009) is refined k times: spacing and tip radii b
 proportion, while the sphere and its approach stay the same. An asperity is more compliant than the
 solid material in its place, as if there were a soft layer of the thickness of the spacing b. So the
 rough sphere carries less load than a smooth one, and the difference vanishes with b. Richardson's
-extrapolation of four loads to b = 0 gives Hertz's load, (4/3) E* sqrt(R) D0^(3/2). Likewise the
-displacement at half the limiting shear force tends to Mindlin's.
+extrapolation of four loads to b = 0 gives Hertz's load, (4/3) E* sqrt(R) D0^(3/2). In the same
+limit the displacement at half the limiting shear force tends to Mindlin's.
 
     python examples/continuum_limit.py
 

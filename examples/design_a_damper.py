@@ -2,8 +2,9 @@
 
 A joint under a constant load takes an alternating shear force. Each of its sixty-one asperities may
 be up to 2 % of the approach taller or shorter; their mean height is fixed. Which heights make a
-cycle lose the most energy? The derivatives of the loss by all heights cost two linear systems, so
-any gradient-based optimiser can be used. Equal heights are neither the best nor the worst.
+cycle lose the most energy? The derivatives of the loss with respect to all heights cost only the
+solution of two linear systems. Any gradient-based optimiser can be used. Equal heights are neither
+the best nor the worst.
 
     python examples/design_a_damper.py --draw design.png
     python examples/design_a_damper.py --finer 4          # 955 asperities, ten seconds

@@ -11,8 +11,8 @@ the derivative of w_i(P) = D_i (docs/theory/convexity.md, (1)), where r_i is the
 short asperity from neighbour i. For three equal neighbours at the distance r it is negative if a
 exceeds pi r / (2 (3 - 2 / sqrt(3))) = 0.851 r. Their discs overlap above 0.866 r. Random searches
 over positions and sizes of up to seven neighbours found no derivative below -0.03; this script
-repeats a short one. So an asperity loses contact only if contact discs nearly overlap, where the
-model ends.
+repeats a short one. In all these cases an asperity loses contact only where contact discs nearly
+overlap, and there the model ends.
 
     python examples/losing_contact.py
 """

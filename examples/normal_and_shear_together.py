@@ -2,10 +2,11 @@
 
 First, one smooth sphere is compared with the incremental law of Mindlin and Deresiewicz in the form
 of Thornton and Yin, integrated numerically. Then a rough contact goes through cycles with the shear
-force in phase with the normal load, and a quarter of a cycle behind it. On a straight path with a
-slope below that of friction no energy is lost. On a steeper one the loss has a closed form with
-mean values of D0. At the end, the loss is computed for several phases, together with that of a
-smooth sphere, and drawn to phase_losses.png.
+force in phase with the normal load, and a quarter of a cycle behind it. On a straight path no
+energy is lost if the shear force changes by less than the coefficient of friction times the change
+of the load. On a steeper path the loss has a closed form with mean values of D0. At the end, the
+loss is computed for several phases, together with that of a smooth sphere, and drawn to
+phase_losses.png.
 
     python examples/normal_and_shear_together.py
 """

@@ -3,9 +3,9 @@
 The heights vary independently with a standard deviation. To first order, the standard deviation of
 the loss is that of the heights times the length of the gradient of the loss. This needs no
 sampling. It holds as long as the deviation of the heights is small compared with the smallest gap
-and the smallest indentation. Above that, asperities make and lose contact, and the estimate is too
-small. But the first-order term is still a good control variate: its mean is known, so subtract it
-from every sample and average only the remainder.
+and the smallest indentation. For larger deviations, asperities make and lose contact, and the
+estimate is too small. But the first-order term is still a good control variate: its mean over the
+random heights is 0, so subtract it from every sample and average only the remainder.
 
     python examples/scatter_of_heights.py --samples 400
 """

@@ -62,7 +62,7 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
         lines.append(f"asperities         {counts}")
     lines += [
-        f"disagreement       largest difference of loads from {first['solver']}, over its largest",
+        f"disagreement       largest difference from {first['solver']}, over its largest load",
         "load error         bound on the error of any load, over the solver's own largest load",
         f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
         "statuses           those proved from the solver's loads; contacts that differ are loaded",
