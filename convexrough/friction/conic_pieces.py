@@ -18,16 +18,17 @@ from convexrough.sphere import hertz
 #: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5 and Z are their positions.
 LIFT, Y3, Y5, Z = 7, 3, 5, 6
 
-#: Layers thinner than this fraction of the load are omitted: the solver's error is larger.
+#: Layers thinner than this fraction of the load are omitted; the solver's error is larger.
 THIN = 1e-9
 
 
 class ConePiece(NamedTuple):
-    """A piece of W. The unit of forces is the load N of the asperity, of lengths k N^(2/3).
+    """A piece of W(T). Forces are over the load N of the asperity, lengths over k N^(2/3).
 
-    A slipping piece has the front L from low to high,  T = force - rate L,  the deflection
-    own - rate L^(2/3)  and  W = own T + (3/5) rate^2 L^(5/3) + energy. A stuck piece has rate 0,
-    |T - force| <= high  and  W = own (T - force) + (T - force)^2 softness / 2 + energy.
+    On a slipping piece the slip front L runs from `low` to `high`. There  T = force - rate L,  the
+    deflection is  own - rate L^(2/3)  and  W = own T + (3/5) rate^2 L^(5/3) + energy. On a stuck
+    piece  rate = 0,  |T - force| <= high  and
+    W = own (T - force) + (T - force)^2 softness / 2 + energy.
     """
 
     low: float
@@ -52,7 +53,7 @@ class ConePiece(NamedTuple):
         return self.own - self.rate * float(np.cbrt(level)) ** 2
 
     def distance(self, force: float) -> float:
-        """The distance of a force from the range of forces of the piece."""
+        """The distance of a force from the range of forces of the piece; 0 inside the range."""
         low, high = self.forces()
         return max(low - force, force - high, 0.0)
 
@@ -79,11 +80,11 @@ class ConePiece(NamedTuple):
 
 
 def pieces_of(levels: Array, heights: Array, own: float, k: float) -> list[ConePiece]:
-    """The pieces of an asperity whose memory curve before the step has these vertices, (m,).
+    """The pieces of an asperity, from its memory curve before the step.
 
-    levels : up to its indentation after the step, at most
-    own    : its indentation after the step, positive
-    k      : its coefficient of Hertz's law
+    levels, heights : (m,) vertices of this curve; no level exceeds `own`
+    own : indentation of the asperity after the step, positive
+    k   : coefficient of the asperity in Hertz's law
     """
     distinct = np.diff(levels, prepend=-1.0) > 0
     s, base = levels[distinct], float(levels[-1])

@@ -56,7 +56,7 @@ class StepProgram:
     which  : (n,) indices of the asperities in the scene
     loads, own : (n,) loads N_i and indentations after the step
     parts  : (n,) p_i, the fraction of the step during which the asperity touches
-    shells : (n,) diagonal that makes the coupling positive semidefinite
+    shells : (n,) diagonal that makes the coupling positive semidefinite if it is added to it
     pieces : pairs of an asperity (its index among the n) and a piece of its energy
     """
 
@@ -190,7 +190,7 @@ class StepProgram:
         return forces, float(-raw.multipliers[0]) * unit / float(self.loads.sum())
 
     def deflections(self, forces: Array) -> Array:
-        """(N,) own deflections of all asperities under these forces, from the nearest pieces."""
+        """(N,) own deflections under these forces; 0 for asperities that are not in the program."""
         found = np.zeros(len(forces))
         for place, i in enumerate(self.which):
             part = float(forces[i] / self.loads[place])

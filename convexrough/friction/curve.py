@@ -26,7 +26,7 @@ from convexrough.record import Along, Table, in_text
 class Piece(NamedTuple):
     """A part of a segment on which the slip front falls through one layer (segment) of the curve.
 
-    sign   : c of the slip
+    sign   : the direction c of slip, 1 or -1
     slope  : slope th of the layer; the loss is proportional to 1 - c th
     top, bottom : [force] levels of the front before and after
     load_before, load_after : [force] P before and after; it changes linearly with the level
@@ -133,7 +133,7 @@ class MemoryCurve(Table, Plottable):
         return self._slip(sign, *self._crossing(sign, load, height))
 
     def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
-        """The state after running back along the top layer, to the point or the layer's end."""
+        """The state after running back along the top layer, down to `load` or its lower end."""
         last = len(self.slopes) - 1
         below = self._cut(last)
         if load <= self.levels[last]:
@@ -141,7 +141,7 @@ class MemoryCurve(Table, Plottable):
         return below._with(self.slopes[last], load, height)
 
     def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
-        """The point where a segment of falling load meets the old curve again, or else its end."""
+        """Where a segment of falling load meets the old curve again; else the segment's end."""
         direction = (height - self.height) / (load - self.load)
         over = Fraction(0)  # sign times (path - old curve)
         for k in reversed(range(len(self.slopes))):
@@ -158,8 +158,9 @@ class MemoryCurve(Table, Plottable):
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
         """The state after slip of this sign on the segment, and the pieces of its loss.
 
-        The line of slope c through the moving point reaches the lower end of a layer after a `part`
-        of the segment, which is linear in the level. It passes layers of slope c at once.
+        A `part` of the segment is covered when the line of slope c through the moving point reaches
+        the lower end of a layer. Within a layer the part is linear in the level of the front. The
+        front passes layers of slope c at once.
         """
         added = load - self.load
         rate = (height - self.height) - sign * added

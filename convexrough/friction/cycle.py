@@ -2,10 +2,11 @@
 
 The path is a closed curve of the load P and the shear force Q. With the coefficient of friction f,
 let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. The memory curve
-(docs/theory/paths.md) gives the shear force that the layers of the contact up to each normal load s
-carry, divided by f. From the second cycle on, it passes through the point L* = (m+ + m-) / 2,
-T* = (m+ - m-) / 2 at every moment. The curve below L* never changes again. Above L* it repeats in
-each cycle and does not depend on the start. docs/theory/losses.md derives the loss.
+(docs/theory/paths.md) is a function of the normal load s: the shear force that the layers of the
+contact up to s carry, divided by f. From the second cycle on, it passes at every moment through
+the point (L*, T*) with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below L* the curve no longer
+changes. Above L* it repeats in each cycle and does not depend on the start of the path.
+docs/theory/losses.md derives the loss.
 """
 
 from __future__ import annotations
@@ -70,14 +71,14 @@ class Cycle(Table, Plottable):
     slip_errors, stick_radius_errors : [length] proved bounds on their errors
     level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
         L* is the same at every moment from the second cycle on
-    balance_defect   : relative difference between `loss` and a second formula for it, the error of
-        the trapezoid rule (docs/theory/losses.md); a check of rounding; nan if P varies
-        or order fails
-    loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
-        Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
-    smooth_normalised : loss / W0 of the smooth sphere; nan if P varies. Both are nan if no asperity
-        is loaded, or no smooth solution is known for the shape
-    displacement_amplitude : [length] half the range of the displacement at the points
+    balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
+        docs/theory/losses.md, as a check of rounding; nan if P varies or order fails
+    loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
+        nu Poisson's ratio, G the shear modulus, a_H the contact radius of the smooth sphere
+    smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
+        if no asperity is loaded, or if no smooth solution is known for the shape
+    displacement_amplitude : [length] half the range of the displacement of one body relative to the
+        other, at the points of the path
     displacement_error : [length] proved bound on the error of the displacement amplitude
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so
         loss and statuses are proved; "proved for one step": statuses hold for the result of one
@@ -151,9 +152,9 @@ class Cycle(Table, Plottable):
     def asperity_losses(self) -> Array:
         """(n,) [force length] energy lost at each asperity per cycle; nan where `order` fails.
 
-        Where the load varies, an integral over 64 intervals gives these losses, with two normal
-        solutions for each interval. They are accurate to about 0.1 %; their proved bounds are some
-        per cent.
+        Where the load varies, these losses are integrals over 64 intervals, with two normal
+        solutions for each interval. Their errors are about 0.1 %; the proved bounds on these errors
+        are some per cent.
         """
         return frozen(self.partial_slip_losses + self.sliding_losses)
 
@@ -207,7 +208,7 @@ class Cycle(Table, Plottable):
             points. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if the loss has no derivative. In gross sliding it has none in two cases:
-        if several asperities are together the last to start sliding, or if the approach is kept
+        if several asperities start to slide last, at the same force, or if the approach is kept
         constant.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
@@ -305,8 +306,9 @@ def cycles(
     *,
     displacement: ArrayLike | None = None,
 ) -> list[Cycle]:
-    """The steady cycles of m amplitudes, computed together: `cycle` with (m,) arrays.
+    """The steady cycles of several ranges of shear force at constant load, computed together.
 
+    maximum, minimum, displacement : (m,) as in `cycle`, which says what InputError is raised for
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
     ['0.00021', '0.0028', '0.048']
@@ -427,7 +429,7 @@ class _Closed(Walk):
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
-    """The steady cycles of closed paths with one start, each given by points, loads and forces."""
+    """The steady cycles of closed paths with one start; `asked` has points, loads and forces."""
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
@@ -542,7 +544,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop through points where Q has fallen, and then risen, by the amounts 2 `way`."""
+    """The loop through the points where Q has fallen, and then risen again, by 2 `way`."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

@@ -1,8 +1,8 @@
 """Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
 
 f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. In a
-contact disc with a stick disc of radius c, the slip at the distance r from the centre has the
-amplitude  f c_t [g + (r^2/R) h(c/r)]  with
+contact disc with a stick disc of radius c, the amplitude of the slip at the distance r from the
+centre is  f c_t [g + (r^2/R) h(c/r)]  with
 
     h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
 
@@ -37,8 +37,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: Number of distances from the centre, besides the kinks of the traction, that are tried for the
-#: largest traction. At constant load a kink has the largest; otherwise the error is about 0.1 %.
+#: The largest traction is sought at the radii a(s_k) and at this number of other distances. At
+#: constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
 DISTANCES = 64
 
 
@@ -84,8 +84,7 @@ class Fretting(Table, Plottable):
 
 
 def fretting(cycle: Cycle) -> Fretting:
-    """The fretting of each asperity in a steady cycle from `cycle` or `steady`.
-
+    """The fretting of each asperity in a steady cycle, a result of `cycle` or `steady`.
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True

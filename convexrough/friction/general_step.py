@@ -30,15 +30,15 @@ from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
-#: Newton's method stops at this residual, relative to the largest indentation. If rounding keeps
-#: the residual larger, up to a thousand times as much is accepted.
+#: Newton's method stops at this residual, relative to the largest indentation. If rounding prevents
+#: this, a residual up to a thousand times as large is accepted.
 ACCURATE = 1e-14
 
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
-#: The residual after a Newton step may not exceed the largest of this many latest residuals. It may
-#: grow, because slopes jump where an asperity begins or ceases to slide.
+#: The residual after a Newton step may not exceed the largest of this many latest residuals. Within
+#: this limit it may grow, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
 #: The smallest and the largest number of steps per segment.
@@ -55,7 +55,7 @@ class Bundle:
 
     load, height : [force] P and T = Q / f
     curves    : the memory curves of the asperities
-    fronts    : (n,) indentations at their slip fronts, or the whole indentations
+    fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
     carried   : (n,) T_i
     positions : (n,) deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
@@ -131,7 +131,7 @@ class Stepper:
         return replace(found, load=load, height=height, work=now.work + mean * run)
 
     def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
-        """The state in which all asperities slide, at the least displacement at which they do."""
+        """The state at the smallest displacement at which all asperities slide."""
         trial, on = _Trial.of(self, now, level), level.indentations > 0
         coupled = self.A @ (sign * level.loads - now.carried)
         taken = (sign * level.indentations - now.deflections)[on] / trial.parts[on]
@@ -255,7 +255,7 @@ class _Iterate(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """The largest defect, or the displacement that supplies what the total lacks."""
+        """The largest defect, or, if larger, the displacement that would correct the total."""
         stiffness, rounding = float(self.slopes.sum()), len(self.eta) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
         beyond = abs(self.excess) > rounding * float(np.abs(self.own.forces).sum())

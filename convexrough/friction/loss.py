@@ -3,7 +3,7 @@
 docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2. While the total load is P
 and the slip front falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th
 is the slope of the memory curve at L, c the direction of slip, and B the sum of B_i(P, L) in (2) of
-that page, or by (1) B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. This needs order.
+that page. By (1), B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. All of this needs order.
 """
 
 from __future__ import annotations
@@ -145,11 +145,11 @@ def _sharper(a: Ball, b: Ball) -> Ball:
 def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
     """(N,) [force length] losses at each asperity, due to partial slip and to sliding.
 
-    cells : number of cells into which the pieces on which the load varies are cut, in all
+    cells : total number of cells into which the pieces with a varying load are cut
 
     The loss in a cell lies between the losses for the loads at the two ends of the cell
     (docs/theory/losses.md, "A front while the load changes"). The returned means have relative
-    errors of about cells^-2; their proved bounds are about 1 / cells.
+    errors of about cells^-2; the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends

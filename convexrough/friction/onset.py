@@ -48,14 +48,15 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
     In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds this
-    force. The result is nan for an asperity without load, and for one that is dragged back before:
-    where an indentation falls as the load rises from that at which the asperity touches first.
+    force. The result is nan for an asperity without load. It is also nan if the order (see
+    `prove_order`) "fails" between the load at which the asperity first touches and that of the
+    contact; the asperity may then start to slide at another force.
 
     which : indices of the asperities, in the order of the result; default all. Each asperity needs
         several normal solutions
 
-    Raises InputError if more than 256 loaded asperities are chosen and no compliance matrix is
-    stored.
+    Raises InputError if the scene has no friction, or if more than 256 loaded asperities are chosen
+    and no compliance matrix is stored.
 
     >>> onsets = cr.onset_of_sliding(contact, which=[0, 36])
     >>> print((onsets / contact.load).round(3))
@@ -91,7 +92,7 @@ def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """The onset of one asperity, enclosed by levels near the root: known or else new ones."""
+    """The onset of one asperity, enclosed by levels near the root; known levels are tried first."""
     place = int(levels.top.problem.places[asperity])
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -109,7 +110,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
 
-    if not levels.at(Fraction(0)).open[place]:  # no asperity is known to be higher
+    if not levels.at(Fraction(0)).open[place]:  # it may be the first asperity to touch
         return Fraction(0)
     known = [load for load in levels.known if depth(load) > 0]
     low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)

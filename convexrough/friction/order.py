@@ -10,12 +10,12 @@ L1 down to L0 if at all loads between, y_i >= 0 for each asperity i that may tou
 load of the path, and all others are open. The level at L1 can prove it, with these symbols:
 
 - The *support* is the set of asperities that are not proved open at L1.
-- C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for diagonal C', 0 <= C' <= C~.
+- C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for all diagonal 0 <= C' <= C~.
 - delta is diagonal, 0 <= delta <= C~. From here on C is any diagonal matrix, C~ - delta <= C <= C~,
   and y solves (I + A C) y = 1 with this C.
 - v_k are the *weights* for asperity i: any numbers on the support, except v_i = 0. w_k = v_k C~_k.
 - t_k = v_k + sum_j w_j A_jk,                                                                   (1)
-  r_k = |A_ik - t_k| if k != i, and r_i = max(-t_i, 0). In (2), r_k = max(A_ik - t_k, 0) will do.
+  r_k = |A_ik - t_k| if k != i, and r_i = max(-t_i, 0). In (2), r_k = max(A_ik - t_k, 0) is enough.
 
 Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
 
@@ -80,7 +80,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
-#: A computed rate below -RATE_ROUNDING counts as negative. SOLVED: tolerance of its linear solve.
+#: A computed rate below -RATE_ROUNDING counts as negative; SOLVED is the tolerance of its solver.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: If at most INVERTED asperities touch, an inverse gives the weights and costs no more than the
@@ -287,7 +287,7 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if each asperity is proved open at `lower`, or is `rising` and deeper at `upper`."""
+    """False if each asperity is open at `lower`, or `rising` and deeper at `upper`, as proved."""
     if upper.solution is None:
         return True
     if lower.solution is None:

@@ -1,9 +1,10 @@
 """The memory curves of asperities, each in the plane of its own indentation and deflection.
 
-docs/theory/paths.md, "The rules", as one formula: the curve after a straight step follows from the
-old curve and the end of the step (s1, t1) alone, because the front only moves down and a curve is
-forgotten above the present indentation. Let h be the heights of the old curve up to the smaller
-indentation. The new curve ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
+This module writes docs/theory/paths.md, "The rules", as one formula. The curve after a straight
+step follows from the old curve and the end (s1, t1) of the step alone, because the front only moves
+down, and layers above the present indentation are forgotten. Cut the old curve at the smaller of
+the old and the new indentation, and let h be its heights. Unless the asperity sticks, the new curve
+ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
 
     L - c h(L) = s1 - c t1,
 
@@ -37,7 +38,7 @@ class OwnCurves(NamedTuple):
 
     @classmethod
     def pressed(cls, indentations: Array, coefficients: Array) -> OwnCurves:
-        """The curves of asperities without shear; those with a gap have no indentation."""
+        """The curves of asperities without shear; a negative indentation (a gap) counts as 0."""
         levels = np.column_stack((np.zeros(len(indentations)), np.maximum(indentations, 0.0)))
         nothing = np.zeros(levels.shape)
         return cls(
@@ -50,7 +51,7 @@ class OwnCurves(NamedTuple):
         return self._ended(front, front.level, front.height, front.load, front.force)
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
-        """A straight step to these ends, (n,), of curves that were cut at the indentations."""
+        """A straight step to the ends (n,); the curves must have been cut at `indentations`."""
         base, moved = self.levels[:, -1], deflections - self.heights[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
@@ -80,7 +81,7 @@ class OwnCurves(NamedTuple):
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
     def _front(self, sign: Array, wanted: Array) -> _Front:
-        """The vertices at which  level - sign height  reaches what is wanted, (n,)."""
+        """The points of the curves at which  level - sign height  reaches `wanted`, (n,)."""
         keys, rows = self.levels - sign[:, None] * self.heights, np.arange(len(sign))
         below = (keys < wanted[:, None]).sum(axis=1)
         after = np.clip(below, 1, keys.shape[1] - 1)

@@ -31,7 +31,7 @@ from convexrough.scene.scene import Scene
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: The smallest ratio of two loads of a path; float64 numbers in units of the larger hold it.
+#: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
 
 
@@ -114,10 +114,10 @@ class LoadPath(Table, Plottable):
         displacements: ArrayLike | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum over the points with respect to the scene, P and Q.
+        """Derivatives of a weighted sum of losses and displacements by the scene and the path.
 
-        losses, displacements : (m,) weights of the losses and displacements; by default the sum is
-            the last loss
+        losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
+            of the last loss is 1, and all others are 0
         holding : quantity kept constant, as in `Contact.gradient`. The forces Q are constant, too
 
         Raises InputError where there is no derivative, as for a history in gross sliding.

@@ -133,7 +133,7 @@ class ShearState(Table, Plottable):
             too; `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if there is no derivative. In gross sliding there is none in two cases: if
-        several asperities are together the last to start sliding, or if the approach is kept
+        several asperities start to slide last, at the same force, or if the approach is kept
         constant.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
@@ -223,7 +223,7 @@ def _state(
         total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
     error = float(found.displacement_errors[0]) if displacement is None else 0.0
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
-    most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
+    most = np.abs(found.drifts[0]) + found.drift_errors[0]  # its slip is 0 if it does not touch
     slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
     if order == "fails":
         error = force_uncertainty = np.inf

@@ -2,7 +2,7 @@
 
 (1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of
 the bodies. The same sum over the indentations n_i (minus gaps where open) is the own deflection of
-an asperity plus its drift. First loading is (1) of docs/theory/states.md.
+an asperity plus its drift. (1) of docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations

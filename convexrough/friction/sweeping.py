@@ -38,32 +38,32 @@ from convexrough.roundoff import ROUNDOFF
 
 # All numbers here are heuristics.
 
-#: Number of neighbours with weights of least energy; and with weights of least total, in each of
-#: several searches. Each search adds the constraint that the last one violated most.
+#: Numbers of neighbours: for weights of least energy, and for each of several searches for weights
+#: of least total. Each search adds the constraint that the result of the last one violated most.
 NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
 
 #: The constraints of weights of least total are at the NEAR nearest asperities, and at one in each
-#: of SECTORS sectors of RINGS rings. CENTRED: how near the least total the method comes.
+#: of SECTORS sectors of RINGS rings. The estimate of the gap to the least total contains CENTRED.
 NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
 
-#: Largest number of Newton steps for weights of least total, and the gap at which they end.
+#: Largest number of Newton steps for weights of least total, and the gap at which the steps end.
 STEPS, LEAST = 40, 1e-8
 
 #: Largest number of searches for weights of least energy; each drops neighbours of weights below 0.
 SEARCHES = 8
 
-#: Number of directions in which the extent of the support is known; numbers in memory at once.
+#: Number of directions in which the extent of the support is computed; numbers in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
     """(n,) lower bounds on y(C) for all 0 <= C <= C~.
 
-    All are -inf if one on the support is not positive, or if the support has fewer than two
+    All are -inf if any bound on the support is not positive, or if the support has fewer than two
     asperities (then row sums of A C~ are enough).
 
     c     : (n,) diagonal of C~, 0 where open
-    spare : (n,) a bound above -spare is enough for an open asperity, and is not improved
+    spare : (n,) for an open asperity a bound above -spare is enough, and is not improved
     most  : largest number of asperities for which weights of least total are sought
     """
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
@@ -142,7 +142,7 @@ class _Swept:
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
 
     def potentials(self, charges: Indices, places: Indices) -> Array:
-        """Potentials of unit charges at places; the shell's potential at the place of a charge."""
+        """Potentials of unit charges at places; on a charge itself, the potential of its shell."""
         apart = self.places[charges] - self.places[places]
         squares = apart.real**2 + apart.imag**2
         return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
@@ -179,7 +179,7 @@ class _Swept:
             system[:, :s, s:] = sums[todo].mT
             system *= here[:, :, None] * here[:, None, :]
             dropped = 1.0 - here
-            dropped[:, s:] = -1e-13  # so that it is never singular
+            dropped[:, s:] = -1e-13  # the system is then never singular
             system[:, range(s + rows), range(s + rows)] += dropped
             found = np.linalg.solve(system, (target[todo] * here)[:, :, None])[:, :s, 0]
             fits = (found >= 0).all(axis=1)
@@ -213,7 +213,7 @@ class _Swept:
             bending[:, diagonal, diagonal] += 1.0 / w**2
             try:
                 step = np.linalg.solve(bending, downhill[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:  # singular by rounding: what is found is verified later
+            except np.linalg.LinAlgError:  # singular by rounding; `rates` verifies the weights
                 break
             shrinks = np.maximum(
                 (-step / w).max(axis=1), (-np.einsum("is,isk->ik", step, scaled)).max(axis=1)
@@ -227,7 +227,7 @@ class _Swept:
         return weights
 
     def _spread(self, which: Indices, nearest: Indices) -> Indices:
-        """(m, k) one asperity of the support in each sector of each ring, or else the nearest."""
+        """(m, k) one asperity of the support per sector of each ring; `nearest` if it is empty."""
         away = self.places[self.support] - self.places[which][:, None]
         itself = self.support == which[:, None]
         apart = np.abs(np.where(itself, self.extent, away))
@@ -265,7 +265,7 @@ class _Swept:
         return rates, worst
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
-        """(m, k) distances between asperities; `themselves` from an asperity to itself."""
+        """(m, k) distances between asperities; between equal ones, the entry of `themselves`."""
         from scipy.spatial.distance import cdist
 
         apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))
@@ -274,7 +274,7 @@ class _Swept:
         return apart
 
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
-        """(...) lower bounds on Re(conj(p) z) over the support, from two directions near p."""
+        """(...) lower bounds on Re(conj(p) z) for directions p and all points z of the support."""
         step = 2 * np.pi / DIRECTIONS
         around = np.exp(1j * step * np.arange(DIRECTIONS + 1))
         least = np.array([(side.conj() * self.places[self.support]).real.min() for side in around])

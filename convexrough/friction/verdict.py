@@ -25,7 +25,7 @@ CLAIMS_SLIDING = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """Comparison of claimed shear forces of first loading with what is proved.
+    """Comparison of claimed shear forces with what is proved about first loading.
 
     forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] the prescribed sum Q of the shear forces
@@ -110,8 +110,7 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Comparison of shear forces of first loading from any source with what is proved.
-
+    """Comparison of shear forces from any source with what is proved about first loading.
     forces  : (n,) [force] shear forces in the order of the scene's asperities
     force   : [force] the prescribed sum Q of the shear forces
     within  : largest error allowed, as a fraction of the largest force

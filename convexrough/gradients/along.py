@@ -122,7 +122,7 @@ class Along:
         return found
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
-        """The part of each level, the weighted sum of losses, and the one of displacements.
+        """The part of each level, the weighted sum of losses, and that of displacements.
 
         moves : derivatives of the load of every level, at fixed T
         """
@@ -152,7 +152,7 @@ class Along:
                 loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
                 heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
             ).sums
-        except InputError:  # beyond gross sliding, or less than no load
+        except InputError:  # |T| > P, or a negative load
             return NONE
         total = ZERO
         for base, there, factor in (

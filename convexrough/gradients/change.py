@@ -39,7 +39,7 @@ class Direction(Record):
     """A change of the parameters of a scene and of the load. The default of each is no change.
 
     heights, tip_radii : [length] (n,), or one number for all asperities
-    positions : [length] (n, 2), or one number for all
+    positions : [length] (n, 2), or one number for all coordinates
     sphere_radius : [length]
     contact_modulus : [force / length^2] at constant Poisson's ratio
     load      : [force]

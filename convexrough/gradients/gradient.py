@@ -39,12 +39,12 @@ class Number(NamedTuple):
     """A number J that depends on a contact, with derivatives at constant forces and load.
 
     value    : J
-    scaled   : the part of J that consists of energies and loads: it is multiplied by c if the
-        modulus and all loads are
-    pulled : for each level the derivatives of its part of J, for the candidates of `problem`
-    slopes   : derivatives of J by parameters outside the scene's geometry
-    steep : where J depends on D0 at the load 0, the factors of dD0/dL, which is infinite there
-    sides : by "forces" or "loads": (m, 2) derivatives by those of a path, from below and from above
+    scaled   : the part of J that consists of energies and loads. If the modulus and all loads are
+        multiplied by a number, this part is multiplied by the same number
+    pulled   : for each level the derivatives of its part of J, for the candidates of `problem`
+    slopes   : derivatives of J by parameters outside the scene's geometry, by name
+    steep    : if J contains D0 at the load 0, the factors of dD0/dL, which is infinite there
+    sides    : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
     """
 
     contact: Contact
@@ -75,7 +75,7 @@ class Number(NamedTuple):
         return cls(contact, top.problem, top, value, scaled, pulled, slopes, steep)
 
     def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times a factor; `slopes` are the factor's derivatives times this number."""
+        """The number times a factor; `slopes` are derivatives of the factor, times the number."""
         names = {*self.slopes, *slopes}
         pulled = [each.times(factor) for each in self.pulled]
         both = {
@@ -98,10 +98,11 @@ class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
-    derivative is at constant values of the other parameters listed here. Shear forces are constant;
-    their fractions of f P, or a prescribed displacement, are not. At constant displacement X a loss
-    W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q: W_Q is twice the derivative of W by `maximum`, and
-    X_Q the derivative of X by `force`, for the state at the amplitude of the cycle.
+    derivative is at constant values of the other parameters listed here. Shear forces Q are kept
+    constant; their fractions of f P, or a prescribed displacement, are not. If instead the
+    displacement X is kept constant, a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is
+    twice the derivative of W by `maximum`. X_Q is the derivative of X by `force`, from the gradient
+    of the `shear` state whose force is the amplitude of the cycle.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
@@ -114,11 +115,11 @@ class Gradient(Table, Plottable):
     heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for
         screened asperities, and for open ones unless the number contains their gap
     positions       : (n, 2) derivatives by x and y, with zeros as in `heights`
-    sphere_radius   : None for shapes other than a sphere
-    contact_modulus : at constant Poisson's ratio
-    poisson_ratio   : at constant contact modulus E*
-    load, approach  : derivative by the quantity `holding`; the other is None
-    friction        : None for a scene without friction
+    sphere_radius   : derivative by the radius; None for shapes other than a sphere
+    contact_modulus : derivative at constant Poisson's ratio
+    poisson_ratio   : derivative at constant contact modulus E*
+    load, approach  : derivative by the quantity that `holding` names; the other one is None
+    friction        : derivative by the coefficient f; None for a scene without friction
     force           : derivative by the shear force of a friction state
     maximum, minimum : derivatives by the largest and smallest shear force of a cycle
     forces, loads   : (m,) derivatives by the forces and loads of a history or path; nan where the

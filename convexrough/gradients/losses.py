@@ -18,7 +18,7 @@ from convexrough.gradients.gradient import Gradient, Holding, Number, control_he
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
 
-#: The number 1 of which nothing is proved.
+#: The number 1 with an infinite error bound. A product with it has an infinite error bound, too.
 UNKNOWN = Ball.around(1.0, np.inf)
 
 
@@ -79,7 +79,7 @@ def path_gradient(
     )
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
-    later = np.cumsum(spent[::-1])[::-1]  # every later cumulative loss includes a step's loss
+    later = np.cumsum(spent[::-1])[::-1]  # a loss on one segment is part of all later losses
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
     along = Along.of(sheared.known, Fraction(path.start), steps, path.loads, path.forces)
     sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]

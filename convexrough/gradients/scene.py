@@ -121,10 +121,10 @@ class Geometry:
         )
 
     def slopes(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
-        """(m, 2) sums -scale sum_j (c_i - c_j) P_j / r_ij^3 for the asperities `which`, per P.
+        """For each vector P, (m, 2) sums -scale sum_j (c_i - c_j) P_j / r_ij^3.
 
-        loads : vectors P, (m,) each. For more than PAIRWISE asperities the sums are computed in
-            float64, and without a stored matrix no error bound is known
+        loads : vectors P, (m,) each, of the asperities `which`. For more than PAIRWISE asperities
+            the sums are computed in float64, and without a stored matrix no error bound is known
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)

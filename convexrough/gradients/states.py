@@ -76,7 +76,7 @@ class Frictional:
         return self.known.at(self.known.load - height)
 
     def moves(self, height: Ball, /, **shares: float) -> Moves:
-        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ by each force."""
+        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ per force."""
         by_force = -1.0 / self.known.force_unit
         rates = {name: by_force * share for name, share in shares.items()}
         return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
@@ -141,9 +141,9 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     asperity : index of the asperity in the scene
     holding  : quantity kept constant, as in `Contact.gradient`
 
-    Raises InputError if the asperity carries no load, or is one of several that slide last, where
-    there is no derivative; ProofError if it is not proved that the indentation of the asperity
-    rises with the load.
+    Raises InputError if the scene has no friction, if the asperity carries no load, or if it is one
+    of several that slide last: then there is no derivative. Raises ProofError if it is not proved
+    that the indentation of the asperity rises with the load.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
@@ -202,7 +202,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """Weights of gaps, 0 for asperities that touch; balls that contain both if undecided."""
+    """Weights of gaps, 0 for asperities that touch; if undecided, balls with 0 and the weight."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))

@@ -1,9 +1,10 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-This module evaluates the two bounds of docs/theory/shakedown.md, "Melan's program", for the result
-of a solver, which need not be accurate: the largest lambda for given residual forces r_i, and (3)
-for given slips. The bounds include the errors of shares and loads. As on that page, shear forces
-are divided by the coefficient of friction; t0 is the mean of the path, P_i are the loads.
+This module evaluates the two bounds of docs/theory/shakedown.md, "Melan's program". The lower bound
+is the largest lambda for given residual forces r_i, the upper bound is (3) for given slips. Forces
+and slips come from a solver, which need not be accurate. The bounds include the errors of shares
+and loads. As on that page, shear forces are divided by the coefficient of friction; t0 is the mean
+of the path, P_i are the loads.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def shakedown(
     all points of the path are equal.
 
     Example: in the scene of Dini and Hills (2009), sliding ceases for all amplitudes up to
-    0.3517 f P. Here f = 0.5, so Q is 0.1 f P.
+    0.3517 f P. Here f = 0.5, so Q is 0.1 f P, and the largest amplitude is factor / 10 times f P.
 
     >>> Q = 0.05 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -232,12 +232,12 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _fall(p: Array, t: Array) -> float:
-    """The decrease of L* per factor, (r_+ + r_-) / 2."""
+    """The decrease of L* per unit of the factor, (r_+ + r_-) / 2."""
     return float((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The limit with the scalar kernel: that of one asperity, or of gross sliding if smaller."""
+    """The limit with the scalar kernel: the least of all asperities, or that of gross sliding."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())

@@ -36,7 +36,7 @@ SOLVERS: dict[str, Callable[[], Solver]] = {
 
 
 def named(solver: Solver | str | None) -> Solver:
-    """The given solver, the solver with this name, or Newton's method for None."""
+    """The solver for an argument `solver`: itself, the one of this name, or Newton's for None."""
     if solver is None:
         return Newton()
     if isinstance(solver, str) and solver in SOLVERS:

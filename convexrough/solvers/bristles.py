@@ -10,12 +10,12 @@ with integrals over 0 <= x <= b, for every P whose contact radius is at most b. 
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
 cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
 In scaled units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
-h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its compliance, and phi_ij m times the force on cell j:
+h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its compliance, and phi_ij / m the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
-P is exact where the contact ends on the edge of a cell; in between its error is at most
+P is exact if the contact ends on the edge of a cell. Otherwise its error is at most
 0.375 B_i b / (b_i m^2).
 
 Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator
@@ -24,11 +24,11 @@ A,
     minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
-Its matrix is positive definite exactly if A + diag(h) is: the Hessian of the contact energy at the
-upper ends of the box P <= B, for any m. The box is that of the a priori bounds if a Cholesky
-factorisation finds the matrix positive definite there. Otherwise it is cut at
-b_i = 0.99 (pi/2) s_i (s_i: half the distance to the nearest neighbour), where the shell lemma of
-docs/theory/convexity.md proves that the matrix is. An answer on a cut face of the box is refused.
+For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
+the contact energy at the upper ends of the box P <= B. The box is that of the a priori bounds if a
+Cholesky factorisation finds A + diag(h) positive definite there. Otherwise it is cut at
+b_i = 0.99 (pi/2) s_i, with half the distance to the nearest neighbour as s_i. There the shell lemma
+of docs/theory/convexity.md proves definiteness. An answer on a cut face of the box is refused.
 """
 
 from __future__ import annotations
@@ -167,9 +167,9 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         )
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads: a bristle carries a force where h phi exceeds its multiplier.
+        """The loads; a bristle carries a force where h phi exceeds its multiplier.
 
-        The sign of this difference is clear also where phi is 0 only to the solver's accuracy.
+        The sign of this difference is clear even where the solver's phi is nearly 0.
         Raises TooDenseError if the answer lies on a face where the box was cut.
         """
         problem, n, m = self.problem, len(self.problem), self.m

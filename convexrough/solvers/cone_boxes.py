@@ -121,9 +121,10 @@ class ConeSolver(ABC):
     newton_step : end with a step of Newton's method, which reduces errors of some 1e-8 of the
         largest load to rounding; a second step follows if the first is not accurate enough
 
-    After Newton steps the gaps must satisfy  |g_i| <= 1e-13 (|D0| + max |d_i|)  where loaded, and
-    -g_i <= the same elsewhere. Without them, max |P - P(D - A P)| <= 10 sqrt(tolerance) max P. Else
-    SolverError is raised, or TooDenseError if the cut boxes do not contain the solution.
+    After Newton steps  |g_i|  where loaded, and  -g_i  elsewhere, must not exceed the limit
+    1e-13 (|D0| + max |d_i|). Without Newton steps,  max |P - P(D - A P)| <= 10 sqrt(tolerance)
+    max P,  where P(delta) is Hertz's load at the indentation delta. Otherwise SolverError is
+    raised, or TooDenseError if the cut boxes do not contain the solution.
     """
 
     tolerance: float = 1e-9
@@ -220,7 +221,7 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps from `loads` or from `alone`, the P(D - A P).
+    """The solution after one or two Newton steps; `alone` is P(D - A P) for P = `loads`.
 
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
     Each asperity starts from the more accurate of the two, also where a load is almost 0.

@@ -22,7 +22,7 @@ from convexrough.solvers.solution import Solution
 
 
 class _Options(NamedTuple):
-    """Names of a solver's options for tolerances and iterations, and the default of the latter."""
+    """Names of a solver's options for tolerances and iterations, and the default iterations."""
 
     tolerances: tuple[str, ...]
     limit: str

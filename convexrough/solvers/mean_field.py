@@ -21,9 +21,9 @@ RINGS, LEAST = 128, 150
 #: Approximate size of the evenly spaced sample of asperities that is used.
 SAMPLE = 50_000
 
-#: The displacement by an evenly spread load includes that by the asperity's own share. It is this
-#: factor times that of a disc with the asperity's share of the area: 1.1002 for square and 1.1061
-#: for hexagonal arrays by Ewald's sums, and a heuristic for other layouts.
+#: A load spread evenly includes the asperity's own load, spread over its share of the area. The
+#: displacement by this part is the factor times that of a disc of the same area: 1.1002 for square
+#: and 1.1061 for hexagonal arrays by Ewald's sums, and a heuristic for other layouts.
 OWN_SHARE = 1.10
 
 
@@ -87,7 +87,7 @@ def _mean_field(problem: NormalProblem) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Rings:
-    """For each asperity the ring before it and its relative distance to the next one."""
+    """For each asperity two neighbouring rings, and its relative position between their middles."""
 
     first: Indices
     share: Array
@@ -95,12 +95,12 @@ class _Rings:
 
     @classmethod
     def of(cls, places: Array, count: int) -> _Rings:
-        """The rings of asperities at squared distances `places` (n,), over a ring's width."""
+        """The rings of asperities; `places` (n,) are squared distances over the width of a ring."""
         first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
         return cls(first, places - 0.5 - first, count)
 
     def sums(self, values: Array) -> Array:
-        """(count,) sums over the rings; at both ends the nearest ring gets all."""
+        """(count,) sums over the rings; beyond the middle of an end ring, this ring gets all."""
         outer = np.clip(self.share, 0.0, 1.0) * values
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]

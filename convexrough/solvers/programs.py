@@ -1,7 +1,7 @@
 """Programs in standard form, their solution by libraries, and conversions to and from problems.
 
 A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
-and Boyd, J. Control Decis. 5 (2018) 42). docs/how-to/solvers.md adds another solver.
+and Boyd, J. Control Decis. 5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
 """
 
 from __future__ import annotations

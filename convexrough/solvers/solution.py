@@ -41,7 +41,7 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution whose residual is computed from the loads; infinity stands for nan."""
+        """A solution whose residual is computed from the loads; a residual of nan becomes inf."""
         if np.shape(loads) != (len(problem),):
             raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)

@@ -52,6 +52,6 @@ def potential(x: Number) -> Number:
 
 
 def loss(x: Number) -> Number:
-    """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], as `mindlin.loss`."""
+    """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)] of `mindlin.loss`."""
     s = 1.0 - x
     return x * x * x * (1.0 + s * (3.0 + s)) / 6.0

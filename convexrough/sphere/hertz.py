@@ -1,7 +1,7 @@
-"""One sphere on an elastically similar half-space: Hertz's law and its relatives.
+"""One sphere on an elastically similar half-space: load, indentation, radius, pressure by Hertz.
 
 Arguments are scalars or arrays in consistent units: load P, contact modulus E*, relative radius R,
-contact radius a. Indentations delta are the approach of distant points of the two bodies.
+contact radius a. An indentation delta is the approach of distant points of the two bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 """
 
@@ -39,7 +39,7 @@ def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Num
 
 
 def _cube_root(value: Number) -> Number:
-    """The cube root; for eight times a number exactly twice as large, on every machine."""
+    """The cube root; the root of 8 x is exactly twice the root of x, on every machine."""
     mantissa, exponent = np.frexp(value)
     thirds, rest = np.divmod(exponent, 3)
     return np.ldexp(np.cbrt(np.ldexp(mantissa, rest)), thirds)

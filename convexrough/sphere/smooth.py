@@ -32,7 +32,7 @@ def smooth(scene: Scene, *, load: float) -> SmoothSphere:
 
     Raises InputError for a flat or a cylinder, which have no smooth contact of finite size.
 
-    >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # the rough one's is 5e-5
+    >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # 5e-5 in the rough contact
     4.184e-05
     """
     checks.instance("scene", scene, Scene)

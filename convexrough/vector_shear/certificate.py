@@ -30,9 +30,9 @@ ROUNDED = 8 * ROUNDOFF
 class VectorBounds(NamedTuple):
     """Proved bounds on the errors of a state, in scaled units; infinite without a proof.
 
-    increments, slips : (n,) on |q - q*| and |slip - slip*|;  displacement_error : on |X - X*|
+    increments, slips : (n,) bounds on |q - q*| and |slip - slip*|
+    displacement_error : bound on |X - X*|;  excess : bound on the energy minus its minimum
     sliding, partial : (n,) True where proved to slide, and where proved not to slide
-    excess : on the excess of the energy over the minimum
     """
 
     proved: bool
@@ -176,8 +176,7 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
 
 def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
-    """Bound on E(q) - E(q*) for forces within friction, up to rounding; infinite if X is.
-
+    """Bound on E(q) - E(q*) for |q_i| <= P_i up to rounding; infinite if X is infinite.
     e_i is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the
     ray of all eta with this force.
     """
@@ -246,7 +245,7 @@ def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> V
     least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # of X.t
     highest = thresholds.upper + uncertainty  # of | X - coupled | where an asperity sticks
     pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)
-    # If i stuck, |X| would be small, and differences of B q across t would turn the forces.
+    # If i stuck, |X| would be small. Then differences of B q across t would turn the forces.
     weights, side = np.where(sure, least, 0.0), coupled @ across
     mean = float(weights @ side) / float(weights.sum())
     spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ uncertainty**2)
@@ -254,8 +253,8 @@ def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> V
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
     complete = problem.stray == 0 and bool(sure.all())
     proved = bool(sliding.any()) or complete
-    # Without bias the only state is symmetric, with all forces along t. So below the friction limit
-    # not all asperities slide. If all but one slide, that one sticks.
+    # If the bias is 0, the only state has all forces along t. So below the friction limit not all
+    # asperities slide. If all but one slide, that one sticks.
     straight = problem.bias == 0.0 and problem.margin > 0 and unused < float(least.min())
     below = float(left.lower) > AT_THE_END * ROUNDOFF * size
     last = complete and straight and below and int(sliding.sum()) == len(P) - 1

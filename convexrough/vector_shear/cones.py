@@ -2,9 +2,9 @@
 
 docs/theory/vector-friction.md, "Cones", derives it, with t from |q| / P = 1 - t^3, u = 1 - t, the
 share S of the shift in the local compliance, and epsilon, the elastic estimate of |q| / P. The
-solver's variables are those of order u^k over epsilon^k, and q over epsilon P. The multiplier of
-the total is the rigid displacement; that of |q_i| <= P_i (1 - t^3) is the sum of the slip and of
-the slope of the local energy.
+solver's variables are q / (epsilon P), and the variables of order u^k divided by epsilon^k. The
+multiplier of the total is the rigid displacement. The multiplier of |q_i| <= P_i (1 - t^3) is the
+sum of the slip and of the slope of the local energy.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class _Lift(NamedTuple):
     orders : (k,) order of each variable in u; the first variable is the number 1
     cones  : (cones, 3, k) coefficients of x, y, w
     share  : (k,) coefficients of m / P = 1 - t^3
-    energy : (2, k) coefficients whose sum, the second times S, gives the local energy
+    energy : (2, k) the coefficients of the local energy are the first row plus S times the second
     """
 
     orders: Array
@@ -79,8 +79,8 @@ _SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 #: the program is solved at this fraction and the result scaled. A heuristic.
 ELASTIC = 1e-9
 
-#: Largest accepted residual over the largest accepted `duality_gap`. A heuristic: an energy with an
-#: error of 1e-8, the default, determines forces to the square root, 1e-4.
+#: Largest accepted residual over the largest accepted `duality_gap`. A heuristic: the error of the
+#: forces is about the root of that of the energy, which is 1e-4 for the default gap of 1e-8.
 SLIPS = 1e4
 
 #: Limits on Clarabel's steps, as parts of the way to the boundary of the cones, in order of trial.
@@ -93,8 +93,8 @@ class FrictionConic:
     """A solver of `shear_vector` by a cone program, through Clarabel.
 
     tolerance : tolerance of Clarabel for duality gap and feasibility
-    accepted  : largest relative `duality_gap` of the result; `residual` may be 1e4 times as large.
-        Otherwise `solve` raises SolverError, whatever Clarabel reports
+    accepted  : largest accepted `duality_gap`, as a fraction of the energy; `residual` may be 1e4
+        times this number. If a result exceeds these limits, `solve` raises SolverError
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
     >>> state.residual < 1e-5

@@ -29,9 +29,9 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 class FrictionNewton:
     """A solver of `shear_vector` by Newton's method, which starts from the state of `shear`.
 
-    It stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not halve
-    this residual. Raises SolverError if this takes more than `max_iterations` steps. The symbols
-    are those of docs/theory/vector-friction.md.
+    The method stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not
+    halve this residual. `shear_vector` then raises SolverError if this takes more than
+    `max_iterations` steps. docs/theory/vector-friction.md defines the symbols.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
     >>> state.residual < 1e-12
@@ -122,7 +122,7 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _Iterate) -> float:
-        """A lower bound on the rounding of F, which ends steps on symmetric layouts."""
+        """A lower bound on the rounding error of F; on symmetric layouts it ends the iteration."""
         return ROUNDOFF * state.scale
 
     def advice(self, state: _Iterate) -> str:

@@ -115,7 +115,7 @@ class VectorProblem(Loaded):
         return along(self.deflections(size), increments, size)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, and exactly P_i up to rounding, as deflections are steep near P_i."""
+        """(n,) |q_i|, or P_i if they differ by rounding only, as deflections are steep near P_i."""
         size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full
@@ -134,9 +134,9 @@ class VectorProblem(Loaded):
     def residual(self, state: VectorState) -> float:
         """The largest relative violation of the conditions of least energy.
 
-        Over |X|: the error of the equation for X (top of the module); the part of a slip across its
-        force; and slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|:
-        the error of the total.
+        Relative to |X| these are the error of the equation for X (top of the module), the part of a
+        slip across its force, and slip_i (1 - |q_i| / P_i). The part of |q_i| beyond P_i is
+        relative to P_i, and the error of the total to |T|.
         """
         if not np.isfinite(state.displacement).all():
             return np.inf

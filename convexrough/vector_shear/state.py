@@ -30,7 +30,7 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState
 
 
 class FrictionSolver(Protocol):
-    """The interface of solvers: frozen settings. SolverError replaces inaccurate results."""
+    """The interface of solvers of `shear_vector`; an inaccurate result must raise SolverError."""
 
     @property
     def name(self) -> str: ...
@@ -50,15 +50,15 @@ class VectorShearState(Table, Plottable):
     disagreement : relative difference (2-norm) of the forces from those of `shear`
     residual     : largest relative violation of the conditions of least energy, recomputed from
         this result: `VectorProblem.residual`
-    duality_gap  : [force length] bound on the energy of these forces above the minimum; infinite
-        if the energy is not proved to be convex
-    certificate  : proved statuses and bounds; error bounds of vectors are on the length of their
-        difference
+    duality_gap  : [force length] upper bound on the energy of these forces minus the least energy;
+        infinite if the energy is not proved to be convex
+    certificate  : proved statuses and bounds; a bound on the error of a vector is a bound on the
+        length of the difference
     solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P the forces are f P_i along Q. In general several asperities then reach this state
-    only in the limit of an infinite displacement: the displacement, the slips, `residual` and
-    `duality_gap` are infinite.
+    At |Q| = f P the forces are f P_i along Q. Except in symmetric layouts, this state is reached
+    only in the limit of an infinite displacement. The displacement, the slips, `residual` and
+    `duality_gap` are then infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.holds
@@ -153,7 +153,7 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
-    """The solver's result, checked to be finite. SolverErrors keep its forces."""
+    """The solver's result, checked to be finite. A SolverError gets forces in the scene's units."""
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
@@ -181,7 +181,7 @@ def _vector(force: ArrayLike) -> Array:
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """The state at |T| = sum P, where all forces and slips are along T.
 
-    If displacements B q across T differ, the forces only tend to it as X grows without bound.
+    If the components of B q across T differ, forces tend to this state only as X goes to infinity.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
