@@ -1,4 +1,4 @@
-"""Balls: numbers known to within a radius. A formula on balls gives its value and an error bound.
+"""Balls: numbers known to within a radius. A formula computed on balls gives an error bound, too.
 
 The midpoint of a ball is a pair of float64 numbers, the radius a float64 number. Every operation
 returns a ball that contains the result for every choice of numbers in the operands. The radius is
@@ -47,7 +47,7 @@ class Ball:
     mid: Pair
     radius: Array
 
-    # numpy's operators leave `array * ball` to the ball.
+    # Makes numpy use the ball's own operators in `array * ball`.
     __array_ufunc__ = None
 
     @classmethod

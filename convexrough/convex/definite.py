@@ -20,7 +20,7 @@ from convexrough.roundoff import ROUNDOFF
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
     """The largest of the increasing margins for which `proved` is true, by bisection; else 0."""
     low, high = -1, len(margins)
-    middle = 0  # first the smallest: if no margin is proved, one test is enough
+    middle = 0  # begin with the smallest: if it is not proved, no other needs a test
     while high - low > 1:
         if proved(margins[middle]):
             low = middle

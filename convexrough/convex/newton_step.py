@@ -5,10 +5,10 @@ W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The norma
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-The number beta is 0, or the one for which the loads keep their sum: sum W y = 0. The matrix is
-positive definite where the energy is convex. Otherwise shells are added to the diagonal of A, which
-make it so. Conjugate gradients also return A W y, and so the step of every asperity, touching or
-not.
+The number beta is 0, or the one for which the loads keep their sum: sum W y = 0. The matrix
+I + W A W is positive definite where the energy is convex. Where it is not, the diagonal `shells` is
+added to A, which makes it so. Conjugate gradients also return A W y, from which the step d of every
+asperity follows, touching or not.
 """
 
 from __future__ import annotations

@@ -22,9 +22,7 @@ from convexrough.roundoff import SAFETY
 
 
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
-    """(n,) violations e of the first-order conditions, for residuals F - beta:
-    docs/theory/one-theorem.md.
-
+    """(n,) violations e of the first-order conditions, for residuals F - beta.
     inside : (n,) False where x is on a lower face of K. True is also valid on an upper face: the e
         of an interior point, |F - beta|, is at least as large as that of a point on an upper face
     """

@@ -52,7 +52,7 @@ class SiteBox:
     def padded(self) -> tuple[int, int]:
         """The size of the transforms, in which no two differences of occupied sites coincide.
 
-        Twice the box is enough. A smaller size is enough if every vector between two periodic
+        Twice the box always suffices. A smaller size suffices if every vector between two periodic
         images of a site is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
@@ -105,7 +105,7 @@ class SiteBox:
         block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
-        sums: dict[int, list[float]] = {}  # by block: sums of squares of each kernel
+        sums: dict[int, list[float]] = {}  # for each block: sums of squares of each kernel
 
         def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)

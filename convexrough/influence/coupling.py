@@ -19,8 +19,8 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 
-#: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points. It is 1 after the
-#: differences, 3 after the squares, 4 after their sum, 3 after the root, and 8 at the end.
+#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. It is 1
+#: for differences, 3 for squares, 4 for their sum, 3 for the root, and 8 for the result.
 ENTRY_ROUNDOFFS = 8
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
@@ -78,7 +78,8 @@ class Influence(Coupling, Protocol):
     scale  : 1 / (pi E*) in the units of the problem
     stored : True if the matrix is stored; otherwise products with float32 loads are cheaper than
         with float64 loads
-    cheap_sums : True if `sums` costs few products, so that Newton's last step starts from it
+    cheap_sums : True if `sums` costs few products; Newton's method then ends early, and `refine`
+        makes the last steps
     """
 
     @property
@@ -124,7 +125,7 @@ class Influence(Coupling, Protocol):
         ...
 
     def separations(self) -> Array:
-        """(n,) [length] lower bounds on the distance of each asperity to its nearest neighbour."""
+        """(n,) [length] lower bounds on the distances of asperities from their nearest neighbours."""
         ...
 
     def crowding(self, radii: Array) -> float:
@@ -140,7 +141,7 @@ class Influence(Coupling, Protocol):
         ...
 
     def smoother(self, root: Array) -> Smoother | None:
-        """An approximate inverse of I + W A W, W = diag(root), symmetric and positive definite.
+        """A symmetric positive definite approximation of (I + W A W)^-1, with W = diag(root).
 
         None if nothing better than the identity is known.
         """

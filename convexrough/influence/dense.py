@@ -24,7 +24,7 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: Largest number of entries 1 / r to other points that are cached; reading more saves no time.
+#: Largest number of entries 1 / r to other points that are cached; for more, caching saves no time.
 KEPT = 2**16
 
 

@@ -2,8 +2,8 @@
 
 The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
 box of sites that holds the asperities is padded with zeros, to at most about twice its size in
-each direction, so that there are no periodic images. docs/theory/operators-lattice.md explains the
-method, its rounding errors and the products with more digits ("sharp" products).
+each direction, so that periodic images do not contribute. docs/theory/operators-lattice.md explains
+the method, its rounding errors and the products with more digits ("sharp" products).
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ ENTRY_ROUNDOFFS = 24
 #: Number of array elements in a block, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
-#: Fill ratio of a box below which a k-d tree finds neighbours. A heuristic: it affects speed, and
-#: the lower bounds on nearest distances, which determine the shells of docs/theory/convexity.md.
+#: Fraction of occupied sites of a box below which a k-d tree finds neighbours. A heuristic: it
+#: affects speed, and the lower bounds on nearest distances, from which shells are computed
+#: (docs/theory/convexity.md).
 FILLED = 0.2
 
 #: Number of asperities above which rarely needed spectra are not cached.
@@ -180,7 +181,7 @@ class LatticeInfluence:
     def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
         """The values at the sites, zeros elsewhere, in rows as long as the transforms."""
         field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
-        field.ravel()[self._boxed[1]] = values  # the last one where points coincide
+        field.ravel()[self._boxed[1]] = values  # where points coincide, the last value remains
         return field
 
     def __len__(self) -> int:
@@ -248,7 +249,7 @@ class LatticeInfluence:
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
 
-        Pairs are searched up to the distance beyond which none can exceed the largest found."""
+        Pairs are searched up to the distance beyond which none can exceed the largest so far."""
         if not self._filled:
             return crowding(self.points, radii)
         (rows, columns), places = self.box.shape, self._boxed[1]

@@ -84,8 +84,8 @@ class _Symbol:
         """(m,) f in the middles c of cells of the dual lattice, and lower bounds on f in each cell.
 
         Each bound is the larger of two. The first is f(c) - |grad f(c)| rho - bend rho^2 / 2 for
-        points within rho of c, where no second derivative is below -bend. The second takes the
-        least value of the first sum, and E, which decreases, at the largest distances.
+        points within rho of c, where no second derivative is below -bend. The second has -1 in
+        place of each cosine, and an upper bound on each |k + G|, because E decreases.
 
         cells : (m, 2) middles c in units of g1 and g2
         size  : side of the cells in these units

@@ -13,8 +13,8 @@ from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.influence.splitting import Splitting
 
-#: Memory [bytes] for half a near pair while the matrix is assembled, and least number of points
-#: from which the number of pairs is estimated before.
+#: Memory [bytes] for half a near pair while the matrix is assembled, and the number of points from
+#: which the number of pairs is estimated first.
 BYTES, SAMPLE = 24, 1000
 
 

@@ -98,7 +98,7 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Rounding errors outside the transforms: factors of the sums, and of the size of loads."""
+        """Rounding errors outside the transforms: relative to the sums, and to the largest load."""
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)

@@ -33,7 +33,7 @@ from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
-#: Largest relative error of a product by interpolation. It is most of the error of `sums`, 1e-16.
+#: Largest relative error of a product by interpolation: most of the error of `sums`, about 1e-16.
 TOLERANCE = 5e-17
 
 #: Largest relative error by interpolation for loads in single precision, and for `falloff`.

@@ -71,7 +71,7 @@ class SoftTable:
         values, *others = soft_terms(kernel, Fraction(step), nodes, TERMS)
         scales = (step / kernel.reach**2) ** np.arange(1, TERMS)[:, None] / kernel.reach
         slopes = np.array(others).astype(np.float64) * 2.0**-FIXED * scales
-        # At r = 0 all are largest. Rounding, and what the series leaves out.
+        # The errors by rounding and by truncation of the series are both largest at r = 0.
         ends = [
             abs(float(term[0])) for term in soft_terms(kernel, Fraction(1), 1, kernel.order + 1)
         ]

@@ -1,8 +1,8 @@
 """The sums of `pair_sums` with more digits than float64 has, for the products of a certificate.
 
-Products to the mesh, on it and from it are computed in slices: first slices have so few bits that
-their products are exact, and the rests are small. The remaining error is mostly that of
-interpolation (docs/theory/operators-mesh.md).
+The products from points to the mesh, on the mesh and back to the points are computed in slices.
+First slices have so few bits that their products are exact, and the rests are small. The remaining
+error is mostly that of interpolation (docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ def _from_nodes(
 def _weighed(
     product: Product, lows: LowWeights
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
-    """Points of some patches, rows and nodes of each patch, and the weights in x and y."""
+    """For groups of patches: points, rows and nodes of each patch, and the weights in x and y."""
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):

@@ -133,7 +133,7 @@ class Sliced:
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
         budget = SURE / ((count - 1) * each_loss(box, count))
-        # All slices of the kernel should have about the same norm, and so should those of loads.
+        # All slices of the kernel should have about equal norms, and all slices of the loads, too.
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
         more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)

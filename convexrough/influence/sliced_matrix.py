@@ -47,9 +47,9 @@ class SlicedMatrix:
     """Rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
 
     blocks : the columns of each block, and the number of bits for a slice of the loads there
-    losses : (3 blocks, m) three factors for each block: of the largest load there, of the largest
-        rest of a load after two slices, and of the largest rest after one. The sum of these
-        products over the blocks bounds the error of a product with loads
+    losses : (3 blocks, m) three factors for each block. They multiply the largest load in it, the
+        largest rest of a load after two slices, and the largest rest after one slice. The sum of
+        these products over the blocks bounds the error of a product with loads
     """
 
     slices: tuple[Array, Array, Array]

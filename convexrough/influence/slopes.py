@@ -64,7 +64,7 @@ def _softer(product: Product) -> Softened:
 
 
 def _nearby(product: Product, ordered: Array) -> Array:
-    """The part of the sums that near pairs add to the smooth part."""
+    """(n, 2) sums over near pairs, with 1 / r^3 minus its smooth part."""
     upper, points, kernel = product.near.upper, product.order.points, _softer(product)
     total, n = np.zeros_like(points), len(points)
     edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + BLOCK, BLOCK))

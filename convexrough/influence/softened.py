@@ -140,7 +140,8 @@ class Softened:
 def lebesgue(order: int) -> float:
     """The Lebesgue constant: the largest sum of |Lagrange's polynomials| in the middle interval.
 
-    There the sum is an even polynomial with all its roots outside, so it is largest in the middle.
+    In this interval the sum is an even polynomial, and all its roots lie outside. So it is largest
+    in the middle.
     """
     return float(np.abs(lagrange(np.array([0.5]), order)).sum())
 
@@ -189,7 +190,7 @@ def exact_series(order: int, power: int) -> list[Fraction]:
 
 @cache
 def _interpolated(order: int) -> float:
-    """c with |error| <= c h^p max |d^p L| / p! for interpolation in four variables, one by one."""
+    """c with |error| <= c h^p max |d^p L| / p!, for successive interpolation in four variables."""
     growth = lebesgue(order)
     remainder = math.prod(range(1, order, 2)) ** 2 / 2.0**order
     return 1.01 * remainder * (1.0 + growth + growth**2 + growth**3)

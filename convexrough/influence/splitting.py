@@ -1,7 +1,7 @@
 """The choice of the splitting of 1 / r^q, and of the mesh for the smooth part.
 
 docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: they affect
-the cost, and how near the error is to the tolerance. The error is bounded for any choice.
+the cost, and how near the error is to the tolerance. The bounds on the error hold for any choice.
 """
 
 from __future__ import annotations

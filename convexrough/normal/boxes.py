@@ -38,7 +38,7 @@ LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 #: Number of touching asperities up to which Cholesky costs no more than overlapping shells.
 FACTORISED = 1500
 
-#: Margins mu of a box of touching asperities, some small: it may be barely convex.
+#: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
 CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
@@ -50,7 +50,7 @@ class Box(NamedTuple):
     loads: Array  # upper ends; the lower ends are 0
     compliance: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # the solution must still be proved to be below these; infinite where not
+    faces: Array  # it must still be proved that the solution is below these; infinite: no need
     fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:
@@ -69,8 +69,9 @@ class Box(NamedTuple):
     def closed(self) -> Box:
         """A box that contains this one, for use at another load or approach.
 
-        The solution there may lie outside. Where shells prove S_i <= theta, with the convexity
-        number theta, the box ends at S_i = theta: far above the error bounds of loads at the rim.
+        The solution at that load or approach may lie outside. Where shells prove convexity, the
+        upper ends are raised to the loads at which each convexity number theta_i is `theta`. So
+        they are far above the error bounds of loads at the rim.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -155,7 +156,7 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Loaded asperities too close for an energy minimum; else those whose shells meet; else all."""
+    """Loaded asperities so close that the energy is not convex; if none: shells meet; else all."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which

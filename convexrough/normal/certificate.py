@@ -52,13 +52,13 @@ class Certificate(Table):
     gap_errors : [length] bounds on |gap - solution|
     approach : [length] the prescribed approach, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
-    duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
-        0 up to rounding at a solution, infinite where nothing is proved. If the total load is
-        prescribed, loads on asperities that cannot touch are first dropped, and the others scaled
-        to the total
+    duality_gap : [force length] upper bound on the energy of these loads minus the least energy. It
+        is 0 up to rounding at a solution, and infinite where nothing is proved. If the total load
+        is prescribed, loads on asperities that cannot touch are first dropped, and the others
+        scaled to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
-        of them touches are not excluded
+        of these asperities touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
         the largest (a_i + a_j) / r_ij, with contact radii a and distances r. This bound is infinite
         if there is no other solution, and 0 if nothing is known
@@ -152,7 +152,7 @@ def certify(
         scaled to a prescribed total, and the bounds include this change
     influence : compliance operator "dense", "lattice" or "scattered"; None for the cheapest
 
-    Raises InputError for loads of the wrong length, negative or not finite.
+    Raises InputError for loads that are negative, not finite or not of the shape (n,).
 
     >>> judged = cr.certify(scene, contact.loads.round(12), approach=5e-5)
     >>> judged.holds, judged.load_error < 1e-11
@@ -276,7 +276,7 @@ class _Screened(NamedTuple):
     """The asperities that cannot touch: D_i <= 0 in every solution, rounding included."""
 
     which: Indices  # in the scene
-    below: NDArray[np.bool_]  # D_i < 0: every term of a D_i = 0 is 0
+    below: NDArray[np.bool_]  # D_i < 0; otherwise D0 = d_i = 0
     coupling: Coupling | None  # from asperities that can touch; None if all can
     indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation

@@ -26,11 +26,12 @@ SUSPICIOUS = 1e-3
 #: Prefixes of the units of forces that are too large by these powers of ten.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
-#: For `_moved`: distance over the size of the array that counts as 0, and largest remaining part of
-#: the error.
+#: `_moved` treats points as equal within this part of the size of the array, and accepts a symmetry
+#: if at most this part of the error remains.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: Largest part of an error that remains after a factor, of which `hints` then tells.
+#: `hints` reports a common factor of the forces if dividing by it leaves at most this part of the
+#: error.
 REMAINING = 0.1
 
 
@@ -45,7 +46,7 @@ def tolerance(name: str, within: float) -> float:
 class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
-    one, many : the singular and the plural of what a force is called in messages
+    one, many : the singular and the plural of the term for a force in messages
     proved    : name in messages of the set of asperities that the claim is about
     kinds     : names of attributes with the indices of wrong statuses, and what is wrong there
     claims    : the statuses that are claimed where `claimed` is True and where it is False
@@ -101,7 +102,7 @@ class Claim(ABC):
 
     @property
     def basis(self) -> str:
-        """What is proved of the assumption on which the proof of these forces rests; "" if none."""
+        """What is proved about the assumption that the proof of the forces needs; "" if none."""
         return ""
 
     @property
@@ -125,7 +126,7 @@ class Claim(ABC):
         return not wrong and self.near_enough and self.total_holds
 
     def hints(self) -> Iterator[str]:
-        """Lines that suggest where wrong forces may come from."""
+        """Lines that name a possible cause of wrong forces, such as a wrong unit or sign."""
         if self.holds or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
@@ -233,8 +234,8 @@ class Claim(ABC):
         """(m,) indices of asperities with a wrong status or a wrong force, likeliest first.
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
-        two. If the total differs from that of the solution, the forces are also compared after
-        scaling to it.
+        two. If the sum of the forces differs from that of the solution, they are also compared
+        after scaling them to the sum of the solution.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or (self.near_enough and not len(wrong)):

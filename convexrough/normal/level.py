@@ -175,8 +175,8 @@ class Level:
         """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
 
         The solution is refined in pairs of float64 numbers until the residual no longer halves.
-        Bounds on its error follow from docs/theory/one-theorem.md. They include the x of doubtful
-        asperities.
+        Bounds on its error follow from docs/theory/one-theorem.md. They allow any x of the
+        asperities for which it is not proved whether they touch.
 
         right : (n,);  total : ()
 
@@ -325,9 +325,9 @@ class Levels:
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The level in the box of `top`, sought from nothing; then from the loads of `top`.
+        """The level in the box of `top`, sought without initial loads, then from those of `top`.
 
-        If other solutions than that of `top` are possible, only the second is tried.
+        If other solutions than that of `top` are possible, only the loads of `top` are tried.
         """
         top = self.top.solution
         local = top is not None and top.box.scope == "local"

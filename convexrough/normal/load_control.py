@@ -17,8 +17,8 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Smallest radius of a scene, over the smooth contact radius; and the factor by which the scene on
-#: which the approach is bounded is wider.
+#: Least radius of a scene, divided by the contact radius of the smooth body; and how many times as
+#: wide as the scene of asperities that can touch is the scene that bounds the approach.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on
@@ -62,7 +62,7 @@ def approach_bound(
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
-    It is (2) of docs/theory/certificate.md, with q = weights / sum(weights), alpha = q k, c = A q.
+    (2) of docs/theory/certificate.md with q = weights / sum(weights), alpha = q k and c = A q.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) A times weights, or more
@@ -128,7 +128,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] loads of this total if the surface moves as under a smooth sphere."""
+    """(n,) [force] loads with this total, for the surface displacement of a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
@@ -157,8 +157,8 @@ def all_that_could_touch(
     scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    A bound found on a wide scene also holds for a narrower one if this has all asperities with an
-    approximate load: (2) of docs/theory/certificate.md is then the same sum with the same lambda.
+    A bound found on a wide scene also holds for a narrower scene that contains all asperities with
+    a nonzero weight: (2) of docs/theory/certificate.md is then the same sum with the same lambda.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

@@ -151,7 +151,7 @@ class NormalProblem:
 
     @cached_property
     def places(self) -> Indices:
-        """(N,) index of each asperity among the candidates, whose order is any; -1 for others."""
+        """(N,) index of each asperity among the candidates, which are not sorted; -1 if in none."""
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places
@@ -178,7 +178,7 @@ class NormalProblem:
         slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) F(delta), which the step reduces to 0
         enough : accept a step that reduces the defect by this factor
 
-        On a lattice the step leaves out asperities with slope and defect 0: the box is smaller.
+        On a lattice the step leaves out asperities with slope and defect 0, for smaller transforms.
         """
         some, influence = np.arange(len(self)), self.influence
         if influence.cheap_sums:
@@ -195,7 +195,7 @@ class NormalProblem:
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """A P for `others`, loads close to `loads`, from the difference if that is cheap."""
+        """A P for the loads `others`, from `product` = A `loads` and the difference if cheaper."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:
@@ -361,7 +361,7 @@ class NormalProblem:
         return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
-        """(n,) the offsets as pairs of float64 numbers: z - r^2 / (2 R), by axes."""
+        """(n,) offsets as pairs of float64 numbers, z - x^2 / (2 Rx) - y^2 / (2 Ry)."""
         return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
 
     def _twofold_offsets(self, which: Indices) -> Pair:
@@ -393,7 +393,7 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*), in scaled units."""
+    """In scaled units: mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*)."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

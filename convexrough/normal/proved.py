@@ -141,7 +141,7 @@ class Known(NamedTuple):
     """What the theorem proves in a box: for one problem or in rows.
 
     inside   : True if the box is proved to hold the solution, on which the other fields rest
-    at_first : (n,) bounds on the errors of the trial loads, if it does
+    at_first : (n,) bounds on the errors of the trial loads, valid if `inside`
     distance, compliance, loads, indentation, approach : the fields of `Proved`
     """
 
@@ -183,7 +183,9 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
 
 
 class _Missing(NamedTuple):
-    """The effect of a difference between prescribed total and sum: docs/theory/one-theorem.md.
+    """The effect of a difference between the prescribed total and the sum of the loads P.
+
+    docs/theory/one-theorem.md derives it.
 
     loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals, where
         (1 + t) P have the prescribed total; 0 if they have it
@@ -224,8 +226,8 @@ def _smaller(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tupl
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
     """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
 
-    If none is: gaps >= 0, so D0* is at most this at each asperity; and at least -max d, where
-    contact begins.
+    If none is proved to touch, D0* is at most this at each asperity, because gaps are not negative.
+    D0* is at least -max d, the approach at which contact begins.
     """
     if problem.load is None:
         return state.approach.radius

@@ -30,7 +30,7 @@ from convexrough.sphere import hertz
 #: Largest number of corrections.
 CORRECTIONS = 12
 
-#: Fraction of the residual's rounding error to which corrections reduce the residual.
+#: A correction aims to reduce the residual to this fraction of the residual's rounding error.
 ENOUGH = 0.1
 
 #: Number of candidates up to which refinement with a matrix costs no more than the solution.
@@ -75,7 +75,7 @@ class Trial:
 
     @property
     def defect(self) -> Array:
-        """(n,) the residual of the contact law: the gap where loaded, and minus the overlap."""
+        """(n,) the residual of the contact law: gap where loaded; elsewhere min(gap, 0)."""
         gap = self.gap.value
         return np.where(self.inside, gap, np.minimum(gap, 0.0))
 
@@ -108,7 +108,7 @@ class Trial:
 
 
 def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
-    """The residuals of loads with known A P and known difference from the prescribed total."""
+    """The residuals of loads, given A P and the difference from the prescribed total."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:

@@ -22,7 +22,7 @@ from convexrough.roundoff import SAFETY
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Problems in m rows, in scaled units: arrays (m, n), or (n,) where all rows share them.
+    """Problems in m rows, in scaled units: arrays are (m, n), or (n,) where all rows are equal.
 
     coupled : slices of the rows, each with a problem whose compliance operator these rows share
     exact   : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`

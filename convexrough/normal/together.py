@@ -77,7 +77,7 @@ class Solved:
     def total(self) -> Ball:
         """(m,) the total load of each row."""
         trial = Ball.exact(self.trial.loads).sum()
-        with np.errstate(invalid="ignore"):  # only rows that are not good: no least compliance
+        with np.errstate(invalid="ignore"):  # nan only in rows that are not good
             spread = self.distance * np.sqrt(summed(1.0 / self.compliance)) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 

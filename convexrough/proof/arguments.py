@@ -19,8 +19,8 @@ from scipy.spatial.distance import cdist
 from convexrough.arrays import Array
 from convexrough.scene.scene import Scene
 
-#: Relative distance from the radii of any solution to the upper ends of a box, and smallest upper
-#: end divided by the largest. The first pair is for accurate radii, the second for rough ones.
+#: Relative distance from bounds on the radii of any solution to the upper ends of a box, and the
+#: smallest upper end divided by the largest: for accurate radii, then for inaccurate ones.
 ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
 #: Relative room for rounding in this module.
@@ -36,7 +36,7 @@ FITTED = 0.9
 WIDTHS = (2.0, 4.0, 8.0)
 
 #: Relative distance from the radii to the upper ends of a box in which all asperities that do not
-#: touch are fixed open: for radii with thirty digits, for float64 numbers, and for rough ones.
+#: touch are fixed open: for radii with thirty digits, float64 numbers, and less accurate ones.
 LEEWAY = (1e-12, 1e-6, 1e-2)
 
 #: The box, the convexity number and the shells of an argument.
@@ -147,7 +147,7 @@ class TrialState:
         return box
 
     def _crowded(self, box: Array) -> Iterator[Reason]:
-        """Arguments by overlapping shells, or else by Cholesky factorisation."""
+        """An argument by overlapping shells if one is found, else by Cholesky factorisation."""
         able = np.flatnonzero(box)
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:
