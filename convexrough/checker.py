@@ -13,11 +13,12 @@ asperity. The offset is its height minus the distance, at the asperity, between 
 plane that touches the base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
-is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
-checker computes with rationals and with intervals between rationals. Equation (1) is in
-docs/theory/proof-file.md, (2) to (12) are in proof-file-steps.md.
+is convex on this box, and claims. Its numbers are float64 in hexadecimal, which are exact
+rationals. The checker computes with rationals and with intervals between rationals. Equation (1) is
+in docs/theory/proof-file.md; (2) to (12) are in proof-file-steps.md in the same folder.
 
-Exit status: 0 if all claims are proved; 1 if one is refused, with the reason; 2 if unreadable.
+Exit status: 0 if all claims are proved; 1 if a claim is refused, with the reason; 2 if the file is
+not a proof.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ MOST_INVERTED = 600  # most touching asperities for an inverse in the proof of o
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
-UNIT = 1 << 320  # inverse distances are integers over this, too small by at most the factor SLACK
+UNIT = 1 << 320  # inverse distances are integers / UNIT, too small by at most the factor SLACK
 SLACK = 1 + Fraction(1, 1 << 96)
-FAR = 1 << 400  # the distance from an asperity to itself, so that it does not displace itself
+FAR = 1 << 400  # counts as the distance of an asperity from itself: it does not displace itself
 ROOT_BITS = 60  # bits of the integer Cholesky factor
 ONE_BITS = 80  # binary places of fixed-point numbers in the proof of order
 ONE = 1 << ONE_BITS
@@ -339,11 +340,11 @@ class State(NamedTuple):
     depths: list[Interval]  # D_i - (A P)_i of the solution: the indentation, or minus the gap
     loads: list[Interval]  # P_i of the solution
     total: Interval  # sum of the P_i
-    energy: Interval  # of the solution: the least energy of all loads with this total (9)
+    energy: Interval  # least energy of all loads with this total, the energy of the solution (9)
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The only solution in the box, under this load, or if None, under the approach in `place`."""
+    """The solution, proved to be in the box; at the approach in `place` if `load` is None."""
     radii, centre = table(place, "radii", "approach")
     n = len(scene.points)
     a = [added(radius, f"radii [{i}]") for i, radius in enumerate(as_list(radii, "radii", n))]
@@ -358,7 +359,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
         scaling = Interval(1).wider((load / added_up(near) - 1).size())
         near, local, pushed = ([x * scaling for x in xs] for xs in (near, local, pushed))
 
-    # (6) Bound the distance to the solution in energy, then in each load (7): it is in the box.
+    # (6) Bound the distance to the solution in the energy norm, (7) in each load; check the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
@@ -368,7 +369,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     if any(near[i].high + error[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
-    # (8) Enclose the depth of each asperity: D_i less the displacement by the others.
+    # (8) Enclose the depth of each asperity: D_i minus the displacement (A P)_i by the others.
     moved = [(distance * s.root()).high for s in spread]
     shift = Fraction(0)
     if load is not None:
@@ -438,10 +439,11 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 
 
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
-    """An amount by which D0 can decrease from this state so that no indentation increases (11).
+    """An amount by which D0 can decrease from this state while no indentation increases (11).
 
     `missed` is minus the lower bound on the rate of each asperity. It must be negative for all that
-    may touch. Where it is positive for others, their gaps must exceed it times the amount.
+    may touch; otherwise the amount is 0. Where it is positive for an open asperity, the gap must
+    exceed `missed` times the amount.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]

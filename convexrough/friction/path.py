@@ -146,9 +146,9 @@ def load_path(
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : compliance operator; None for the cheapest that is exact
-    general_steps : number of general steps per segment, which need no order
-        (docs/theory/without-order.md) and whose results are not proved. None uses the memory curve,
-        or as many general steps as needed if an indentation falls as the load rises
+    general_steps : number of general steps per segment (docs/theory/without-order.md), whose
+        results are not proved. None uses the memory curve, or, if an indentation falls as the load
+        rises, as many general steps as needed
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.

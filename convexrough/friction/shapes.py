@@ -30,6 +30,7 @@ def elliptic_path(
         points of the path, so that `Cycle.level` is exact
     chords : approximate number of chords; the relative error of the loss is about chords^-2
 
+    Raises InputError for other phases, or if `friction` is not positive.
     >>> loads, forces = cr.elliptic_path(
     ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8
     ... )

@@ -46,7 +46,8 @@ class Objective(Record):
     influence : compliance operator, as in `press`
 
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
-    Divide both by the initial value: scipy's tolerances are absolute, and a loss may be 1e-13.
+    Divide value and gradient by the initial value: scipy's tolerances are absolute, and a loss may
+    be 1e-13.
     `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)

@@ -125,7 +125,7 @@ class Influence(Coupling, Protocol):
         ...
 
     def separations(self) -> Array:
-        """(n,) [length] lower bounds on the distances of asperities from their nearest neighbours."""
+        """(n,) [length] lower bounds on the distances of asperities to their nearest neighbours."""
         ...
 
     def crowding(self, radii: Array) -> float:

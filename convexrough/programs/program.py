@@ -51,8 +51,8 @@ class Program(Record):
     energy_unit : [force length] unit of the objective
     objective   : minimum of the objective, in energy_unit; for bristles the value that OSQP finds,
         nan if OSQP fails
-    constant    : the energy, in energy_unit, is constant + objective; for the dual it is constant -
-        objective. The constant is 0 for bristles, and if the approach is prescribed
+    constant    : the energy, in energy_unit, minus the objective; for the dual, the energy plus the
+        objective. It is 0 for bristles, and if the approach is prescribed
     load_error_estimate : estimated error of the loads that minimise the objective exactly, as a
         fraction of the largest load
 
@@ -77,6 +77,8 @@ class Program(Record):
 
         values : the solution x, with or without the last variable that a file in CBF adds. For
             the dual, the multipliers of the equations in the order of the file, of either sign
+
+        Raises InputError for a wrong number of values.
         """
         m, data = len(self.asperities), self.data
         given = checks.numbers("values", values).ravel()
@@ -92,7 +94,7 @@ class Program(Record):
         return loads
 
     def energy(self, objective: float) -> float:
-        """[force length] the energy that corresponds to a value of the objective."""
+        """[force length] the energy for a value of the objective in `energy_unit`."""
         sign = -1.0 if self.form == "dual" else 1.0
         return self.energy_unit * (sign * checks.finite("objective", objective) + self.constant)
 
@@ -148,9 +150,9 @@ def program(
     >>> program.data.cones
     220
 
-    Raises TooDenseError if the solution lies outside the boxes in which the program is exact.
-    Newton's method solves the problem first, to check that the solution lies in the boxes;
-    SolverError is raised if it finds none.
+    Raises TooDenseError if the solution lies outside the boxes in which the program is exact. To
+    check this, Newton's method solves the problem first; SolverError is raised if it finds no
+    solution.
     """
     checks.instance("scene", scene, Scene)
     checks.whole("bristles", bristles)

@@ -125,8 +125,8 @@ class SmoothSphere(Record):
     def branch(self, force: ArrayLike, turning_force: float) -> Any:
         """[length] displacement after loading from rest to `turning_force` and back to `force`.
 
-        Masing's rule [14]-[15]: X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force
-        Q1 and X of `displacement`.
+        By Masing's rule it is X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force Q1
+        and X of `displacement`: [14]-[15] of Dini and Hills (2009).
         """
         turning = checks.finite("turning_force", turning_force)
         first = self.displacement(turning)
@@ -140,10 +140,10 @@ class SmoothSphere(Record):
         return first - 2.0 * self.displacement((turning - given) / 2.0)
 
     def energy(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Any:
-        """[force length] energy lost per steady cycle between two shear forces, [16].
+        """[force length] energy lost per steady cycle between two shear forces.
 
         It is W0 e((maximum - minimum) / (2 f P)), with the `energy_scale` W0 and the function e of
-        `mindlin.loss`. The default minimum is -maximum.
+        `sphere.mindlin.loss`: [16] of Dini and Hills (2009). The default minimum is -maximum.
         """
         upper = self._share("maximum", maximum)
         lower = -upper if minimum is None else self._share("minimum", minimum)
