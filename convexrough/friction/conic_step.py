@@ -2,8 +2,8 @@
 
 The cones of `convexrough.convex.cones` represent each piece of the energy W(T) of an asperity
 (`conic_pieces`) exactly, and W is the convex hull of its pieces. Piece j has a weight w_j, which
-replaces the 1 in its cones. The weights of an asperity add up to 1, and the forces and energies of
-its pieces to those of the asperity. Displacements are in units of c_t f and forces in units of f:
+replaces the 1 in its cones. The weights of an asperity add up to 1. The forces and energies of its
+pieces add up to those of the asperity. Displacements are in units of c_t f, forces in units of f:
 docs/theory/without-order.md, "The step as one cone program".
 """
 

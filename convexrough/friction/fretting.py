@@ -37,8 +37,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: The largest traction is sought at the radii a(s_k) and at this number of other distances. At
-#: constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
+#: The largest traction is sought at the radii a(s_k) and at about this number of other distances.
+#: At constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
 DISTANCES = 64
 
 

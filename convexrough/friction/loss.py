@@ -138,7 +138,7 @@ def _hull(a: Ball, b: Ball) -> Ball:
 
 
 def _sharper(a: Ball, b: Ball) -> Ball:
-    """The one with the smaller radius, of two balls that enclose the same numbers."""
+    """Of two balls that enclose the same numbers, the one with the smaller radius."""
     return where(a.radius <= b.radius, a, b)
 
 

@@ -49,7 +49,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
     In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds this
     force. The result is nan for an asperity without load. It is also nan if the order (see
-    `prove_order`) "fails" between the load at which the asperity first touches and that of the
+    `prove_order`) "fails" between the load at which the asperity first touches and the load of the
     contact; the asperity may then start to slide at another force.
 
     which : indices of the asperities, in the order of the result; default all. Each asperity needs

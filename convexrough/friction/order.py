@@ -7,8 +7,7 @@ n_i, which are minus the gap where asperity i is open. Let A be the compliance m
 offsets, and C the diagonal matrix of c_i = dP_i / dn_i, which is 0 where i is open. By the contact
 law n + A P = D0 + d, the *rates* y = dn / dD0 solve (I + A C) y = 1. There is order from the load
 L1 down to L0 if at all loads between, y_i >= 0 for each asperity i that may touch at the highest
-load of the path, and all others are open. The level at L1 can prove it, with these symbols:
-
+load of the path, and all others are open. The level at L1 can prove order. Symbols of the proof:
 - The *support* is the set of asperities that are not proved open at L1.
 - C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for all diagonal 0 <= C' <= C~.
 - delta is diagonal, 0 <= delta <= C~. From here on C is any diagonal matrix, C~ - delta <= C <= C~,
@@ -26,9 +25,9 @@ Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
 2. Row i is 1 - y_i = (A z)_i, and differs from that sum by t_i z_i and at most sum_k r_k z_k.
 3. (2) and (3) follow from 0 <= z_k <= C~_k and 0 <= (C~_k - C_k) y_k <= delta_k m_k.
 
-(a) Start from m = 1 and decrease m by (3). For all i on the support, let (2) with 2 r in place of r
-have a positive right side, and let |1 - sum_k w_k| <= 2 (1 - max(t_i, 0) C~_i - sum_k r_k C~_k).
-Then all rates on the support are positive.
+(a) Start from m = 1 and decrease m by (3). Suppose that for all i on the support the right side of
+(2), with 2 r in place of r, is positive, and
+|1 - sum_k w_k| <= 2 (1 - max(t_i, 0) C~_i - sum_k r_k C~_k). Then all rates on the support are > 0.
 
 1. If |y| <= Y, (2) and (3) hold for C = C~ and delta = 0, with Y r in place of r.
 2. So by the last condition Y = 2 is such a bound at C~, and by (2) the rates are positive there.
@@ -80,7 +79,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
-#: A computed rate below -RATE_ROUNDING counts as negative; SOLVED is the tolerance of its solver.
+#: A computed rate below -RATE_ROUNDING counts as negative. SOLVED: tolerance in solving for rates.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: If at most INVERTED asperities touch, an inverse gives the weights and costs no more than the
@@ -255,7 +254,7 @@ class _Span(NamedTuple):
 
         The arrays of this object must be for s asperities that include the support.
 
-        entries     : (m, r, s) of A; columns are these asperities, rows are these and r - s more
+        entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
         entry_error : (m, 1) bound on the relative error of the entries
         """
         c, s = self.c[:, :, None], np.arange(self.c.shape[1])

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: A given force keeps the status "sliding" of its asperity if its error bound is smaller than this
+#: An asperity keeps the status "sliding" if the error bound of its given force is smaller than this
 #: fraction of the friction limit f P_i.
 NEAR_SLIDING = 1e-2
 

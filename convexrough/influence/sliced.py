@@ -62,7 +62,7 @@ class Distances:
     def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
         """The distances for |i| and |j| below `largest`.
 
-        basis : reduced, in a unit that is at most its shortest length and more than half of it
+        basis : reduced basis, in a unit that is 0.5 to 1 times the length of the shorter vector
         """
         (a, b), (c, d) = basis
         bits = 52 - (4 * largest * largest).bit_length()

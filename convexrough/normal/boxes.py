@@ -50,7 +50,7 @@ class Box(NamedTuple):
     loads: Array  # upper ends; the lower ends are 0
     compliance: Array  # h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # it must still be proved that the solution is below these; infinite: no need
+    faces: Array  # the solution must still be proved to be below these; infinite where no need
     fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
 
     def at(self, rows: Indices, problem: Stack) -> Box:

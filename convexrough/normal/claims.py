@@ -23,7 +23,7 @@ WITHIN = 0.01
 #: Smallest error of a suspect, as a fraction of the largest error.
 SUSPICIOUS = 1e-3
 
-#: Prefixes of the units of forces that are too large by these powers of ten.
+#: The prefix of a wrong unit of force, by the power of ten by which it makes forces too large.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 #: `_moved` treats points as equal within this part of the size of the array, and accepts a symmetry

@@ -80,7 +80,7 @@ class NormalProblem:
     candidates    : (n,) their indices in the scene; all others carry no load in any solution
     coefficients, offsets, influence : (n,) k, (n,) d, and the compliance operator A
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    shells        : (n,) 1 / (pi E* s_i) for radii s_i: A with these on the diagonal is semidefinite
+    shells        : (n,) 1 / (pi E* s_i) for radii s_i; A + diag(shells) is positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     approach_bound : upper bound on D0 at any solution
@@ -123,7 +123,7 @@ class NormalProblem:
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
     def at_load(self, load: Ball) -> NormalProblem:
-        """The problem of the same asperities under a total load, up to that at `approach_bound`."""
+        """The problem of the same asperities under a load whose approach is <= `approach_bound`."""
         return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
 
     def at_approach(self, approach: Ball) -> NormalProblem:
@@ -353,7 +353,7 @@ class NormalProblem:
         return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
-        """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
+        """theta of (3), docs/theory/convexity.md; if it is below 1, Phi is convex up to `loads`."""
         return float(self.convexity_at(self.compliance(loads)))
 
     def convexity_at(self, compliance: Array) -> Any:

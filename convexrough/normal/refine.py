@@ -51,7 +51,7 @@ class Trial:
     loads, product : (n,) P and A P
     local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
-    approach : D0, prescribed, or under a prescribed load the one that fits best
+    approach : D0: the prescribed one, or, if the load is prescribed, the one that fits best
     missing : prescribed total minus the sum of the loads; 0 where none is prescribed
     """
 

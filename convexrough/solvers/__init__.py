@@ -36,7 +36,10 @@ SOLVERS: dict[str, Callable[[], Solver]] = {
 
 
 def named(solver: Solver | str | None) -> Solver:
-    """The solver for an argument `solver`: itself, the one of this name, or Newton's for None."""
+    """The given solver, the solver that `SOLVERS` has under this name, or Newton's method for None.
+
+    Raises InputError for other arguments.
+    """
     if solver is None:
         return Newton()
     if isinstance(solver, str) and solver in SOLVERS:

@@ -76,7 +76,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are p, y2 to y5 and z, in blocks of n. An asperity has four cones, or five for
-    larger boxes of loads: these have y1 before y2.
+    larger boxes of loads. With five cones the block y1 precedes y2.
     """
 
     problem: NormalProblem
