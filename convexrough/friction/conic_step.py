@@ -158,7 +158,7 @@ class StepProgram:
         return csc_matrix(rows)
 
     def _cones(self, width: int) -> tuple[csc_matrix, Array]:
-        """Rows and constants of the cones: the bounds of each piece, then its energy."""
+        """Rows and constants of the cones: for the bounds of each piece, then for its energy."""
         from scipy.sparse import csc_matrix, lil_matrix, vstack
 
         n, five = len(self.which), 1.5 * self.shifts.max() > FOUR_CONES_LIMIT

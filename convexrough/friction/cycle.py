@@ -526,6 +526,7 @@ def loops(
     points : approximate number of points of the widest loop; narrower ones have fewer
     asperities : as in `Cycle.loop`
 
+    Raises InputError if the load of a cycle varies.
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
     >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
     [23, 41]

@@ -241,15 +241,18 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
 
 
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:
-    """Whether it is proved that no indentation falls as the load rises from 0 to that of `contact`.
+    """What is proved about order at the loads between 0 and the load of `contact`.
 
-    The result is "proved", "proved for one step" or "fails", as in `Cycle.order`. Later results for
-    this contact reuse the proof. For some asperities, mostly at the edge of the contact, the proof
-    needs a search of some milliseconds. Without this call the search is made for at most 1,000
-    asperities, and only if at most 10,000 touch.
+    Order means that no indentation falls as the load rises. The result is "proved", "proved for one
+    step" or "fails", as in `Cycle.order`. Later results for this contact reuse the proof. For some
+    asperities, mostly at the edge of the contact, the proof needs a search, which takes some
+    milliseconds for each. Without this call the search is made for at most 1,000 asperities, and
+    only if at most 10,000 touch.
 
     most : largest number of asperities for which the search is made; at most ten times as many may
         touch
+
+    Raises InputError if the scene has no friction.
 
     >>> cr.prove_order(contact)
     'proved'

@@ -127,7 +127,7 @@ class SiteBox:
         return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box, for the shortest difference at each place."""
+        """Values in some rows of the padded box, each for the shortest difference at its place."""
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []

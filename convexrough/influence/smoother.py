@@ -30,14 +30,15 @@ WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 #: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.
 FINE = 3.5
 
-#: Side of windows for smooth W. Then blocks have 2 x 2 cells, and cost a third of blocks of one.
+#: Side of windows for smooth W. Blocks then have 2 x 2 cells, which cost a third of 1 x 1 cells.
 LEAST_WINDOW = 2 * FINE
 
 #: Side of the windows on which the scatter of W^2 is measured.
 WINDOW = 8
 
-#: Mean number of points in the cell of a point above which cells are made smaller, most cells per
-#: point, and largest difference between the numbers of rows or columns that contain points.
+#: Cells are made smaller while the mean number of points in the cell of a point exceeds the first
+#: number and there are fewer cells per point than the second. The third is the largest distance, in
+#: cells, of neighbouring rows or columns that contain points; larger distances are shortened.
 MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
 #: Lower limit of 1 + d A, as the spectrum of A is negative at short waves.
@@ -79,7 +80,7 @@ def _mean_sharing(cells: Indices) -> float:
 def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:
     """M for asperities in these cells (2, n) of a lattice, with the diagonal `root` (n,) of W.
 
-    scale : an entry of A between the centres of cells, times their distance in the unit of `basis`
+    scale : A_ij r_ij, with distances r_ij in the unit of `basis`
     """
     (i, j), (rows, columns) = cells, (cells.max(axis=1) + 1).tolist()
     squares = np.bincount(i * columns + j, root * root, minlength=rows * columns)

@@ -156,7 +156,11 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Loaded asperities so close that the energy is not convex; if none: shells meet; else all."""
+    """Indices of loaded asperities that probably prevent a proof of convexity.
+
+    They are those in a pair too close for convexity; if there are none, those whose shell meets
+    another shell; if there are none either, all.
+    """
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which

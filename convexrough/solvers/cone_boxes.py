@@ -47,7 +47,7 @@ class TooDenseError(InputError):
     """Asperities whose contact radii are too large for a convex program: a_i > (pi/2) s_i.
 
     asperities : (m,) their indices in the scene
-    ratios     : (m,) contact radius of each over (pi/2) s_i, if its neighbours stay below their
+    ratios     : (m,) contact radius of each divided by (pi/2) s_i, while all others obey their
         limits; s_i is half the distance to the nearest neighbour
     """
 

@@ -37,9 +37,9 @@ class Loaded:
     """n loaded asperities of a contact. Arrays are (n,), in scaled units.
 
     scope    : scope of the contact's certificate; "none" without a proof
-    touching : their indices in the scene
+    touching : indices of the loaded asperities in the scene
     loads, errors : P, and bounds on the errors;  thresholds : k P^(2/3)
-    influence : operator A;  shells : added to its diagonal they make it positive semidefinite
+    influence : operator A;  shells : A + diag(shells) is positive semidefinite
     sure     : True where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
     stiffness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
