@@ -23,8 +23,9 @@ from convexrough.arrays import Array
 from convexrough.errors import SolverError
 from convexrough.progress import log_step
 
-#: Largest relative residual of the linear system of a step; the square of the last reduction of the
-#: defect if smaller (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996) 16, choice 2).
+#: The linear system of a step is solved to this relative residual, or to the square of the last
+#: reduction of the defect if that is smaller (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996)
+#: 16, choice 2).
 MOST_LEFT = 0.1
 
 #: Least residual of the linear system, relative to the defect at which the method stops. Heuristic.

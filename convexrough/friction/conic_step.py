@@ -3,8 +3,9 @@
 The cones of `convexrough.convex.cones` represent each piece of the energy W(T) of an asperity
 (`conic_pieces`) exactly, and W is the convex hull of its pieces. Piece j has a weight w_j, which
 replaces the 1 in its cones. The weights of an asperity add up to 1. The forces and energies of its
-pieces add up to those of the asperity. Displacements are in units of c_t f, forces in units of f:
-docs/theory/without-order.md, "The step as one cone program".
+pieces add up to those of the asperity. Forces are in units of the coefficient of friction f,
+displacements of c_t f with Mindlin's ratio c_t: docs/theory/without-order.md, "The step as one cone
+program".
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class StepProgram:
     which  : (n,) indices of the asperities in the scene
     loads, own : (n,) loads N_i and indentations after the step
     parts  : (n,) p_i, the fraction of the step during which the asperity touches
-    shells : (n,) diagonal that makes the coupling positive semidefinite if it is added to it
+    shells : (n,) diagonal; the coupling plus this diagonal is positive semidefinite
     pieces : pairs of an asperity (its index among the n) and a piece of its energy
     """
 

@@ -133,7 +133,7 @@ class MemoryCurve(Table, Plottable):
         return self._slip(sign, *self._crossing(sign, load, height))
 
     def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
-        """The state after running back along the top layer, down to `load` or its lower end."""
+        """The state after running back along the top layer, down to `load` or the layer's end."""
         last = len(self.slopes) - 1
         below = self._cut(last)
         if load <= self.levels[last]:

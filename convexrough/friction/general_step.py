@@ -1,10 +1,10 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
-Each asperity i keeps its own memory curve, in the plane of its indentation and its deflection over
-c_t f. A straight step to the load P and the shear force f T computes the normal solution at P. Then
-Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i and x: the
-displacements of the asperities and of the bodies in the step. Shear forces are divided by f, and
-displacements by c_t f.
+Shear forces are divided by the coefficient of friction f, tangential displacements by c_t f with
+Mindlin's ratio c_t. Each asperity i keeps its own memory curve, in the plane of its indentation and
+its deflection. A straight step to the load P and the shear force T computes the normal solution at
+P. Then Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i
+and x: the displacements of the asperities and of the bodies in the step.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
 """The energy loss by slip: of each asperity, of the whole contact, and along a path.
 
-docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2. While the total load is P
-and the slip front falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th
-is the slope of the memory curve at L, c the direction of slip, and B the sum of B_i(P, L) in (2) of
-that page. By (1), B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. All of this needs order.
+docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2, with the coefficient of
+friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
+level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
+L, c the direction of slip, and B the sum of B_i(P, L) in (2) of that page. By (1) of that page,
+B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. All of this assumes order: no indentation falls as
+the load rises.
 """
 
 from __future__ import annotations

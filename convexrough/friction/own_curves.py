@@ -8,7 +8,8 @@ ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
 
     L - c h(L) = s1 - c t1,
 
-whose left side does not fall with L. Deflections are divided by c_t f, shear forces by f.
+whose left side does not decrease with L. Shear forces are divided by the coefficient of friction f,
+deflections by c_t f with Mindlin's ratio c_t.
 """
 
 from __future__ import annotations

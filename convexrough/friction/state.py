@@ -1,4 +1,4 @@
-"""Friction states as sums of normal solutions, weighted with the bends of the memory curve.
+"""Friction states as sums of normal solutions, weighted with slope changes of the memory curve.
 
 (1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of
 the bodies. The same sum over the indentations n_i (minus gaps where open) is the own deflection of

@@ -1,7 +1,8 @@
 """A path of (P, T = Q / f) with its levels, states and losses: the basis of all friction results.
 
-States are sums over the levels of the memory curve, losses are integrals over its pieces. If an
-indentation falls as the load rises, general steps compute the results, without proofs.
+States are sums over the levels of the memory curve, losses are integrals over the pieces of each
+segment (`curve.Piece`). If an indentation falls as the load rises, general steps compute the
+results, without proofs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Interpolation between the nodes of a square mesh and points.
 
-docs/theory/operators-mesh.md, "A mesh and near pairs", derives it.
+docs/theory/operators-mesh.md, "A mesh and near pairs", derives the weights.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Near pairs of points, with the part of 1 / r^q that is not smooth."""
+"""The part S of 1 / r^q that is not smooth, as a sparse matrix over near pairs of points."""
 
 from __future__ import annotations
 

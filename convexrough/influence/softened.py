@@ -1,8 +1,8 @@
 """The softened kernel L: 1 / r^q made smooth within a reach, with bounds on interpolation errors.
 
-Beyond the reach a, L is 1 / r^q. Within, L is a polynomial: the series of 1 / r^q in
-t = 1 - (r/a)^2, which ends with t^p. So L has p continuous derivatives at r = a. All terms of the
-series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds: "The
+Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial: the series of 1 / r^q in
+t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives at r = a. All terms of
+the series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds: "The
 smooth part", "Derivatives of L", "Interpolation".
 """
 

@@ -17,8 +17,8 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Least radius of a scene, divided by the contact radius of the smooth body; and how many times as
-#: wide as the scene of asperities that can touch is the scene that bounds the approach.
+#: A scene has a radius of at least LEAST_REACH contact radii of the smooth body. The approach is
+#: bounded on a scene whose radius is WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on

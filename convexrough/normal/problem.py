@@ -151,7 +151,7 @@ class NormalProblem:
 
     @cached_property
     def places(self) -> Indices:
-        """(N,) index of each asperity among the candidates, which are not sorted; -1 if in none."""
+        """(N,) index of each asperity in `candidates`, which are in any order; -1 for others."""
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places

@@ -1,9 +1,9 @@
 """The proof that a solution exists near given loads, and bounds on the distance to it.
 
-docs/theory/certificate.md and one-theorem.md: the theorem on a box of loads on which the energy is
-convex (`boxes`), and again on a smaller box that the first result proves to hold the solution.
-P are the loads, D0 the approach, A the compliance operator, H the local Hessian; a star marks the
-solution.
+The theorem of docs/theory/one-theorem.md is applied on a box of loads on which the energy is convex
+(`boxes`), and then on a smaller box that the first result proves to hold the solution
+(docs/theory/certificate.md). P are the loads, D0 the approach, A the compliance operator, H the
+local Hessian; a star marks the solution.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The contact law on balls, and Newton's method that refines loads to thirty digits.
 
-Functions take a problem, with arrays (n,), or m problems in rows, with arrays (m, n); quantities
-with one number per problem are then (m, 1).
+Functions take one problem or a stack of m problems. Arrays are (n,) for one problem and (m, n) for
+a stack, where quantities with one number per problem are (m, 1).
 
 The residual  k P^(2/3) + A P - d - D0  of loads P known as pairs is a ball, whose radius bounds
 the errors of the data, the product and the arithmetic. A correction is one step of

@@ -1,6 +1,6 @@
 """Many normal problems, one in each row of an array, solved and proved together.
 
-Rows that the cheapest proof does not cover are left out; the caller solves them one by one.
+Only the cheapest proof is tried. The caller solves the rows without a proof one by one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-With the loads P(w) at displacements w of rings about the axis, and the displacements K by unit
-loads spread evenly over the rings, Newton's method solves  w = K P(w)  (Greenwood and Tripp, J.
-Appl. Mech. 34 (1967) 153, for any heights and radii).
+Asperities are grouped in rings about the axis. All asperities of a ring get the same displacement
+w by the loads of all rings, and by Hertz's law the loads P(w) at the indentations D - w. K are the
+displacements by unit loads spread evenly over the rings. Newton's method solves  w = K P(w)
+(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights and radii).
 """
 
 from __future__ import annotations
