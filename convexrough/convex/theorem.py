@@ -2,7 +2,7 @@
 
 docs/theory/one-theorem.md states and proves it, with the symbols of this module. Let x be a trial
 point, e its violations of the first-order conditions, x* the solution, and H a positive diagonal
-matrix. On a box with both, where the Hessian is at least mu H with mu > 0, (1) is
+matrix. On a box with x and x* on which the Hessian is at least mu H with mu > 0, (1) is
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.
 

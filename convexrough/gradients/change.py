@@ -1,6 +1,6 @@
 """Forward derivatives: first-order changes of results when a scene and its load change.
 
-docs/theory/gradients.md, "The change in one direction".
+docs/theory/gradients.md, "The change in one direction", derives them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The compliance operator of arbitrary points: a mesh and a sparse matrix, with error bounds.
 
-`pair_sums` has the method, and docs/theory/operators-mesh.md derives it.
+`pair_sums` implements the method, which docs/theory/operators-mesh.md derives.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The comparison of a claim with a proof, which verdicts on loads and on shear forces share."""
+"""Comparison of claimed forces with a proof: the common base of verdicts on loads and on shear."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Bounds on the convexity of crowded contacts, by overlapping shells about the asperities.
 
-docs/theory/crowded.md, "Shells that overlap". Local compliances h are given as lengths
-t_i = 1 / (pi E* h_i). For distances r_ij, any radii s_i, and the energy U_ij of two shells of
-charge 1 with these radii, the matrix
+docs/theory/crowded.md, "Shells that overlap", derives them. Local compliances h are given as
+lengths t_i = 1 / (pi E* h_i). For distances r_ij, any radii s_i, and the energy U_ij of two shells
+of charge 1 with these radii, the matrix
 
     S_ij = (1 - t_i / s_i) on the diagonal,  (t_i t_j)^(1/2) (1 / r_ij - U_ij) off it,
 

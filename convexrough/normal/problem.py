@@ -1,6 +1,6 @@
 """The normal contact problem in scaled units: energy, gap, residual, bounds, convexity.
 
-docs/theory/convexity.md, "The model", (1) and (2):
+(1) and (2) of docs/theory/convexity.md, "The model", state it:
 
     minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
 

@@ -1,8 +1,8 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-docs/theory/vector-friction.md, "Cones", derives it, with t from |q| / P = 1 - t^3, u = 1 - t, the
-share S of the shift in the local compliance, and epsilon, the elastic estimate of |q| / P. The
-solver's variables are q / (epsilon P), and the variables of order u^k divided by epsilon^k. The
+docs/theory/vector-friction.md, "Cones", derives it. For a force q and a load P, |q| / P = 1 - t^3
+and u = 1 - t. S is the share of the shift in the local compliance, epsilon the elastic estimate of
+|q| / P. The variables are q / (epsilon P), and those of order u^k divided by epsilon^k. The
 multiplier of the total is the rigid displacement. The multiplier of |q_i| <= P_i (1 - t^3) is the
 sum of the slip and of the slope of the local energy.
 """

@@ -1,7 +1,8 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-docs/theory/vector-friction.md, "Newton's method", in scaled units: the unknown eta_i is the sum of
-deflection and slip of asperity i, and `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", in scaled units. The unknown eta_i is the sum of
+deflection and slip of asperity i. For the forces q, their total T, the kernel B and the rigid
+displacement X, `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
