@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array, even
 from convexrough.errors import InputError
 
-#: Limits on the sizes of numbers in a scene's units, whose products and powers float64 can hold.
+#: Smallest and largest size of a number in a scene's units; float64 holds products of such numbers.
 SMALLEST, LARGEST = 1e-60, 1e60
 
 #: What an error message expects instead of a number outside these limits.
@@ -42,7 +42,7 @@ variation = Kind(
     "a standard deviation over the mean, from 0 to 1: not in per cent",
     lambda number: 0 <= number <= 1,
 )
-#: pi may be rounded up.
+#: The limit is a little above pi, because pi may be rounded up.
 phase = Kind(
     "a phase in radians, from -pi to pi; 90 degrees are 1.5708", lambda number: abs(number) < 3.15
 )
@@ -92,7 +92,7 @@ def array(
     """A read-only copy of a vector. A number stands for `length` equal values.
 
     sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : what has one value each, for messages
+    one  : noun for what has one value each, for messages
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
@@ -130,12 +130,12 @@ def same_index(**given: Any) -> None:
 
 
 def in_order(what: str, values: Any) -> None:
-    """Raise InputError for a pandas object that is sorted otherwise than its index 0, 1, ..."""
+    """Raise InputError for a pandas object whose index 0, 1, ... is not in increasing order."""
     if hasattr(values, "iloc"):
         index = np.asarray(values.index)
         counts = index.dtype.kind in "iu" and (np.sort(index) == np.arange(len(index))).all()
         if counts and (np.diff(index) < 0).any():
-            expected = "the order of the asperities: .sort_index(), or .to_numpy() if they have it"
+            expected = "increasing order: use .sort_index(), or .to_numpy() if rows are in order"
             raise InputError(what, found="an index in another order", expected=expected)
 
 

@@ -3,7 +3,7 @@
 One code certifies all results, independently of the solver. If a certified result contradicts one
 of global scope, the mathematics or the code of the package has a mistake. Two results of local
 scope may differ without a mistake: each certificate proves that its own box of loads contains a
-solution, and these may be different ones.
+solution, and the two solutions may be different.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class Entry(Record):
     outcome : "answered", "refused" (the solver does not accept the scene) or "failed"
     message : the reason where there is no solution, else ""
     contact : the certified solution, or None
-    disagreement : max |load - reference| over the largest load of the reference; nan where either
-        has no solution
+    disagreement : largest |load - load of the reference|, divided by the reference's largest load;
+        nan if this solver or the reference has no solution
     different_statuses : number of asperities whose proved status differs from that in the
-        reference; None where either has no solution
-    different_contacts : number of asperities with a load above 1e-6 of the largest in one of the
-        two and below 1e-7 of it in the other; None as above
+        reference; None if this solver or the reference has no solution
+    different_contacts : number of asperities with a load above 1e-6 of the reference's largest load
+        in one of the two solutions, and below 1e-7 of it in the other; None if one is missing
     steps : for each iteration its solver, step, objective and residual, if `compare` was called
-        with `log`; OSQP and the solvers of CVXPY do not report theirs
+        with `log`; OSQP and the solvers of CVXPY do not report their iterations
     memory : [bytes] largest increase of the resident memory of the process, without memory that the
         allocator reused; None if the system is not Linux
     """
@@ -82,8 +82,8 @@ class Entry(Record):
 class Comparison(Table, Plottable):
     """The entries of all solvers; the first is Newton's method, the reference.
 
-    contradictions : sentences about pairs of certified results, at least one of them of global
-        scope, that contradict each other; each shows a mistake in the mathematics or in the code
+    contradictions : a sentence for each contradiction between two certified results, at least one
+        of them of global scope; each shows a mistake in the mathematics or in the code
     """
 
     entries: tuple[Entry, ...]
@@ -96,7 +96,7 @@ class Comparison(Table, Plottable):
 
     @property
     def certified(self) -> bool:
-        """True if some result has a proved status for all asperities."""
+        """True if at least one result has a proved status for every asperity."""
         return any(contact.certificate.holds for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
@@ -179,7 +179,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers, those that end with a Newton step also without it; SCS and QOCO if installed."""
+    """All solvers, with and without a last Newton step if they offer it; SCS, QOCO if installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),
@@ -200,7 +200,7 @@ def solver_named(name: str) -> solvers.Solver:
     module, _, attribute = name.rpartition(".")
     if not module:
         return solvers.named(name)
-    expected = "package.Class, importable from here, of a solver that needs no arguments"
+    expected = "package.Class of a solver that can be imported and needs no arguments"
     try:
         made = getattr(import_module(module), attribute)()
     except (ImportError, AttributeError, TypeError, ValueError, SystemExit) as error:

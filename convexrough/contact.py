@@ -45,17 +45,17 @@ if TYPE_CHECKING:
 class Contact(Cached, Table, Plottable):
     """A solved normal contact. Arrays are (n,), in the order of the scene's n asperities.
 
-    loads         : [force]
-    contact_radii : [length]
-    approach      : D0 [length];  load : total [force]
-    prescribed_load : [force] None where the approach was prescribed
+    loads, contact_radii : [force], [length] load and contact radius of each asperity; 0 where open
+    approach, load : [length], [force] approach D0 of the two bodies, and total load
+    prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : estimated relative error of the displacements at loaded asperities that is due
-        to point forces in place of pressures: the largest of `surface.model_errors`
-    crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; above 1
-        contact discs overlap and the model fails
+    model_error   : estimated relative error of the displacements at loaded asperities because the
+        model replaces pressures by point forces: the largest of `surface.model_errors`
+    crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
+        1, contact discs overlap and the model fails
+    candidates    : number of asperities that can touch, which the solver computes
     influence     : the compliance operator: "dense", "lattice" or "scattered"
-    seconds       : [s] time of `press` or `solve`
+    iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
     >>> contact = cr.press(scene, approach=5e-5)
     >>> print(contact.status[0], contact.status[-1], f"{contact.loads[0] / contact.load:.4f}")
@@ -84,7 +84,7 @@ class Contact(Cached, Table, Plottable):
 
     @property
     def gaps(self) -> Array:
-        """(n,) [length] gaps, 0 where touching."""
+        """(n,) [length] gap between each asperity and the sphere; 0 where they touch."""
         return self.certificate.gaps
 
     @property
@@ -94,12 +94,15 @@ class Contact(Cached, Table, Plottable):
 
     @cached_property
     def covered(self) -> int:
-        """Number of open summits under contact discs, where point forces misplace the pressure."""
+        """Number of open summits under the contact disc of another asperity.
+
+        There a point force does not represent the pressure.
+        """
         return covered(self.scene, self.contact_radii)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the loads: no certificate, crowding, few contacts, yield.
+        """Reasons to doubt the loads, each a sentence: no certificate, crowding, few contacts, ...
 
         >>> contact.warnings
         ()
@@ -115,10 +118,10 @@ class Contact(Cached, Table, Plottable):
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
-        sheared : shear states of this contact, which the proof includes with the losses of cycles
-            between +Q and -Q; the sign of their forces Q does not matter
+        sheared : results of `shear` for this contact. For each, the proof includes the state at the
+            shear force Q and the loss of the cycle between +Q and -Q; the sign of Q does not matter
 
-        Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
+        Raises InputError for scenes too large for exact arithmetic, and ProofError if nothing is
         proved.
         """
         from convexrough.proof import NearState, prove, refuse_many  # a higher layer
@@ -157,10 +160,10 @@ class Contact(Cached, Table, Plottable):
 
         loads, gaps    : (n,) weights of the asperities' loads and gaps
         approach, load : weights of the approach and the total load
-        holding        : "load" or "approach", held constant; default: what was prescribed
+        holding        : the quantity kept constant, "load" or "approach"; default: the prescribed
 
-        Raises InputError if no weight is given or no asperity is loaded, and SolverError where the
-        state has no derivative because the energy is not convex there.
+        Raises InputError if no weight is given or no asperity is loaded, and SolverError if the
+        loads have no derivative because the energy is not convex there.
 
         >>> print(f"{contact.gradient(load=1.0, holding='approach').approach:.5g}")
         0.012145
@@ -171,7 +174,7 @@ class Contact(Cached, Table, Plottable):
         return contact_gradient(self, holding, **weights)
 
     def change(self, direction: Direction) -> ContactChange:
-        """First-order changes of loads, gaps and approach for a change of the scene.
+        """First-order changes of loads, gaps and approach when the scene changes by `direction`.
 
         Raises InputError and SolverError as `gradient` does.
         """
@@ -181,12 +184,12 @@ class Contact(Cached, Table, Plottable):
 
     @property
     def mean_pressures(self) -> Array:
-        """(n,) [force / length^2] load over contact area, 0 where open."""
+        """(n,) [force / length^2] load divided by contact area; 0 where open."""
         return frozen(mean_pressures(self.loads, self.contact_radii))
 
 
 def mean_pressures(loads: Array, radii: Array) -> Array:
-    """(n,) loads over contact areas, 0 where the contact radius is 0."""
+    """(n,) loads divided by contact areas; 0 where the contact radius is 0."""
     areas = np.pi * radii**2
     return np.asarray(np.divide(loads, areas, out=np.zeros(len(areas)), where=areas > 0))
 
@@ -200,15 +203,15 @@ def press(
     start: ArrayLike | None = None,
     influence: Kind | None = None,
 ) -> Contact:
-    """The contact when the sphere is pressed by an approach [length] or with a load [force].
+    """The contact of a scene under a prescribed approach or total load.
 
+    approach [length] or load [force] : the prescribed quantity, exactly one
     solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
-    start  : (n,) [force] initial loads; a solution with a global certificate does not depend on
-        them
+    start  : (n,) [force] initial loads; a globally certified solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
 
-    Raises InputError for bad values and SolverError where the solver stops without a solution.
+    Raises InputError for wrong values and SolverError if the solver stops without a solution.
     Loads that could not be certified are returned too: check `contact.certificate.scope`.
 
     >>> contact = cr.press(scene, approach=5e-5)
@@ -313,7 +316,7 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles contain neither; for an unpickled contact `levels_of` proves the loads again.
+    # Pickles contain neither of these; for an unpickled contact `levels_of` proves the loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 
@@ -367,11 +370,11 @@ def closest_changes(contact: Contact) -> Array:
     """(n,) [force] first-order load changes on a change to the "closest" geometry.
 
     They are 0 if the scene has this geometry already. In this geometry an asperity of tip radius
-    rho at the distance r from the axis of a sphere of radius R touches the sphere at the distance r
-    R / (R + rho) from the axis. So its offset is greater by r^2 rho / (2 R (R + rho)) than in the
+    rho at the distance r from the axis touches a sphere of radius R at the distance r R / (R + rho)
+    from the axis. Its offset (`Scene.offsets`) is greater by r^2 rho / (2 R (R + rho)) than in the
     geometry "summit". The contact points are closer to each other by a fraction of about rho / R,
-    and the compliances between them are greater by this fraction. At the same approach, with the
-    compliance operator A,
+    and the compliances between them are greater by this fraction. At the same approach, the load
+    changes dP satisfy, with the compliance operator A,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 

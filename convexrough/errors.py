@@ -47,9 +47,9 @@ class InputError(ConvexroughError, ValueError):
 
 @contextmanager
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
-    """Put the place `where` (a file, a table) in front of InputErrors of the body.
+    """Put the place `where` (a file, a table) in front of each InputError that the body raises.
 
-    unless_known : leave errors that name a place unchanged. A MistakesError is never changed
+    unless_known : errors that name a place already stay unchanged; a MistakesError always does
     """
     try:
         yield
@@ -94,10 +94,10 @@ def file_errors(path: Path, what: str) -> Iterator[None]:
 class SolverError(ConvexroughError):
     """A solver stopped without a solution.
 
-    what    : the reason, with the number that was too large
+    what    : the reason, with the number that shows it
     solver  : name of the solver
     advice  : what to try, or ""
-    iterate : the latest loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order, or None
+    iterate : [force] the latest loads (n,), or shear forces (n,) or (n, 2); None if there are none
     """
 
     def __init__(
@@ -134,4 +134,4 @@ class ExtraError(ConvexroughError, ImportError):
 
 
 class WorkerError(ConvexroughError):
-    """The workers stopped or run another version of the package; computed rows are kept."""
+    """Workers of a sweep stopped, or run another version of a package; computed rows are kept."""

@@ -1,8 +1,9 @@
 """Pressure, traction and displacement at any points of the surface, from contacts and shear states.
 
 Pressure and traction are sums over the contact discs that contain a point; displacements are sums
-over all asperities. Shear is along x. Points are (..., 2) [length] with the axis of the sphere as
-origin. Each disc has a centre r_i, a contact radius a_i and a peak pressure p0_i.
+over all asperities. Shear is along x. Points are an array (..., 2) [length] with the axis of the
+sphere as origin, and a result is an array (...) with a value for each point. Disc i has the centre
+r_i, the contact radius a_i and the peak pressure p0_i.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.sphere import hertz, surface_shear
 
-#: Number of pairs of a point and an asperity that are evaluated at a time, to fit into a cache.
+#: Number of pairs of a point and an asperity that are evaluated at a time, so that they fit in a
+#: cache.
 BLOCK = 2**14
 
 
@@ -69,8 +71,8 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
 def traction(state: ShearState, points: ArrayLike) -> Array:
     """(...) [force / length^2] shear traction along x after loading from rest.
 
-    Each asperity contributes f p0 sqrt(1 - r^2/a^2), minus f p0 (c/a) sqrt(1 - r^2/c^2) within its
-    stick radius c, at a distance r from its centre.
+    At the distance r from its centre an asperity contributes f p0 sqrt(1 - r^2/a^2), with the
+    coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is taken off.
     """
     asperities = _Sheared(state)
     return _sum_over_discs(
@@ -86,9 +88,9 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     """(...) [length] sum of both surfaces' displacements along x, relative to the distant bodies.
 
-    It is the sum over asperities of Johnson's (3.91) for both bodies, the source paper's [A3] and
-    [A4]. Where the surfaces stick it approximates the relative displacement of the bodies: the
-    forces of Ciavarella and Jaeger are exact only on average over directions.
+    It is the sum over asperities of (3.91) in Johnson (1985) for both bodies: [A3] and [A4] of Dini
+    and Hills (2009). Where the surfaces stick, the exact value is the relative displacement of the
+    bodies. This sum only approximates it, because `shear` averages compliances over directions.
     """
     asperities = _Sheared(state)
     material = state.contact.scene.material
@@ -126,7 +128,7 @@ class _Sheared:
 
 
 def cell_areas(points: Array) -> Array:
-    """(n,) [length^2] area of each point's Voronoi cell, nan on the outline.
+    """(n,) [length^2] area of each point's Voronoi cell; nan for points on the convex hull.
 
     points : (n, 2) [length]
 
@@ -173,7 +175,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over the discs that contain r, by trees of similar radii."""
+    """sum_i profile(|r - r_i|, i) over discs that contain r; discs of similar radii share a tree."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: Names, with the dimensions of an array and the array. The first one has the rows of a data frame.
+#: Arrays by name, each after the names of its dimensions. The first array has the rows of a frame.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
 #: The names of the components of a vector.
@@ -22,7 +22,7 @@ DIRECTION = {"direction": ["x", "y"]}
 
 
 def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFrame:
-    """A data frame of the arrays along the rows, or along rows and direction."""
+    """A data frame of the arrays with the dimensions (rows) or (rows, direction)."""
     rows, _ = next(iter(variables.values()))
     columns: dict[str, NDArray[Any]] = {}
     for name, (along, values) in variables.items():

@@ -30,8 +30,8 @@ class Contacts(Table):
 
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
-    controls : (m,) what was prescribed: approaches [length], or loads [force] where `by_load`
-    loads, approaches : (m,) totals [force], and approaches [length]
+    controls : (m,) what was prescribed: loads [force] if `by_load` is True, or approaches [length]
+    loads, approaches : (m,) total loads [force], and approaches [length]
     load_errors, approach_errors : (m,) bounds on their errors
     asperity_loads, asperity_load_errors : (m, n) [force]
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
@@ -75,10 +75,11 @@ class Contacts(Table):
     def cycles(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Cycles:
         """The steady cycle of each contact between two shear forces.
 
-        maximum, minimum : (m,) [force], or one for all; the default minimum is -maximum
+        maximum, minimum : (m,) [force] largest and smallest shear force, or one number for all
+            contacts; the default minimum is -maximum
 
-        Raises InputError where a scene has no friction, a minimum exceeds its maximum, or the size
-        of either exceeds the friction limit.
+        Raises InputError if a scene has no friction, a minimum exceeds its maximum, or a force
+        exceeds the friction limit in size.
 
         >>> found = cr.press_many([scene, scene], load=3.6e-7).cycles([9e-8, 4e-8])
         >>> print([f"{loss:.4g}" for loss in found.losses], found.order.tolist())
@@ -167,9 +168,9 @@ def press_many(
 ) -> Contacts:
     """The contacts of many scenes with equal numbers of asperities.
 
-    approach [length] or load [force] : (m,), or one for all
+    approach [length] or load [force] : the prescribed quantity, (m,) or one number for all scenes
 
-    Raises InputError for scenes of different sizes, and what `press` raises.
+    Raises InputError for scenes with different numbers of asperities, and the errors of `press`.
 
     >>> contacts = cr.press_many([scene, scene], load=[3e-7, 2e-7])
     >>> bool((contacts[1].loads == contacts.asperity_loads[1]).all())
@@ -182,7 +183,7 @@ def press_many(
     for k, scene in enumerate(scenes):
         checks.instance(f"scenes[{k}]", scene, Scene)
         if len(scene) != len(scenes[0]):
-            expected = f"{len(scenes[0])}, as of the first: rows are of one length"
+            expected = f"{len(scenes[0])}, as in scenes[0]: all scenes need as many asperities"
             raise InputError(f"scenes[{k}]", found=f"{len(scene)} asperities", expected=expected)
     m, n = len(scenes), len(scenes[0]) if scenes else 0
     name = "approach" if load is None else "load"

@@ -19,15 +19,15 @@ from convexrough.tabular.units import UnitNames
 #: Contacts with fewer touching asperities than this cause a warning.
 FEW = 5
 
-#: Scenes with fewer asperities than this are not taken to be parts of a larger array; those on a
-#: lattice are from the second number on.
+#: Least number of asperities that are taken to be a part of a larger array: in general, and on a
+#: lattice.
 ARRAY, ON_LATTICE = 20, 7
 
-#: `array_extent` below which an array is cut off: smooth pressure there is 0.7 of the peak.
+#: An array with a smaller `array_extent` is cut off: the smooth pressure there is 0.7 of the peak.
 CUT_OFF = 0.7
 
-#: Number of sectors in which the rim of an array is sought, and the largest share of asperities
-#: there that may touch. Single tall ones do also at the rim of a wide array.
+#: Number of sectors whose farthest asperities are the rim of an array, and the largest share of
+#: these that may touch without a warning: single tall asperities touch at the rim of a wide array.
 DIRECTIONS, CUT_RIM = 16, 0.5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
@@ -48,7 +48,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
         widths a and b of the contact of a smooth body at this load; None without such a contact,
         and where the asperities are too few for an array (`is_array`)
-    rim_touching : share that touches of the asperities farthest out in `DIRECTIONS` sectors
+    rim_touching : share of the rim that touches: the farthest asperity in each of 16 sectors
     axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -105,7 +105,7 @@ def cautions_of(contact: Contact) -> Iterator[str]:
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     """Warnings about the limits of the model, which the certificate does not cover.
 
-    normal : the contact's `limits_of`
+    normal : the result of `limits_of` for the contact
     """
     yield from unlikely_modulus(normal["contact_modulus"], units)
     if (normal["friction"] or 0.0) > HIGH_FRICTION:

@@ -12,7 +12,7 @@ class Plottable:
     """A result with a method `plot`."""
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the main figure of the result, as `convexrough.plots.plot`; return the axes."""
+        """Draw the main figure of the result into `axes`, by default new ones; return the axes."""
         from convexrough.plots import plot  # it imports matplotlib
 
         return plot(self, axes)

@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """Base of dataclasses: prints a line for each field; unpickled arrays are read-only."""
+    """Base of results: `repr` has a line for each field; unpickled arrays are read-only."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -96,17 +96,17 @@ class Table(Record):
         """A pandas data frame with a row for each asperity, step, point or solver.
 
         Columns are named in the singular, components of vectors with _x and _y. Fields that are one
-        number or text are in `attrs`. All other two-dimensional arrays, such as the forces of
-        asperities at each step of a history, are only in `to_xarray`.
+        number or text are in `attrs`. Two-dimensional arrays that are not vectors, such as the
+        forces of asperities at each step of a history, are only in `to_xarray`.
 
-        Raises ExtraError where pandas is not installed.
+        Raises ExtraError if pandas is not installed.
         """
         return frames.dataframe(self._variables(), self._attributes())
 
     def to_xarray(self) -> xarray.Dataset:
         """An xarray data set of all arrays, with named dimensions.
 
-        Fields that are one number or text are in `attrs`. Raises ExtraError where xarray is not
+        Fields that are one number or text are in `attrs`. Raises ExtraError if xarray is not
         installed.
         """
         return frames.dataset(self._variables(), self._attributes())

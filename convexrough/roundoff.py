@@ -1,4 +1,4 @@
-"""Roundoff of float64, for the bounds that include it."""
+"""Constants of float64 rounding that error bounds use."""
 
 #: Unit roundoff of float64.
 ROUNDOFF = 2.0**-53

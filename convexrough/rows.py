@@ -33,7 +33,7 @@ from convexrough.sphere import hertz
 #: Scenes with more asperities are solved one by one, as stacks save no time.
 MOST = 512
 
-#: Largest total size of the matrices of all rows processed at once.
+#: Largest total number of matrix entries of all rows processed at once.
 MATRICES = 2**20
 
 #: Fields with one number for each contact, and for each cycle.
@@ -107,7 +107,7 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """The pressed scenes that can be proved together; controls : (m,) [force] or [length]."""
+    """The scenes that can be proved together, pressed; controls: (m,) loads or approaches."""
     if not scenes or len(scenes[0]) > MOST:
         return []
     with threads.one_where(MATRICES):

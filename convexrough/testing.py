@@ -1,7 +1,8 @@
-"""For the tests of other software: assertions that forces are certified, or that two answers agree.
+"""Assertions for the tests of other software: forces are certified, or two results agree.
 
 Each function raises AssertionError with the asperities concerned, their errors and statuses; none
-needs a test framework. Loads that are negative, not finite or too few or many raise InputError.
+needs a test framework. Each raises InputError for loads that are negative or not finite, and if the
+number of loads is wrong.
 """
 
 from __future__ import annotations
@@ -40,8 +41,9 @@ def assert_certified(
 
     loads  : (n,) [force] from any source, in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error of a load, as a fraction of the largest load, and of the total
-    floor  : [force] a load up to this claims that its asperity is open
+    within : largest error allowed: of a load, as a fraction of the largest load; and of a
+        prescribed total, as a fraction of this total
+    floor  : [force] a load up to this size counts as 0, and its asperity as open
 
     Raises AssertionError with the asperities concerned.
     """
@@ -92,8 +94,9 @@ def assert_agree(
     scene, approach or load : the problem, required for loads without a contact
     within : largest difference of two loads of one asperity, as a fraction of the largest load
 
-    A contradiction is what `compare.contradictions` reports. The bounds of inaccurate results are
-    wide, so these contradict each other less than accurate ones.
+    A contradiction is what `compare.contradictions` reports: proved statuses differ, or values
+    differ by more than the sum of their error bounds. Raises AssertionError with the asperities
+    concerned, and InputError if the two results are of different problems.
     """
     __tracebackhide__ = True
     within = tolerance("within", within)
@@ -108,7 +111,9 @@ def assert_agree(
             for each in (first, second)
         )
         if given != wanted:
-            raise InputError("second", found=f"prescribed {given}", expected=f"{wanted}, as first")
+            raise InputError(
+                "second", found=f"prescribed {given}", expected=f"{wanted}, as in the first"
+            )
     for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
@@ -147,7 +152,7 @@ def _answer(
     if isinstance(given, Contact):
         return Answer(f"{name} ({given.solver})", given.loads, given.certificate)
     if scene is None:
-        raise InputError("scene", found="none", expected=f"the scene that {name} answers")
+        raise InputError("scene", found="none", expected=f"the scene of the loads `{name}`")
     certificate = certify(scene, given, approach=approach, load=load)
     return Answer(name, np.asarray(given, dtype=np.float64) * np.ones(len(scene)), certificate)
 

@@ -120,7 +120,7 @@ def test_wrong_use(contact: cr.Contact) -> None:
         assert_agree(contact, cr.press(small, approach=approach))
     with pytest.raises(cr.InputError, match="within: found 5, expected a fraction"):
         assert_agree(contact, contact, within=5)
-    with pytest.raises(cr.InputError, match=r"second: found prescribed load .*, as first"):
+    with pytest.raises(cr.InputError, match=r"second: found prescribed load .*, as in the first"):
         assert_agree(contact, cr.press(contact.scene, load=contact.load))
     rubbed = cr.press(replace(paper(), friction=0.5), approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match=r"sliding: found shape \(1,\) of int64, expected"):

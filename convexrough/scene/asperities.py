@@ -33,6 +33,8 @@ class Asperities(Record):
     tip_radii : (n,) [length] radii of the tips, or one number for all
     heights   : (n,) [length] heights of the summits, or one number for all; positive is taller
 
+    Raises InputError for wrong shapes or values, and for two asperities at one place.
+
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> len(asperities)
     61
@@ -73,7 +75,10 @@ class Asperities(Record):
     def roughened(
         self, *, height_std: float = 0.0, tip_radius_cv: float = 0.0, seed: int | None = None
     ) -> Asperities:
-        """These asperities with random heights and tip radii; arguments as for `hexagonal`.
+        """These asperities with random changes of heights and tip radii.
+
+        Random numbers are added to the heights, and the tip radii are multiplied by random factors
+        of mean 1. The arguments are those of `hexagonal`.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -110,7 +115,7 @@ class Asperities(Record):
 
     @property
     def lattice(self) -> Lattice | None:
-        """The lattice on which all summits lie; None without one."""
+        """The lattice on which all summits lie; None if there is no such lattice."""
         return self.layout.lattice
 
     @property
@@ -137,11 +142,11 @@ class Asperities(Record):
         height_std    : [length] standard deviation of heights, which are normal random numbers
         tip_radius_cv : coefficient of variation of tip radii, which are lognormal random numbers
             with the mean `tip_radius`
-        seed          : of the random numbers; required with height_std or tip_radius_cv
+        seed          : whole number that fixes the random numbers; required if any are random
 
-        The normal random numbers behind heights and tip radii are clipped at 6 standard deviations.
+        Random heights, and logarithms of random tip radii, are clipped at 6 standard deviations.
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
-        asperities and leaves the others unchanged, with their random heights and radii.
+        asperities; the others keep their positions, random heights and random tip radii.
         """
         rough = (height_std, tip_radius_cv, seed)
         return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)

@@ -1,7 +1,7 @@
 """The shape of the pressed body: a sphere, an ellipsoid, a cylinder or a flat.
 
-It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, a flat
-R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
+The shape is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R; a
+flat has R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of the two radii is inf.
 """
 
 from __future__ import annotations

@@ -15,17 +15,17 @@ from convexrough.checks import SMALLEST
 
 Sites = NDArray[Any]  # whole numbers
 
-#: Largest difference of points from the sites of a lattice, over the largest coordinate: a little
-#: more than the rounding of coordinates.
+#: Largest difference of points from the sites of a lattice, divided by the largest coordinate: a
+#: little more than the rounding errors of coordinates.
 SITE_ERROR = 32 * 2.0**-53
 
-#: Largest difference over the spacing, which error bounds of products include.
+#: Largest difference of points from the sites, divided by the spacing.
 CLOSEST = 1e-7
 
 #: Lattices with a spacing below this part of the largest coordinate are not used.
 FINEST = 1e-12
 
-#: Lattices with more sites per point are not used. A heuristic, for speed.
+#: Lattices with more sites per point than this are not used. A heuristic, for speed.
 SPARSEST = 50
 
 
@@ -33,9 +33,9 @@ SPARSEST = 50
 class Lattice(Cached):
     """The sites origin + i b1 + j b2 with whole numbers i and j.
 
-    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2, reduced up to rounding
-    site_error : [length] bound on the difference of each coordinate of the points from its site
-    shrink, unshrunk : the exact basis is shrink * unshrunk; None unless made by `shrunk`
+    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2: a reduced (shortest) basis
+    site_error : [length] bound on the distance of points from their sites along x and along y
+    shrink, unshrunk : factors of the exact basis if `shrunk` made this lattice; else 1 and None
     """
 
     origin: Array
@@ -45,7 +45,7 @@ class Lattice(Cached):
     unshrunk: Array | None = None
 
     def shrunk(self, factor: Fraction) -> Lattice:
-        """The lattice of the points times a factor; `site_error` includes the rounding of both."""
+        """The lattice of the points times `factor`; `site_error` includes the rounding errors."""
         assert self.unshrunk is None
         times = float(factor)
         site_error = 2.0 * times * self.site_error
@@ -74,7 +74,7 @@ class Lattice(Cached):
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points. Relative to the middle of the points both decouple.
+        # Fit origin and basis to all points. Relative to the sites' middle the two fits decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))

@@ -12,10 +12,11 @@ from convexrough.errors import InputError
 class Material:
     """The material of both bodies; `pair` combines two different materials.
 
-    contact_modulus : [force / length^2] E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
-    poisson_ratio   : nu, from 0 to 0.5; for a pair the mean weighted with 1 / G
-    hardness        : [force / length^2] mean pressure at which asperities yield, if known; only
-        used for a warning
+    contact_modulus : [force / length^2] E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2, with
+        the Young's moduli E and Poisson's ratios nu of bodies 1 and 2
+    poisson_ratio   : nu, from 0 to 0.5; for a pair the mean weighted by 1 / G (shear modulus G)
+    hardness        : [force / length^2] mean pressure at which asperities yield; None if unknown.
+        It is used only for a warning
     mismatch        : Dundurs' beta of a pair, 0 for equal materials. It measures the coupling of
         normal and tangential displacements, which is neglected
 

@@ -37,8 +37,10 @@ class Pattern:
         return 1.0 / self.second[1]
 
     def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
-        """(n, 2) i and j of the sites with norms up to a limit, ordered by norm and then by angle;
-        and (n,) indices that sort them by i and then by j."""
+        """i and j (n, 2) of the sites with norms up to a limit, and indices (n,) that sort them.
+
+        The sites are ordered by norm and then by angle; the indices sort them by i and then by j.
+        """
         top = int(np.sqrt(limit / (1.0 - self.skew**2 / 4.0))) + 1
         steps = np.arange(-top, top + 1)
         norms = np.add.outer(steps * steps, steps * steps)
@@ -47,7 +49,7 @@ class Pattern:
         taken = norms <= limit
         i, j = (each - top for each in np.nonzero(taken))
         x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # less than differences of norms, >= 1
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # < 1, the least difference of norms
         order = np.argsort(norms[taken] + turns)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))

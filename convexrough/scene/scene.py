@@ -29,13 +29,13 @@ Geometry = Literal["summit", "closest"]
 class Scene(Record):
     """A sphere, the asperities on which it is pressed, and the material of both.
 
-    sphere_radius : [length] R of a sphere; inf for a flat; a pair (Rx, Ry) for an ellipsoid
-        with axes along x and y, one of them inf for a cylinder
-    friction      : Coulomb's coefficient f; required only for shear
+    sphere_radius : [length] radius R of a sphere; inf for a flat. A pair (Rx, Ry) of radii of
+        curvature along x and y makes an ellipsoid, or a cylinder if one of them is inf
+    friction      : Coulomb's coefficient f; None if the scene is not sheared
     geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
-        closest) or "summit" (at the summit of the asperity, as in the source paper)
-    units         : names of the units of length and force, as ("mm", "N"), for figures and reports;
-        no number is converted
+        closest) or "summit" (at the summit of the asperity, as in Dini and Hills 2009)
+    units         : names of the units of length and force, such as ("mm", "N"), for figures and
+        reports; no number is converted
 
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
@@ -75,7 +75,7 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Pairs of a finite radius [length] and the axes (0 is x, 1 is y) along which it holds."""
+        """Each finite radius [length], with the slice of axes (0: x, 1: y) along which it holds."""
         return base.curved(self.sphere_radius)
 
     @property
@@ -103,8 +103,8 @@ class Scene(Record):
     def contact_points(self) -> Array:
         """(n, 2) [length] the point at which each asperity first touches.
 
-        It is the summit r_i, or in the geometry "closest" r_i R / (R + rho_i) along each axis, with
-        the radius R of the sphere and the tip radius rho_i.
+        In the geometry "summit" it is the summit r_i. In the geometry "closest" it is
+        r_i R / (R + rho_i) along each axis, with the sphere's radius R and the tip radius rho_i.
         """
         if self.geometry == "summit" or not self.curved:
             return self.asperities.positions
@@ -114,7 +114,7 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] the radius in `drops`: R, or in the geometry "closest" R + rho_i."""
+        """(n,) [length] `radius`, plus the tip radius rho_i if the geometry is "closest"."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
@@ -123,7 +123,7 @@ class Scene(Record):
     def contact_tails(self) -> Array | None:
         """(n, 2) [length] exact contact points minus `contact_points`; None if all are 0.
 
-        Each is known to 2^-96 of the contact point.
+        The error of each is at most 2^-96 of the size of the contact point.
         """
         points = self.asperities.positions
         if self.contact_points is points:
@@ -158,8 +158,8 @@ class Scene(Record):
     def drops(self) -> Array:
         """(n,) [length] gaps between the sphere and asperities of height 0, at the approach 0.
 
-        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
-        r_i from the axis. With two radii it is the sum of such terms in x and y.
+        At the distance r_i from the axis the gap is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in
+        the geometry "closest". With two radii it is the sum of such terms in x and y.
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
@@ -168,7 +168,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] offsets d_i: heights minus `drops`. Contact displaces by D0 + d_i."""
+        """(n,) [length] heights minus `drops`: d_i. At the approach D0 the overlap is D0 + d_i."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
