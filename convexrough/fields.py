@@ -175,7 +175,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over discs that contain r; discs of similar radii share a tree."""
+    """sum_i profile(|r - r_i|, i) over discs that contain r; similar discs share a search tree."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)

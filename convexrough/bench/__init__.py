@@ -1,1 +1,1 @@
-"""Speed against error: every solver, at many sizes, with the true error of each answer."""
+"""Measurements of the speed of every solver, at many sizes, with the true error of each answer."""

@@ -52,7 +52,7 @@ class Attempt:
     """One point of the diagram of time against error.
 
     solver    : name of the method;  setting : description of the settings
-    settings  : the solver;  influence : compliance operator; None for the cheapest
+    settings  : the solver object;  influence : compliance operator; None for the cheapest
     most      : largest number of asperities for which it is run
     """
 
@@ -127,7 +127,7 @@ def reference(scene: Scene, approach: float) -> Reference:
 def measure_attempt(
     family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
 ) -> Row:
-    """The row of an attempt: the least time to assemble and solve, from runs of `patience` [s]."""
+    """The row of an attempt: the least time to assemble and solve, in runs for `patience` [s]."""
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:

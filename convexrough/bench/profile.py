@@ -28,7 +28,7 @@ class Profile(Table):
     """Times of k solvers on m hard cases, after Dolan and More (Math. Program. 91 (2002) 201).
 
     solvers : (k,) names;  cases : (m,) names
-    seconds : (k, m) of right answers, infinite where a solver gave none
+    seconds : (k, m) [s] time of each right answer; infinite where a solver gave none
     outcomes : (k, m) "right", "wrong", "refused" or "failed"
     sets : (k, m) True where exactly the asperities that touch have a load
     """
@@ -66,7 +66,7 @@ class Profile(Table):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Axes, new unless given, with the part of the cases against the time over the least."""
+        """Plot the part of the cases answered right against time / least time; return the axes."""
         if axes is None:
             axes = Figure(figsize=(SINGLE, 3.8), layout="constrained").subplots()
         finite = self.ratios[np.isfinite(self.ratios)]

@@ -23,9 +23,9 @@ FITTED_FROM = 10_000
 class Row:
     """One task on one scene.
 
-    task    : "solve" is one point of the diagram of time against error, by `solver` as `setting`
-        says; the others are "from nothing", "sweep" and those of `convexrough.bench.measure.TASKS`
-    outcome : "refused": the solver does not accept the scene; `message` says why
+    task    : "solve" (a point of the diagram of time against error: `solver` with the settings that
+        `setting` describes), "sweep", or a name in `convexrough.bench.measure.TASKS`
+    outcome : "refused" means that the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
     product : [s] the unit of `products`, from `measure.plain_product`; nan without a lattice
     error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
@@ -55,7 +55,7 @@ class Row:
 
     @property
     def products(self) -> float:
-        """The time over that of a plain product of the same size."""
+        """The time divided by that of a plain product of the same size."""
         return self.seconds / self.product
 
     @property
@@ -121,7 +121,7 @@ class Bench:
 
 
 def frontier(rows: Iterable[Row]) -> list[Row]:
-    """The Pareto frontier: points to which no other is at least equal in both and better in one."""
+    """The Pareto frontier: points for which no other is as fast and as accurate, and not equal."""
     points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
@@ -136,7 +136,7 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points as accurate as the default and faster by more than `NOISE`; all without it."""
+    """Points as accurate as the default and faster by more than `NOISE`; all if it is missing."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:

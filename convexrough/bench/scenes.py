@@ -15,8 +15,8 @@ Family = Literal["lattice", "rough", "scattered"]
 #: The paper's approach, in units of the sphere's radius.
 APPROACH = 5e-5
 
-#: A hexagonal lattice of equal asperities; with random heights (standard deviation 1e-6 R) and tip
-#: radii (10 %); with every asperity moved at random, by up to 0.15 of the spacing.
+#: A hexagonal lattice of equal asperities; the same with random heights (standard deviation 1e-6 R)
+#: and tip radii (10 %); the first with asperities moved at random by up to 0.15 of the spacing.
 FAMILIES: tuple[Family, ...] = ("lattice", "rough", "scattered")
 
 #: Refinement of a scene by approximate number of asperities.

@@ -18,7 +18,7 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact with a known answer, except that heights are rounded to float64.
+    """A contact with a known answer, up to the rounding of its heights to float64.
 
     `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
     and proves the statuses.
@@ -34,10 +34,10 @@ class Manufactured(Record):
 
 
 def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
-    """A contact of `count` asperities on a hexagonal lattice, of which the part `touching` touches.
+    """A contact of `count` asperities on a hexagonal lattice; the part `touching` of them touches.
 
-    Contact radii are random from 0.1 to 0.45 of the spacing, tip radii from 4 to 8 of it, and gaps
-    up to the largest indentation. Other versions of numpy may give other numbers for a `seed`.
+    Contact radii are random from 0.1 to 0.45 spacings, tip radii from 4 to 8 spacings, and gaps up
+    to the largest indentation. Other versions of numpy may give other numbers for a `seed`.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

@@ -50,7 +50,7 @@ class Checked(Record):
 
     @property
     def right(self) -> bool:
-        """True if the set is correct and all errors are at most `within`."""
+        """True if the set of loaded asperities is correct and `error` is at most `within`."""
         wrong = len(self.wrongly_open) + len(self.wrongly_loaded)
         return wrong == 0 and self.error <= self.within
 
@@ -59,17 +59,17 @@ class Checked(Record):
 class HardCase(Record):
     """A hard scene, with an answer that is known to 50 digits.
 
-    Digits are strings: "0" is exact, all others are right to one unit of the 50th. The answer is
-    that of the scene whose data are the given float64 numbers. An interval Newton step proves that
-    a solution agrees with these digits and is the only one nearby; `cr.certify` says whether it is
-    the only one of all.
+    Digits are strings. "0" is exact; the error of any other is at most one unit of the 50th digit.
+    The answer is that of the scene whose data are the given float64 numbers. An interval Newton
+    step proves that a solution agrees with these digits and is the only one nearby; `cr.certify`
+    says whether it is the only one anywhere.
 
-    family, why : the difficulty
+    family, why : name of the group of similar cases, and a sentence on the difficulty
     approach [length], load [force] : one of them is prescribed; the other is None
     loads, gaps : (n,) digits [force], [length]
     exact_approach, exact_load : digits [length], [force]
     shear_force : [force] the shear force at the end
-    history     : (m,) [force] a sequence of shear forces that ends with it; empty for one from rest
+    history     : (m,) [force] shear forces up to `shear_force`; empty if it is applied from rest
     forces, slips : (n,) digits [force], [length] under `shear_force`; empty if an asperity would be
         dragged along, where the theorem of Ciavarella and Jaeger gives no answer
     displacement  : digits [length] of the relative displacement of the bodies, or ""
@@ -134,7 +134,7 @@ def _judged(
     touching: NDArray[np.bool_],
     within: float,
 ) -> Checked:
-    """The comparison, with exact differences: some loads are closer than float64 numbers."""
+    """The comparison. Differences are exact, as some errors are smaller than float64 rounding."""
     exact = [Fraction(each) for each in digits]
     apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
     largest = max(map(abs, exact))
@@ -207,7 +207,7 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces over the last, largest one; if "nested", each range is inside the one before."""
+    """Shear forces divided by the last and largest; "nested": ranges lie in all earlier ranges."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

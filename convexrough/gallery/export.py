@@ -17,17 +17,17 @@ HEADING += ["spread", "proved"]
 
 INTRODUCTION = """# Hard contact problems, with answers
 
-Each row is a contact of a sphere with asperities as programs for solvers. Loads are the first
-variables times `force_unit`, of the asperities that `index.json` names; it has the scenes, the
-answers to 50 digits, and why a program was left out.
+Each row is a contact of a sphere with asperities, written as programs for solvers. The first
+variables of a program, times `force_unit`, are the loads of the asperities that `index.json` lists.
+`index.json` also has the scenes, the answers to 50 digits, and the reason for each missing program.
 
 - `.cones.json`: `clarabel.load_from_file`; the contact law itself, no approximation
 - `.cbf`: the same with a linear objective, for readers of the Conic Benchmark Format
 - `.bristles.npz`: `qpsolvers.Problem.load`; the error of its loads is about `load_error_estimate`
   of the largest
 
-condition: of the Hessian at the answer, scaled to a diagonal of 1. spread: smallest over largest
-load. proved: how far the proof reaches that the answer is the only one.
+condition: condition number of the Hessian at the answer, scaled to a diagonal of 1. spread:
+smallest load / largest load. proved: scope of the proof that the answer is the only solution.
 """
 
 

@@ -59,7 +59,7 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
 
 
 def _hardness(problem: NormalProblem, own: Array) -> About:
-    """The condition number of the scaled Hessian, and the smallest over the largest load."""
+    """The condition number of the scaled Hessian, and the smallest load over the largest load."""
     eigenvalues = scaled_eigenvalues(problem, own)
     positive = eigenvalues[0] > 0
     return {

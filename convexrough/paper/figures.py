@@ -48,10 +48,11 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
     "fig3_pressure"   : contact pressure
     "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the force at
         which the first asperity of each ring starts to slide
-    "fig5_traction"   : shear traction at 0.5, of all asperities and on the central one
+    "fig5_traction"   : shear traction at Q / (f P) = 0.5, of all asperities and on the central one
     "fig6_section"    : traction and f * pressure along y = 0, also of the smooth sphere
     "fig7_asperities" : force and displacement of an asperity of each ring from Q = 0 to f P
-    "fig8_loops"      : hysteresis loops at 0.5: rough and smooth contact, single asperities
+    "fig8_loops"      : hysteresis loops between -0.5 f P and 0.5 f P: rough and smooth contact,
+        single asperities
     "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and their crossing
 
     Rings have letters as in the paper: A is the outermost.

@@ -1,8 +1,8 @@
 """Figures of every stage, for print and notebooks.
 
-`..._figures` return a dictionary from stems of file names to figures. Where units are named, axes
-are in SI units with prefixes. No global state of matplotlib is changed. `save` writes a figure;
-vector files of dense scenes contain pixels, so give a `dpi` for these too.
+Functions named `..._figures` return a dictionary from stems of file names to figures. If the scene
+names its units, axes are in SI units with prefixes. No global state of matplotlib is changed.
+`save` writes a figure; vector files of dense scenes contain pixels, so give a `dpi` for these too.
 
 `plot` draws the main picture of a result into given axes; `contact.plot()` is the same.
 """

@@ -85,14 +85,14 @@ def draw_map(
     smooth: Sequence[float] = (),
     window: Window | None = None,
 ) -> Window:
-    """Draw a disc at each point with a radius and a faint dot at each other one; return the window.
+    """Draw a disc at each point with a radius, and a faint dot at the others; return the window.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
     window : part of the plane to show; default `map_window`
 
-    From `CROWDED` discs on, a mosaic replaces them: each pixel has the mean colour of the
-    asperities inside it, else of the nearest one, or is white if that has no disc.
+    From `CROWDED` discs on, a mosaic replaces them: a pixel has the mean colour of the asperities
+    inside it, or the colour of the nearest one if there is none. Asperities without disc are white.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, window = whole > 0, window or map_window(points, whole, length, smooth)
@@ -215,7 +215,7 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
-    """The square about all discs (without discs, all points) and the smooth outline, plus 6 %."""
+    """The square about the discs (or else all points) and the smooth outline, with a 6 % margin."""
     points, radii = length.of(points), length.of(radii)
     outline = [length.of(axis) for axis in smooth]
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
@@ -246,7 +246,7 @@ def _blended(layers: Sequence[Layer], whole: Array) -> Array:
 def _draw_mosaic(
     axes: Axes, points: Array, shades: Array, shown: NDArray[np.bool_], window: Window
 ) -> None:
-    """Draw each pixel in the mean colour of the asperities inside it, else of the nearest one."""
+    """Draw the mosaic that `draw_map` describes."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     left, right, bottom, top = window.sides

@@ -11,7 +11,7 @@ import numpy as np
 
 from convexrough.friction.path import LoadPath, history, load_path
 
-#: Largest numbers of points, of asperities times points, and of steps between two points.
+#: Largest number of points, of asperities times points, and of steps between two given points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
 #: Number of segments at varying load up to which points are added; each needs a solution.
@@ -25,7 +25,7 @@ def between(path: LoadPath) -> LoadPath:
     if not path.load_constant:
         each = min(each, 8) if m <= MOST_SEGMENTS else 1
     each = min(each, MOST_BETWEEN)
-    follows_on = path.load_constant or path.start == 0.0  # not a contact pressed elsewhere
+    follows_on = path.load_constant or path.start == 0.0  # no start from another contact
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))

@@ -51,9 +51,9 @@ def cycle_figures(
     loops      : the loop of each cycle; None to compute them
     asperities : asperities with loops; default: one at each distance from the centre, at most 6
 
-    "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles, those with
-        about the whole, 3/4, 1/2 and 1/4 of the widest range. Also loops of the asperities in the
-        cycle of the widest range
+    "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles only the four
+        whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest. Also loops of the asperities
+        in the cycle of the widest range
     "loss" : energy against amplitude, for cycles of several ranges
     """
     if not cycles:
@@ -81,7 +81,7 @@ def cycle_figures(
 
 
 def _spread(amplitudes: Sequence[float]) -> list[int]:
-    """Indices of the loops to draw: all, or of many about 1/4, 1/2, 3/4 and 1 of the widest."""
+    """Indices of the loops to draw: all, or those nearest to 1/4, 1/2, 3/4 and 1 of the widest."""
     if len(amplitudes) <= MOST_LOOPS:
         return list(range(len(amplitudes)))
     parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
@@ -98,7 +98,7 @@ def loops_figure(
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """The figure of loops: of the contact, less an elastic part, and of single asperities.
+    """The figure of loops: of the contact, the same less an elastic part, and of asperities.
 
     names, meaning : entries and title of the legend of the asperities
     loops : loops of the cycles, with those of the asperities;  count : number of all cycles
@@ -143,7 +143,7 @@ def loops_figure(
 def draw_loop(
     axes: Axes, scale: Scale, X: Array, Q: Array, slope: float = 0.0, *, smooth: bool = False
 ) -> None:
-    """Draw Q against X less a slope times Q, of the asperities or of the smooth contact."""
+    """Draw Q against X - slope * Q, for the rough contact or, if `smooth`, for the smooth one."""
     rough: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
     other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
     look = other if smooth else rough
@@ -153,8 +153,8 @@ def draw_loop(
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
     """[length] displacements X of the smooth sphere at the forces of a steady loop.
 
-    From a turning point (Q1, X1), X = X1 + 2 X0((Q - Q1) / 2), where X0 is the displacement after
-    loading from rest, which goes to the larger of the two forces at the ends.
+    From a turning point (Q1, X1), X = X1 + 2 X0((Q - Q1) / 2), where X0(Q) is the displacement
+    after loading from rest to Q. The first loading goes to the turning point with the larger |Q|.
     """
     turn = int(np.argmin(forces))
     maximum, minimum = forces[0], forces[turn]

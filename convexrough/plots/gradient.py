@@ -14,8 +14,8 @@ from convexrough.plots.style import SINGLE, title
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     """The map of derivatives by heights.
 
-    "gradient" : contact discs, in the colour of D0 / J times dJ / dz, with the approach D0 and the
-        number J; open asperities as dots
+    "gradient" : contact discs, coloured by D0 / J times dJ / dz, with the approach D0, the number J
+        and the height z of the asperity; open asperities as dots
     of : symbol of J, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
@@ -30,4 +30,4 @@ def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"
     draw_values(axes, scale, parts, f"$D_0\\,\\partial {of}/\\partial z{per}$", signed=True)
-    title(axes, f"{gradient.holding} held")
+    title(axes, f"{gradient.holding} kept constant")

@@ -55,7 +55,7 @@ def steady_figures(found: Cycle) -> Figures:
     if handles := status_handles(np.unique(found.status)):
         legend_outside(figure, handles, "lower center", len(handles))
     lost = quantity(found.loss, found.scene.units.work)
-    title(place, f"every later cycle loses {lost}")
+    title(place, f"each cycle after the first loses {lost}")
     return Figures({"steady": figure})
 
 
@@ -70,7 +70,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
 
 
 def draw_losses(axes: Axes, found: PhaseLosses) -> None:
-    """Draw loss / factor^3: losses of small cycles are of third order, so their lines coincide."""
+    """Draw loss / factor^3; for small cycles the loss grows as factor^3, so the lines coincide."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
@@ -85,7 +85,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
     legend_below(axes, 3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)
-    label(axes, "phase [°]; 90: in step", unit.label(r"W\,/\,\mathrm{factor}^3"))
+    label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
 
 
 def draw_path(axes: Axes, path: LoadPath) -> None:
@@ -128,7 +128,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
                   ls=DASHED)  # fmt: skip
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
     axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
-    title(axes, "dot: $(L^*, T^*)$, kept for ever")
+    title(axes, "dot: $(L^*, T^*)$, never changes")
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:

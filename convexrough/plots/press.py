@@ -39,8 +39,8 @@ def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact, by stems of file names.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3); if few asperities lie on this line, instead of the
-        profile the peak pressures of all asperities against the distance from the centre
+        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, peak pressures of
+        all asperities against the distance from the centre replace the profile
     "loads"    : load of each touching asperity against the distance from the centre
     """
     if not contact.loads.any():
@@ -176,7 +176,7 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Draw 100 p(r) A / P of the smooth sphere, with the median A of at least seven whole cells."""
+    """Draw 100 p(r) A / P of the smooth sphere; A: median cell area of seven or more asperities."""
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points

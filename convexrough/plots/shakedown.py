@@ -61,7 +61,7 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
         Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
     ]
     draw_map(axes, points, layers, measure(float(np.ptp(points)), found.scene.units.length))
-    ringed = "\nringed: the first to slide on" if first.any() else ""
+    ringed = "\nringed: the first to keep sliding" if first.any() else ""
     title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:
         what = "slip in the mechanism [1]" if vector else "factor up to which sliding ceases"
@@ -86,7 +86,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """The map of how many asperities slide for ever; hatched where all slide or are pulled off."""
+    """The map of how many asperities slide in every cycle; hatched where |Q| exceeds f P."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0
@@ -116,7 +116,7 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     at = unit_p * found.factor if varies else float(found.force) / (f * found.load)
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
-    bar(axes, filled, "asperities that slide on, or open")
+    bar(axes, filled, "asperities that keep sliding, or open")
     across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     label(axes, across_label, "shear amplitude / $(fP_0)$")
     title(axes, "hatched: gross sliding\nline: the limit; dot: of this path")

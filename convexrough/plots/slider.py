@@ -46,7 +46,7 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The slides of a contact. Raises InputError without friction, a sphere or a load."""
+        """The slides of a loaded contact with a sphere and with friction; others: InputError."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         if contact.load == 0:
             raise InputError("slider page", found="no asperity that touches", expected="a contact")
@@ -184,11 +184,11 @@ def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]
     return [
         ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
         ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],
-        ["X_0", f"{X0:.5g}{length}", "its displacement at gross sliding"],
-        ["X", "", "displacement of the deep points of both bodies"],
+        ["X_0", f"{X0:.5g}{length}", "displacement X of the smooth sphere at gross sliding"],
+        ["X", "", "relative displacement of distant points of the two bodies"],
         ["X_i, s_i, a_i", "", "deflection of an asperity, its gross slip, its contact radius"],
         ["W_0", "", "scale of the loss, 24/5 f P X\u2080"],
-        ["k", "", "the contact's stiffness at first: Q/k is the elastic part of X"],
+        ["k", "", "initial stiffness of the contact; Q/k is the elastic part of X"],
     ]
 
 
@@ -196,9 +196,9 @@ def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str
     """Sentences about asperities that the page leaves out."""
     said = []
     if shown < touching:
-        said.append(f"{shown:,} of {touching:,} touching asperities are drawn, by lot and larger.")
+        said.append(f"{shown:,} of {touching:,} touching asperities, a random part, are drawn.")
     if followed < touching:
-        said.append(f"{followed:,} of the asperities can be followed.")
+        said.append(f"{followed:,} of the asperities can be selected.")
     if forces < next(iter(FORCES.values())):
-        said.append(f"There are {forces} forces.")
+        said.append(f"The slider has {forces} forces.")
     return said

@@ -62,11 +62,11 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
         lines.append(f"asperities         {counts}")
     lines += [
-        f"disagreement       largest difference from {first['solver']}, over its largest load",
-        "load error         bound on the error of any load, over the solver's own largest load",
+        f"disagreement       largest difference from the loads of {first['solver']} / largest load",
+        "load error         bound on the error of every load / largest load of the solver",
         f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
-        "statuses           those proved from the solver's loads; contacts that differ are loaded",
-        f"                   by one of the two solvers only, above {CARRIES:g} of the largest load",
+        "statuses           those proved from the solver's loads; a contact differs if only one of",
+        f"                   the two solvers gives it more than {CARRIES:g} of the largest load",
         "MB                 increase of the memory of the process during the solution",
         "",
         *aligned([HEADING, *rows], left=1),
@@ -102,8 +102,8 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
     for row in rows:
         if count := row["different_contacts"]:
             yield (
-                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: they "
-                f"have a load above {CARRIES:g} of the largest in one of the two only"
+                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: only "
+                f"one of the two solvers gives them more than {CARRIES:g} of the largest load"
             )
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]

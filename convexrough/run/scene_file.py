@@ -52,7 +52,7 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Task(Record):
-    """A scene, what presses it, and the stages to compute."""
+    """A scene, its prescribed approach or load, and the stages to compute."""
 
     scene: Scene
     approach: float | None
@@ -73,7 +73,7 @@ class Task(Record):
         )
 
     def press(self) -> Contact:
-        """The contact under the prescribed approach or load. Raises what `press` raises."""
+        """The contact under the prescribed approach or load. Raises the errors of `press`."""
         return solve(self.problem(), self.solver)
 
     def cautions(self, contact: Contact) -> Iterator[str]:
@@ -90,8 +90,8 @@ class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
     approach [length] or load [force] : what is prescribed; the other is None
-    highest_approach : [length] upper bound on the approach under the load, if the extent of the
-        asperities was chosen for it; else None
+    highest_approach : [length] upper bound on the approach under the prescribed load, up to which
+        the pattern has all asperities that can touch; None if `within` or an approach is given
     influence : compliance operator; None for the cheapest
     stages : the tables that request results, by name; the first is [normal]
     text   : text of the file;  seed : seed of its random heights and radii, or None
@@ -170,9 +170,9 @@ def _one_unit(path: Path, own: str, named: str) -> None:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
         if not own:
-            expected = f'a map with its unit, as {path} is in {named}: unit="..." of the map'
+            expected = f'a map with a unit, as {path} is in {named}: give `surface.read` unit="..."'
         if not named:
-            expected = f"a unit of length in {path} ([units] length), or none of the map"
+            expected = f"a unit of length in {path} ([units] length), or a map without a unit"
         raise InputError("asperities", found=found, expected=expected)
 
 
@@ -290,7 +290,8 @@ def _lattice(
 ) -> tuple[Scene, float | None]:
     """The scene with asperities up to the distance `within`, or with all that could touch.
 
-    These could touch as [normal] prescribes, or under the largest load of a stage.
+    These are the asperities that could touch as [normal] prescribes, or under the largest load of a
+    stage.
     """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips

@@ -47,8 +47,8 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: A stage gets a warning if its largest load differs from the load of [normal] by more than this
-#: factor, or if its largest shear force is below this fraction of the friction limit.
+#: A stage gets a warning if its largest load differs from the load of [normal] by more than the
+#: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
 #: At most this many rows of a table of steps are printed, the last ones.
@@ -86,8 +86,8 @@ class Stage(FileTable):
             return
         if known and not 1 / FAR <= load / known <= FAR:
             yield (
-                f"{name} has loads up to {load:.4g}, and [normal] a load of {known:.4g}: check the "
-                f"units of both, and reference in {name}"
+                f"{name} has loads up to {load:.4g}, and [normal] has the load {known:.4g}: check "
+                f"the units in both tables, and the key reference of {name}"
             )
         if 0 < self.highest_force < SLIGHT * checks.friction(contact.scene.friction) * load:
             yield (

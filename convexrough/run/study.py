@@ -190,7 +190,7 @@ class Study(FileTable):
         """Mistakes: unknown or missing tables, and tables that require others."""
         for name, keys_within in keys.items():
             if name == "sweep":
-                yield name, "[sweep]: many scenes, which `convexrough sweep` computes"
+                yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"
             elif name not in cls.model_fields:
                 a_table = isinstance(keys_within, dict)
                 what = f"[{name}]: unknown table" if a_table else f"{name}: in no table"

@@ -16,7 +16,7 @@ from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
 from convexrough.tabular.text import bare
 from convexrough.tabular.units import parsed
 
-#: Columns of numbers, of results, that are ignored in a table of asperities.
+#: Columns of results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
 
 
@@ -30,7 +30,7 @@ def read_text(path: Path, most: int) -> str:
 
 
 def unknown(column: str) -> bool:
-    """True for the header of a column that cannot be told from one of heights."""
+    """True if a column with this header may contain the heights."""
     return bare(column).lower() not in (*INDEX, *RESULTS)
 
 
@@ -39,7 +39,7 @@ def read_summits(
 ) -> Asperities:
     """Asperities from columns x, y and, if the file has them, height (or z) and tip_radius.
 
-    tip_radius : one or (n,) [length] if the file has no such column; else None
+    tip_radius : [length] one number or (n,), if the file has no column tip_radius; else None
     """
     table = read_table(
         path,
@@ -66,7 +66,7 @@ def read_summits(
     given = columns.get("tip_radius")
     if (given is None) == (tip_radius is None):
         found = "neither" if given is None else "both"
-        expected = "either a column tip_radius or that key in the scene file"
+        expected = "either a column tip_radius or the key tip_radius in the scene file"
         raise InputError("tip radii", found=found, expected=expected, where=str(path))
     positions = np.column_stack((columns["x"], columns["y"]))
     radii = tip_radius if given is None else given

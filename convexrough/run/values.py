@@ -52,7 +52,7 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
     return WrapValidator(check)
 
 
-#: Of the types "number" and "list", the one that the file has; messages omit tags in brackets.
+#: The type of a value in the file, "(list)" or "(number)"; messages omit such tags in brackets.
 NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
 
 _SIZED = expected(SIZED, is_sized)
@@ -65,7 +65,7 @@ Variation = Annotated[float, expected(*checks.variation)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Phase = Annotated[float, expected(*checks.phase)]
-#: Where the file has a number, a list of this number.
+#: A single number in the file stands for a list of this number.
 ALSO_ONE = BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool), ALSO_ONE]
 Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool), ALSO_ONE]
@@ -96,12 +96,12 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table of a file: numbers are finite and are not texts or truth values; no other keys."""
+    """A table of a file: numbers are finite, not text or truth values; other keys are mistakes."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
     alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
-    needs: ClassVar[Mapping[str, str]] = {}  # the key on the left is only used with the right one
+    needs: ClassVar[Mapping[str, str]] = {}  # a key, and the other key without which it is no use
     elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # keys not used with this
 
     @model_validator(mode="wrap")

@@ -41,8 +41,8 @@ def half_space(
 ) -> HalfSpace:
     """The operator of both bodies.
 
-    A pixel of unit pressure displaces the surface by (1 / (pi E*)) times the integral of 1/r over
-    it, in the closed form of Love (1929).
+    A pixel of unit pressure displaces a point by (1 / (pi E*)) times the integral over the pixel of
+    1/r, with the distance r from this point: the closed form of Love (1929).
     """
 
     def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
@@ -106,8 +106,8 @@ class Whole(Table):
     loads     : (n,) [force] total load on the pixels nearest to each asperity
     load, area : [force], [length^2] total load and contact area of the map
     pieces    : number of connected sets of loaded pixels
-    resolution : relative change of the load for pixels twice as wide. If the pixels resolve the
-        tips, this is about four times the error due to the pixel size
+    resolution : relative change of the load for pixels twice as wide, an indication of the error
+        due to the pixel size
     """
 
     _along: ClassVar[Along] = {("asperity",): ("loads",), ("row", "column"): ("pressures",)}

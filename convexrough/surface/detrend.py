@@ -23,8 +23,8 @@ class Removed:
 
     kind      : "plane", "sphere" or "paraboloid" (of a cylinder or an ellipsoid)
     height, slopes : [length] height, and slopes along x and y, at the middle of the map
-    curvature : [1/length] of the sphere, positive for a hill; of a paraboloid the mean; 0 for a
-        plane
+    curvature : [1/length] curvature of a sphere, positive for a hill; mean curvature of a
+        paraboloid; 0 for a plane
     curvatures : [1/length] of a paraboloid along its two axes, the larger first; else 0
     """
 
@@ -36,8 +36,7 @@ class Removed:
 
     @property
     def radius(self) -> float:
-        """[length] radius of the sphere, negative for a bowl; infinite for a plane. Of a
-        paraboloid, that of the mean curvature."""
+        """[length] 1 / `curvature`: negative for a bowl, infinite for a plane."""
         return 1.0 / self.curvature if self.curvature else float("inf")
 
     def scaled(self, scale: float) -> Removed:
@@ -59,7 +58,7 @@ class Removed:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The best least-squares form of this kind, and its height at each pixel.
 
-    docs/theory/surfaces.md, "Removing the form". Lengths are over half the map's size.
+    docs/theory/surfaces.md, "Removing the form". Lengths are divided by half the map's size.
 
     Raises InputError if no sphere fits.
     """

@@ -65,7 +65,7 @@ def read_grid(path: Path) -> HeightGrid:
 
 
 def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
-    """Raise InputError for coordinates or numbers of rows or columns, here without the first."""
+    """Raise InputError if `line` has coordinates or numbers of rows or columns, not heights."""
     if _even(line) and not _even(second):
         raise _not_heights(path, place, line.tolist())
 

@@ -41,8 +41,8 @@ def spikes(heights: Array) -> Indices:
 def clipped(heights: Array) -> int:
     """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    Many means at least ten, and more than in the next 1 % of the range of heights or at the second
-    largest height.
+    Many means at least ten, and more than the pixels below them within 1 % of the range of heights,
+    or, if this range ends above the second largest height, down to that height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -54,7 +54,8 @@ def clipped(heights: Array) -> int:
 def repeated(heights: Array) -> int:
     """The number of pixels with the most frequent height, below the largest; 0 if not surprising.
 
-    It is surprising if it is in a sample 20 times as frequent as any other, and on 20 pixels.
+    It is surprising if it is 20 times as frequent in a sample as any other height, and occurs on at
+    least 20 pixels of the sample.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)

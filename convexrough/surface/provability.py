@@ -93,7 +93,7 @@ def provability(
 ) -> Provability:
     """Contacts of the remaining summits at each pruning, with their proofs and model errors.
 
-    summits : found with at most the weakest pruning, such as 0
+    summits : summits found with a pruning of at most the smallest level, such as 0
     press   : function that returns the Contact of asperities
     levels  : prunings, as fractions of Sz; the curve ends where no summit is left
 

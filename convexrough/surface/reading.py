@@ -27,8 +27,8 @@ HEIGHTS = ("heights", "height", "z")
 #: Rms slopes outside this range suggest different units of heights and pixels.
 SLOPES = (1e-5, 10.0)
 
-#: Numbers that mark holes, and the size from which any number does, if they differ from the median
-#: of all other heights by more than FAR times the range of these; so may the extremes.
+#: MARKS, numbers of at least the size HUGE, and the largest and smallest number mark holes if they
+#: differ from the median of the other heights by more than FAR times the range of these.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference up to which two pixel sizes count as equal.
@@ -49,7 +49,7 @@ def read(
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
     unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
         different unit in the file is an error. Heights in another known unit are converted
-    detrend : "plane", "sphere" or "paraboloid" to subtract the best one, or None
+    detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None: none
     fill   : True to fill holes with a harmonic function; else holes are an error. Holes are nan,
         masked, BAD in text, and marks such as -9999 or 1e38 far from all heights
 
@@ -164,7 +164,7 @@ def _arrays(path: Path) -> HeightGrid:
 
 
 def _placed(path: Path, heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """Heights in the order of x and y, with the pixel: of two vectors, or a matrix each."""
+    """Heights in the order of x and y, and the pixel; x and y are two vectors or two matrices."""
     vectors = x.ndim == y.ndim == 1
     shape = (len(y), len(x)) if vectors else x.shape
     if heights.shape != shape or not (vectors or y.shape == shape):

@@ -39,7 +39,7 @@ MOST_LISTED = 10
 #: Fraction of a map's half width beyond which contact causes a warning.
 NEAR_EDGE = 0.9
 
-#: Largest difference of a statistic from its value by moments, relative to this, without a warning.
+#: Largest relative difference of a statistic from its value by moments that causes no warning.
 UNLIKE = 0.2
 
 
@@ -262,8 +262,8 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     chosen = summits.origin.prune
     first = scanned.curve.trusted_from
     if not first <= chosen:
-        more = "no pruning is strong enough" if np.isnan(first) else f"--prune {first:g} is"
-        yield f"at a pruning of {chosen:g} the asperity model cannot be trusted; {more}"
+        more = "no pruning is" if np.isnan(first) else f"--prune {first:g} is"
+        yield f"the asperity model cannot be trusted at a pruning of {chosen:g}; {more} enough"
     if contact is not None and not contact.loads.any():
         yield (
             f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
@@ -291,6 +291,6 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         part = float((np.abs(points).max(axis=0) / np.array(surface.size) * 2).max())
         if part > NEAR_EDGE:
             yield (
-                f"contact reaches {part:.0%} of the way to the edge of the map: beyond it there "
-                "may be more"
+                f"contact reaches {part:.0%} of the way to the edge of the map: there may be more "
+                "contact beyond the edge"
             )

@@ -47,8 +47,8 @@ def self_affine(
         number q
     rms_slope : root mean square of the slope |grad z|
     rolloff   : [length] wavelength; the spectrum of longer waves is constant
-    seed      : of the random phases. Amplitudes are not random, so all maps have the same moments
-    pixels    : number along each side;  pixel : [length] size of a pixel
+    seed      : seed of the random phases. Amplitudes are not random: all maps have equal moments
+    pixels    : number of pixels per side;  pixel : [length] size of a pixel
     cutoff    : [length] shortest wave; default 8 pixels
     unit      : unit of length, as in `Surface`
 

@@ -80,8 +80,8 @@ class Statistics(NamedTuple):
 class Summits(Table, Asperities, Plottable):
     """Asperities that are the summits of a map, in descending order of the heights of their maxima.
 
-    positions, tip_radii, heights : of the tops of fitted paraboloids; the tip radius is
-        1 / sqrt(k1 k2)
+    positions, heights : (n, 2), (n,) [length] of the tops of fitted paraboloids
+    tip_radii   : (n,) [length] 1 / sqrt(k1 k2)
     prominences : (n,) [length] height of the maximum above the highest pass to a taller one
     largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2
     deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
@@ -139,7 +139,7 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def elliptic_loads(self) -> Array:
-        """(n,) load of the elliptic tip over that of its sphere, at the same indentation."""
+        """(n,) load of the elliptic tip divided by that of its sphere at the same indentation."""
         return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
 
     @property

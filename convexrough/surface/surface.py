@@ -30,8 +30,8 @@ MOST, FITTED = 0.5, 256
 #: Difference of the two curvatures of a paraboloid, over their mean, below which it is round.
 ROUND = 0.1
 
-#: Rms slopes below and above which heights are warned of. Lapped steel has some 1e-2, polished
-#: wafers 1e-3 to 1e-4.
+#: Smallest and largest rms slope without a warning. Lapped steel has about 1e-2, polished wafers
+#: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
 #: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
@@ -49,8 +49,8 @@ class Surface(Record, Plottable):
     filled  : number of pixels that were holes
     clipped : number of pixels at the largest height if the map seems to be cut off there, else 0;
         by default determined from `heights`
-    repeated : number of pixels below it with one height, if these are surprisingly many, else 0; by
-        default counted in the heights
+    repeated : number of pixels with the most frequent lower height if these are surprisingly many,
+        else 0; by default determined from `heights`
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, and for pixels with one side more
@@ -124,7 +124,7 @@ class Surface(Record, Plottable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of a form that explains most of the variance, and of wrong pixels.
+        """Sentences on a form that explains most of the variance, and on pixels that look wrong.
 
         Forms are fitted to at most 256 by 256 of the pixels. A spike is a pixel or a pair of pixels
         whose height differs much from the median and from all neighbours.
@@ -182,7 +182,7 @@ class Surface(Record, Plottable):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """The surface without its best-fitting plane, sphere or paraboloid; `removed` has it.
+        """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes this.
 
         Raises InputError if nothing is left.
 

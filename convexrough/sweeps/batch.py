@@ -76,7 +76,7 @@ def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Ro
     except FAILURES as error:
         return _failed(error, columns)
     except KeyError as error:  # a swept list may be shorter than the first
-        return "failed", f"has no number {error}", [np.nan] * len(columns)
+        return "failed", f"the results have no {error}", [np.nan] * len(columns)
     said = "; ".join(filter(None, (unsure, warned)))
     return ("undecided" if unsure else "certified"), said, values
 

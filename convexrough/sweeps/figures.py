@@ -17,7 +17,7 @@ from convexrough.sweeps.batch import Columns
 #: Quantiles that bound the two bands, and that of the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Largest number of combinations of other swept keys with bands of their own; more are merged.
+#: Largest number of combinations of other swept keys that have their own bands; more are merged.
 MOST_BANDS = 4
 
 #: Number of bins for random keys, which have many values.

@@ -86,14 +86,14 @@ class Keys(FileTable):
             elif name == "sweep":
                 yield f"{where}.{key}", "expected a key of a scene"
             elif name in FIXED:
-                yield f"{where}.{key}", f"values of [{name}] are columns, the same for every scene"
+                yield f"{where}.{key}", f"values of [{name}] name columns, so they cannot vary"
             elif key in first or (key == "asperities.seed" and "seeds" in keys):
                 also = f"in [sweep.{first[key]}]" if key in first else "by seeds"
                 yield f"{where}.{key}", f"swept twice, {also} too"
             first[key] = where
         lists = _dict(keys.get("together")).values()
         if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:
-            yield "together", f"found {sorted(lengths)} values, expected as many of each key"
+            yield "together", f"found {sorted(lengths)} values, expected as many for every key"
         if keys.get("draw") and "seeds" not in keys:
             yield "seeds", "missing, needed with [sweep.draw]"
 

@@ -26,9 +26,9 @@ Law = Literal["uniform", "normal", "lognormal"]
 class Draw(NamedTuple):
     """The law of a random value.
 
-    first, second : of "uniform" the ends; of "normal" the mean and the standard deviation; of
-        "lognormal" the mean and the coefficient of variation. The last two laws are clipped at six
-        deviations
+    first, second : for "uniform" the two ends; for "normal" the mean and the standard deviation;
+        for "lognormal" the mean and the coefficient of variation. "normal", and the logarithm of
+        "lognormal", are clipped at six standard deviations
     """
 
     key: str

@@ -1,8 +1,8 @@
 """The numbers that a sweep can measure: names in the summary of a run, or their last parts.
 
-`cycle.loss` is the loss of each cycle, and so is `loss` if no earlier stage has such a number. A
+`cycle.loss` is the loss of each cycle. `loss` means the same if no earlier stage has a `loss`. A
 column is named after the number and the row: `loss_0.37` is the loss of the cycle between
-+-0.37 f P, with the friction limit f P, and `history.loss_2` that at the third force of a history.
++-0.37 f P, with the friction limit f P; `history.loss_2` is the loss at a history's third force.
 """
 
 from __future__ import annotations
@@ -90,13 +90,13 @@ def _numbers(
 
 
 def row_label(ends: Sequence[float]) -> str:
-    """The label of a row: a force, or both ends of a cycle; the maximum if it is symmetric."""
+    """The label of a row: a force, or both ends of a cycle; only the maximum if it is symmetric."""
     *first, last = ends
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
-    """The columns for each name in `measures`, which means the first number of this name.
+    """The columns for each name in `measures`; a name stands for the first number that has it.
 
     Raises InputError if there is no such number. Stages after the last needed one are not computed.
     """

@@ -15,7 +15,8 @@ from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Largest numbers of scenes and (about) of asperities in a batch; number of batches to aim at.
+#: Largest number of scenes, and about the largest of asperities, in a batch; least number of
+#: batches, if the scenes are enough.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
 #: Largest number of scenes that are computed to find out which numbers can be measured.

@@ -67,7 +67,7 @@ def sweep(
     part     : (k, n): compute only the k-th of n shares of the scenes, counted from 1
 
     The table is the same, bit for bit, for any executor, any order of computation and any number of
-    interruptions. The row of a failed scene has the reason.
+    interruptions. In the row of a failed scene `message` is the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
     workers died twice while computing the same scenes, or if none is left.
@@ -81,7 +81,7 @@ def sweep(
     if isinstance(what, (str, os.PathLike, Mapping)):
         for name, value in given.items():
             if value is not None:
-                raise InputError(name, found="given", expected="none: the sweep tables have it")
+                raise InputError(name, found="given", expected="none: the sweep tables state it")
         from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
 
         if isinstance(what, Mapping):

@@ -53,7 +53,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 
 def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
-    """The numbers of the scenes that are proved in rows, by the numbers of the scenes."""
+    """The measured numbers of the scenes that are proved in rows, by the index of the scene."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}

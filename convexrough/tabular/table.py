@@ -268,8 +268,8 @@ def _factors(
         factor = found.into(scene)
         given = how.scales.get(name)
         if given is not None and abs(abs(given) / factor - 1) > SAME:
-            mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as {said} "
-                            f"are {factor:.15g} {scene.name}")  # fmt: skip
+            mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as 1 "
+                            f"{said} is {factor:.15g} {scene.name}")  # fmt: skip
         elif given is None and factor != 1 and how.convert:
             factors[name] = factor
         elif given is None and factor != 1:
@@ -430,7 +430,7 @@ def _numbers(
         if (fine & (plain > 0) if positive else fine).all():
             return plain
     if not any(map(str, cells)):
-        saved = "formulas are, until a spreadsheet program saves their values"
+        saved = "formulas are empty until a spreadsheet program saves their values"
         mistakes.append(f"column {name}: found only empty cells, expected numbers; {saved}")
         return np.full(len(cells), np.nan)
     check = checks.positive if positive else checks.finite

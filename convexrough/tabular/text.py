@@ -46,7 +46,7 @@ _SIGN = r"#(?![A-Z]+[/!?])"
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
-#: A number whose digits are in groups of three: certainly, and perhaps (or with three decimals).
+#: A number whose digits are certainly in groups of three; and one that could have three decimals.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
@@ -275,9 +275,9 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
-    """Numbered rows, with tabs, of the first sheet with a known column, else the first; its name.
+    """The name and the numbered rows of the first sheet with a known column, or of the first sheet.
 
-    The name is in quotes, and followed by those of other sheets with known columns.
+    Tabs separate cells. The name is in quotes; names of other sheets with known columns follow it.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -340,8 +340,8 @@ def _are_holes(cells: Sequence[str]) -> bool:
 def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:
     """Raise FileError for numbers with thousands separators.
 
-    Numbers such as 3,134 could have three decimals. They have thousands separators if a column
-    contains ten of them or more, and besides only whole numbers below 1000.
+    Numbers such as 3,134 could have three decimals. They are refused if a column contains at least
+    ten of them, and apart from them only whole numbers below 1000.
     """
     columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
     for number, line in lines:

@@ -19,7 +19,7 @@ _SLIPS = [
     (
         r"=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)",
         "{whole}.{part}",
-        "a decimal point, no comma",
+        "a decimal point instead of a comma",
     ),
     (
         rf"=\s*(?P<number>{_NUMBER})[dD](?P<power>[+-]?\d+)",
@@ -43,7 +43,7 @@ _SLIPS = [
         '"{text}"',
         "text in straight quotes",
     ),
-    (r":\s*(?P<value>[^\s#].*?)", "{value}", "an equals sign, no colon"),
+    (r":\s*(?P<value>[^\s#].*?)", "{value}", "an equals sign instead of a colon"),
     (
         rf"=\s*(?P<value>{_NUMBER}|\"[^\"]*\"|\[[^\]]*\])\s*[;,]",
         "{value}",

@@ -26,7 +26,7 @@ from convexrough.verdict.verdict import rounded_up
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
 
-#: What a word in a column "status" or "contact" claims, and what a flag in "contact" does.
+#: What a word in a column "status" or "contact" claims, and what a flag in "contact" claims.
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
@@ -85,10 +85,11 @@ class Claimed(NamedTuple):
 
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Loads [force] from a file; noise up to the floor may be negative.
+    """Loads [force] from a file; negative loads are accepted as noise down to -`floor`.
 
-    Rows are matched by positions, else by an index, else by the scene's order. A column pressure,
-    with areas or on a regular grid, is integrated over the points nearest to each asperity.
+    Rows are matched by positions if the file has them, or by an index, or else by the scene's
+    order. Pressures, with areas or on a regular grid, are integrated over the points nearest to
+    each asperity.
 
     Raises TableError with every mistake, and FileError.
     """
@@ -162,7 +163,7 @@ def _negative(
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
     if largest <= floor:
         advice = "without --sign -1" if sign < 0 else "--sign -1"
-        yield f"column {name}: no {name} is positive, expected compression to be: {advice}"
+        yield f"column {name}: no {name} is positive, expected positive compression: {advice}"
         return
     if least <= SMALL * largest:
         hint = f"; --floor {rounded_up(least)} counts noise as 0"
@@ -232,9 +233,9 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
 
 
 def _check_one_size(i: Indices, j: Indices, count: int) -> None:
-    """Raise InputError if pixels without neighbours, more than `count`, are on a coarser grid.
+    """Raise InputError if more than `count` pixels have no neighbours, and lie on a coarser grid.
 
-    A contact of one pixel may have no neighbour, too: at most one for each asperity.
+    At most `count` pixels without neighbours may be contacts of one pixel, one for each asperity.
     """
     if len(i) == (i.max() + 1) * (j.max() + 1):
         return  # a full grid

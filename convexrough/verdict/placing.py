@@ -34,7 +34,8 @@ MOST_TRIED = 1000
 #: Relative difference up to which the last row is the sum of the others.
 TOTAL = 1e-4
 
-#: Part of loaded nodes that may be far from all asperities, if not all positions are wrong.
+#: If at most this part of the loaded nodes is far from all asperities, only their positions may be
+#: wrong; otherwise all may be.
 FEW_FAR = 0.1
 
 #: At most this many unread columns are named, or compared with the positions of asperities.
@@ -267,7 +268,7 @@ class Placing:
             return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
-            self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
+            self._refuse(i, found, f"a position of the scene, to within {allowed:.3g}")
         self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
@@ -294,7 +295,7 @@ class Placing:
             signs = [-1 if name in names else 1 for name in "xy"]
             yield f"{' and '.join(names)} {verb} the other sign: {ways}", points * signs
         for power in (*range(-9, 0), *range(1, 10)):
-            found = f"found them 10^{power} times as far out as the scene's"
+            found = f"found x, y 10^{power} times as large as the scene's"
             ways = _options("scale", dict.fromkeys("xy", f"{10.0**-power:g}"))
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
@@ -307,7 +308,7 @@ class Placing:
             if self._fits(points[:20] + shift) and self._fits(points + shift):
                 digit = 0.1 * min(self._allowed, float(np.abs(shift).max()))
                 by = _pair(np.round(-shift / digit) * digit)
-                expected = f"expected them from the axis of the sphere, to {self._allowed:.3g}"
+                expected = f"expected x, y relative to the sphere's axis, to {self._allowed:.3g}"
                 return f"all are shifted by {by}, {expected}"
         return ""
 
@@ -319,7 +320,7 @@ class Placing:
         for _ in range(REFINEMENTS):  # the mean distance from the nearest asperities
             near = places[_nearest(places, points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
-        expected = "expected them from the axis of the sphere"
+        expected = "expected x, y relative to the sphere's axis"
         return (
             f"all are shifted by about {_pair(shift)}, {expected}" if fits(points - shift) else ""
         )

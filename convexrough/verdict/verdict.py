@@ -36,7 +36,7 @@ NOISE = 1e-6
 class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
-    loads       : (n,) [force] as given
+    loads       : (n,) [force] the given loads
     floor       : [force] a load up to this size counts as 0, and its asperity as open
     within      : largest error allowed, as a fraction of the largest load
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
@@ -137,8 +137,8 @@ def verify(
     approach [length] or load [force] : the prescribed quantity, exactly one
     within : largest error allowed: of a load, as a fraction of the largest load, and of a
         prescribed total, as a fraction of this total. 1 checks hardly more than the contact set
-    floor  : [force] a load up to this size, also a negative one, counts as 0, and its asperity
-        as open
+    floor  : [force] a load of at most this size, positive or negative, counts as 0, and its
+        asperity as open
     influence : compliance operator; None for the cheapest
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.

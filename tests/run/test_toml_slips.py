@@ -79,7 +79,8 @@ def test_all_slips_at_once(tmp_path: Path) -> None:
     text = "[sphere]\nradius = 1,0\n[normal]\napproach = 5e-5 m\n[friction]\ncoefficient 0.5\n"
     lines = refused(tmp_path, text)
     assert (
-        lines[0] == "line 2: found radius = 1,0, expected radius = 1.0: a decimal point, no comma"
+        lines[0]
+        == "line 2: found radius = 1,0, expected radius = 1.0: a decimal point instead of a comma"
     )
     assert lines[1].startswith("line 4: found approach = 5e-5 m, expected approach = 5e-5: ")
     assert lines[2].startswith("not a TOML file: ")

@@ -97,11 +97,11 @@ WRONG = {
     ),
     "fractions swept": (
         sweeping(over={"cycle.maximum_fraction": [[0.1]]}),
-        "values of [cycle] are columns",
+        "values of [cycle] name columns",
     ),
     "of unequal length": (
         sweeping(together={"normal.load": [1e-7, 2e-7], "sphere.radius": [1.0]}),
-        "together: found [1, 2] values, expected as many of each key",
+        "together: found [1, 2] values, expected as many for every key",
     ),
     "nothing random": (sweeping(seeds=3), "seeds: nothing is random"),
     "wrong order": (

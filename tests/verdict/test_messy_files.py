@@ -277,13 +277,13 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pressure in MPa": (lambda case: case.pixels("x y pressure\xa0[MPa]"), "",
                         "column pressure: found MPa, expected N/m²", "--scale pressure=1000000"),
     "places in mm": (headed("x y load", 1e3), "",
-                     "times as far out", "--scale x=0.001 --scale y=0.001"),
+                     "times as large as", "--scale x=0.001 --scale y=0.001"),
     "places in km": (headed("x y load", 1e-6), "",
-                     "times as far out", "--scale x=1e+06 --scale y=1e+06"),
+                     "times as large as", "--scale x=1e+06 --scale y=1e+06"),
     "pixels in mm": (
         lambda case: {name: each * (1 if name == "pressure" else 1e3)
                       for name, each in case.pixels().items()},
-        "", "found them 10^3 times as far out", "--scale x=0.001 --scale y=0.001"),
+        "", "found x, y 10^3 times as large as", "--scale x=0.001 --scale y=0.001"),
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
                        "all are shifted by about [0.0001997, 8.8"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
@@ -308,7 +308,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "formulas without values": (
         lambda case: [[["x", "y", "load"], *([x, y, f"={load}*1"]
                                              for x, y, load in matrix(case.table()))]],
-        "a.xlsx", "column load: found only empty cells", "formulas are, until a spreadsheet"),
+        "a.xlsx", "column load: found only empty cells", "formulas are empty until a spread"),
     "totals without a name": (
         lambda case: lines(case.table()) + f"0,0,{case.loads.sum()}\n", "",
         "row 14: found the sum of the others"),
@@ -329,7 +329,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
     "nodes in km": (moved(lambda x, y: (1e-3 * x, 1e-3 * y)), "a.csv --nodes",
-                    "found them 10^-3 times as far out"),
+                    "found x, y 10^-3 times as large as"),
     "nodes mirrored": (moved(lambda x, y: (-x, y)), "a.csv --nodes",
                        "x has the other sign: --scale x=-1"),
     "nodes exchanged": (moved(lambda x, y: (y, x)), "a.csv --nodes",
@@ -344,7 +344,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: {"id": 1 + np.flatnonzero(case.loads), "load": case.loads[case.loads > 0]},
         "", "rows: found 7, expected 12", "; --missing-open takes the others for open"),
     "negative loads": (lambda case: case.table(load=-case.loads[case.order]), "",
-                       "no load is positive, expected compression to be: --sign -1"),
+                       "no load is positive, expected positive compression: --sign -1"),
     "an index twice": (lambda case: {"index": [0, *range(COUNT - 1)], "load": case.loads}, "",
                        "column index: found 0 in row 2 and row 3"),
     "an id twice": (lambda case: {"id": [1, 2, 2, *range(4, COUNT + 1)], "load": case.loads}, "",
@@ -454,7 +454,7 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     name = put(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
     with pytest.raises(TableError) as refused:
         read_loads(tmp_path / name, scene, Manner())
-    cause = "all are shifted by [0.001, 0], expected them from the axis of the sphere, to 1e-05"
+    cause = "all are shifted by [0.001, 0], expected x, y relative to the sphere's axis, to 1e-05"
     assert str(refused.value) == f"{tmp_path / name}: positions: {cause}"
 
 

@@ -225,7 +225,7 @@ def test_wrong_use(command: Any, contact: cr.Contact) -> None:
         (("--within", "5"), "; 5 % is 0.05"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--tolerance", "1"), "--tolerance: found 1.0, expected at most 0.00125, half the small"),
-        (("--sign", "-1"), "no load is positive, expected compression to be: without --sign -1"),
+        (("--sign", "-1"), "no load is positive, expected positive compression: without --sign -1"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
         (("--column", "x=x", "coord"), "hint: quote names that contain spaces"),
