@@ -45,15 +45,16 @@ if TYPE_CHECKING:
 class Contact(Cached, Table, Plottable):
     """A solved normal contact. Arrays are (n,), in the order of the scene's n asperities.
 
-    loads, contact_radii : [force], [length] load and contact radius of each asperity; 0 where open
-    approach, load : [length], [force] approach D0 of the two bodies, and total load
+    loads         : [force] load of each asperity; 0 where open
+    contact_radii : [length] radius of each contact disc; 0 where open
+    approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : estimated relative error of the displacements at loaded asperities because the
-        model replaces pressures by point forces: the largest of `surface.model_errors`
+    model_error   : estimated relative error of the displacements at loaded asperities, made by
+        point forces in place of pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
         1, contact discs overlap and the model fails
-    candidates    : number of asperities that can touch, which the solver computes
+    candidates    : number of asperities that can touch; the solver leaves out the others
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
@@ -205,7 +206,8 @@ def press(
 ) -> Contact:
     """The contact of a scene under a prescribed approach or total load.
 
-    approach [length] or load [force] : the prescribed quantity, exactly one
+    approach [length] or load [force] : the prescribed quantity, exactly one; at the approach 0 the
+        undeformed sphere just touches the plane of height 0
     solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
     start  : (n,) [force] initial loads; a globally certified solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
