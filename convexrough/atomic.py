@@ -27,7 +27,7 @@ def unfinished(path: Path) -> Path:
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path; its file replaces `path` if the body succeeds, and is removed otherwise.
 
-    Raises FileError where it cannot be written. A killed process leaves the temporary file behind.
+    Raises FileError if it cannot be written. A killed process leaves the temporary file behind.
     """
     temporary = unfinished(path)
     try:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class MemoryRise:
-    """The increase of this process's resident memory since the object was made.
+    """The increase of the resident memory of this process since the object was made.
 
     Memory that an allocator reuses is not counted.
     """

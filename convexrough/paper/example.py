@@ -44,7 +44,7 @@ def results() -> list[Result]:
 
 
 def crossover(contact: cr.Contact) -> float:
-    """The Q / (f P) above which a cycle of the rough contact loses more than a smooth one."""
+    """The Q / (f P) above which a rough contact loses more per cycle than a smooth one."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     limit = 0.5 * contact.load

@@ -62,9 +62,9 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
     """Draw the main picture of a result; return the axes.
 
     result : a Contact: map of pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: loop, or the plane of loads where the normal load varies; Fretting: map of slip
-        amplitudes; LoadPath: shear force against displacement at constant load, else the plane of
-        loads; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
+        Cycle: loop, or the plane of loads if the normal load varies; Fretting: map of slip
+        amplitudes; LoadPath: shear force against displacement, or the plane of loads if the load
+        varies; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
         wrongly claimed asperities; Comparison, PathComparison: times of the solvers or methods;
         PhaseLosses: loss against phase; Shakedown: map of factors; Surface, Summits: map;
         Provability: contacts against pruning

@@ -101,7 +101,7 @@ def loops_figure(
     """The figure of loops: of the contact, the same less an elastic part, and of asperities.
 
     names, meaning : entries and title of the legend of the asperities
-    loops : loops of the cycles, with those of the asperities;  count : number of all cycles
+    loops : loops of the cycles, with loops of the asperities;  count : number of all cycles
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")

@@ -25,7 +25,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
 
 
 def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
-    """Draw derivatives by heights: dark where a taller asperity reduces the number, else light."""
+    """Draw derivatives by heights: dark where negative, light where positive."""
     parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"

@@ -57,7 +57,7 @@ class Measure(NamedTuple):
 
 
 def measure(size: float, unit: str, symbol: str = "") -> Measure:
-    """The measure of values of this size: SI with prefix, else `unit`, else relative to `size`."""
+    """The measure of values up to `size`: SI with a prefix, or another `unit`, or `size` itself."""
     if known := _metric(unit):
         name, exponent = known
         step = _step(abs(size) * 10.0**exponent)

@@ -64,7 +64,7 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
     ringed = "\nringed: the first to keep sliding" if first.any() else ""
     title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:
-        what = "slip in the mechanism [1]" if vector else "factor up to which sliding ceases"
+        what = "slip in the mechanism [1]" if vector else "factor up to which sliding dies out"
         bar(axes, colours, what)
 
 

@@ -98,7 +98,7 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
-    """Draw how many summits touch against pruning; marks show what is proved."""
+    """Draw the number of touching summits against the pruning; marks show what is proved."""
     axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")

@@ -112,9 +112,9 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name` if it is one, else the attribute `name`.
+    """The number of asperities with the status `name`; for other names, the attribute `name`.
 
-    The attribute is that of `found`, or of `found.certificate` where `found` has none.
+    The attribute is that of `found`, or of `found.certificate` if `found` has no such attribute.
     """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)

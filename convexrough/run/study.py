@@ -36,7 +36,7 @@ from convexrough.run.values import (
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
-#: [Pa] limits of moduli, below those of gels and above that of diamond.
+#: [Pa] smallest and largest accepted modulus: below those of gels, and above that of diamond.
 SOFTEST, HARDEST = 1e3, 1e13
 MODULI = ("contact_modulus", "youngs_modulus", "hardness")
 

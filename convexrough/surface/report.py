@@ -47,7 +47,7 @@ UNLIKE = 0.2
 class Scanned:
     """A surface, all summits, those left by pruning, and the result of pressing these.
 
-    curve, contact : None if not pressed; contact also if no solution was found
+    curve, contact : None if nothing was pressed; `contact` is None also if no solution was found
     whole : the whole map by boundary elements, or None
     """
 

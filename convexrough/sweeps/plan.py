@@ -55,7 +55,7 @@ def planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for scenes; the first one shows which numbers it has and how large batches may be.
+    """The plan for scenes; the first scene shows which numbers exist and how large batches may be.
 
     said  : entries of the manifest on the origin of the sweep
     given : all input on which the numbers depend, except measures and version

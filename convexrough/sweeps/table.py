@@ -163,7 +163,7 @@ class SweepTable(Record):
         """Axes with bands of quantiles of a measured number against a swept key.
 
         measured, over : names of columns; default: the first measured number and the first swept
-            key. Each combination of other swept keys has its own bands if there are at most four
+            key. Each combination of the other swept keys has its own bands, if at most four exist
 
         Raises InputError if nothing is swept, and for unknown names.
         """
@@ -188,8 +188,8 @@ class SweepTable(Record):
 
         measured : names of columns, by default all;  at : quantiles, from 0 to 1
 
-        The columns are those of `points`, `quantity`, `scenes` (number computed), `failed` (how
-        many of these failed), and one for each quantile, nan if all scenes failed.
+        The columns are those of `points`, `quantity` (the measured number), `scenes` (how many were
+        computed), `failed` (how many of these failed), and each quantile; nan if all scenes failed.
         """
         names = self.measured if measured is None else list(measured)
         about = self.read([*self.points, "scene", "status"])

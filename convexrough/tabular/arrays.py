@@ -80,7 +80,7 @@ def named_arrays(path: Path) -> dict[str, Any]:
             with loaded:
                 arrays = {name: np.asarray(loaded[name]) for name in loaded.files}
         for values in arrays.values():
-            if values.dtype.kind == "U":  # numpy reads numbers that are no characters, too
+            if values.dtype.kind == "U":  # numpy accepts invalid characters
                 np.char.decode(np.char.encode(values, "utf-8"), "utf-8")
         return arrays
 

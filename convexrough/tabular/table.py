@@ -61,7 +61,7 @@ INDEX = (
     "",
 )
 
-#: First words of rows below a table that are not part of it, in lower case.
+#: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
           "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
 

@@ -38,7 +38,7 @@ CLAIMS = {
     "no_contact": {flag: "open" if it == "contact" else "contact" for flag, it in FLAGS.items()},
 }
 
-#: Difference of heights or tip radii, over the largest, that may be due to rounding.
+#: Difference of heights or tip radii, divided by the largest, that may be due to rounding.
 ROUNDED = 1e-2
 
 #: Largest number of unknown words of a column in a note.

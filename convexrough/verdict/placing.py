@@ -177,8 +177,8 @@ class Placing:
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
-        # Increasing numbers may be those of nodes and are ignored. In another order, or if nearly
-        # all fit, they are indices.
+        # Distinct increasing numbers may be numbers of nodes: mistakes in them are ignored. Numbers
+        # in another order, or repeated ones that fit and mostly differ, are surely indices.
         if times.max() == 1:
             sure |= bool(name) and bool((np.diff(index) < 0).any())
         else:
