@@ -49,7 +49,7 @@ class InputError(ConvexroughError, ValueError):
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
     """Put the place `where` (a file, a table) in front of each InputError that the body raises.
 
-    unless_known : errors that name a place already stay unchanged; a MistakesError always does
+    unless_known : True: leave errors that name a place unchanged; a MistakesError always stays so
     """
     try:
         yield

@@ -3,7 +3,8 @@
 Pressure and traction are sums over the contact discs that contain a point; displacements are sums
 over all asperities. Shear is along x. Points are an array (..., 2) [length] with the axis of the
 sphere as origin, and a result is an array (...) with a value for each point. Disc i has the centre
-r_i, the contact radius a_i and the peak pressure p0_i.
+r_i, the contact radius a_i and the peak pressure p0_i. Points that are not finite, or of another
+shape, raise InputError.
 """
 
 from __future__ import annotations

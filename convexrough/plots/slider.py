@@ -196,7 +196,10 @@ def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str
     """Sentences about asperities that the page leaves out."""
     said = []
     if shown < touching:
-        said.append(f"{shown:,} of {touching:,} touching asperities, a random part, are drawn.")
+        said.append(
+            f"{shown:,} of {touching:,} touching asperities are drawn, chosen at random, as larger "
+            "discs."
+        )
     if followed < touching:
         said.append(f"{followed:,} of the asperities can be selected.")
     if forces < next(iter(FORCES.values())):

@@ -41,8 +41,8 @@ def spikes(heights: Array) -> Indices:
 def clipped(heights: Array) -> int:
     """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    Many means at least ten, and more than the pixels below them within 1 % of the range of heights,
-    or, if this range ends above the second largest height, down to that height.
+    Many means at least ten, and more than all other pixels whose heights are less than 1 % of the
+    range below the largest height, or equal the second largest height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))

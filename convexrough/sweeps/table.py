@@ -66,6 +66,7 @@ class SweepTable(Record):
 
     @property
     def columns(self) -> list[str]:
+        """The names of all columns."""
         return list(self.manifest["columns"])
 
     @property
@@ -80,6 +81,7 @@ class SweepTable(Record):
 
     @property
     def measured(self) -> list[str]:
+        """The names of the columns with measured numbers."""
         return self.columns[self.columns.index("message") + 1 :]
 
     @property

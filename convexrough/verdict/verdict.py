@@ -90,6 +90,7 @@ class Verdict(Claim, Table, Plottable):
 
     @property
     def of(self) -> Scene:
+        """The scene of the loads."""
         return self.scene
 
     @property
