@@ -161,7 +161,7 @@ class Contact(Cached, Table, Plottable):
 
         loads, gaps    : (n,) weights of the asperities' loads and gaps
         approach, load : weights of the approach and the total load
-        holding        : the quantity kept constant, "load" or "approach"; default: the prescribed
+        holding        : quantity kept constant, "load" or "approach"; default: the prescribed one
 
         Raises InputError if no weight is given or no asperity is loaded, and SolverError if the
         loads have no derivative because the energy is not convex there.

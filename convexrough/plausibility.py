@@ -23,7 +23,8 @@ FEW = 5
 #: lattice.
 ARRAY, ON_LATTICE = 20, 7
 
-#: An array with a smaller `array_extent` is cut off: the smooth pressure there is 0.7 of the peak.
+#: An array with a smaller `array_extent` is cut off. At this extent the smooth pressure is 0.7 of
+#: its peak.
 CUT_OFF = 0.7
 
 #: Number of sectors whose farthest asperities are the rim of an array, and the largest share of
@@ -48,7 +49,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
         widths a and b of the contact of a smooth body at this load; None without such a contact,
         and where the asperities are too few for an array (`is_array`)
-    rim_touching : share of the rim that touches: the farthest asperity in each of 16 sectors
+    rim_touching : share of the rim, the farthest asperity in each of 16 sectors, that touches
     axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -135,8 +136,8 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["rim_touching"] > CUT_RIM:
         yield (
-            f"of the asperities at the rim of the array {normal['rim_touching']:.0%} touch: others "
-            "beyond it could carry load, too; use a larger array"
+            f"{normal['rim_touching']:.0%} of the asperities at the rim of the array touch: those "
+            "that are missing beyond the rim could carry load, too; use a larger array"
         )
     if normal["steepness"] > STEEP:
         yield (
@@ -207,9 +208,9 @@ def axis_outside(scene: Scene) -> bool:
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """The share that touches of the asperities farthest from the middle, one in each sector.
+    """The share of the asperities at the rim, the farthest in each sector, that touch.
 
-    It is 0 where the asperities are too few for an array.
+    It is 0 if the asperities are too few for an array.
     """
     if not is_array(scene):
         return 0.0

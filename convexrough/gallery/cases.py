@@ -207,7 +207,7 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces divided by the last and largest; "nested": ranges lie in all earlier ranges."""
+    """Shear forces divided by the last and largest; "nested": each range is in all earlier ones."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

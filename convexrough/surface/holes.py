@@ -41,7 +41,7 @@ def spikes(heights: Array) -> Indices:
 def clipped(heights: Array) -> int:
     """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    Many means at least ten, and more than all other pixels whose heights are less than 1 % of the
+    Many means at least ten, and more than all other pixels whose heights are at most 1 % of the
     range below the largest height, or equal the second largest height.
     """
     top = heights.max()

@@ -80,7 +80,7 @@ class Statistics(NamedTuple):
 class Summits(Table, Asperities, Plottable):
     """Asperities that are the summits of a map, in descending order of the heights of their maxima.
 
-    positions, heights : (n, 2), (n,) [length] of the tops of fitted paraboloids
+    positions, heights : [length] (n, 2) positions and (n,) heights of tops of fitted paraboloids
     tip_radii   : (n,) [length] 1 / sqrt(k1 k2)
     prominences : (n,) [length] height of the maximum above the highest pass to a taller one
     largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2

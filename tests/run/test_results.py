@@ -124,7 +124,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     )
     material = cr.Material(1.0, 0.3)
     for base, approach, told in (
-        (1.0, 9e-5, "of the asperities at the rim of the array 100% touch: those that are"),
+        (1.0, 9e-5, "100% of the asperities at the rim of the array touch: those that are"),
         (1.0, 5e-5, ""),
         (np.inf, 1e-6, ""),
         (1.0, -1e-6, "no asperity carries a load: check the sign and the unit of the approach"),
