@@ -201,7 +201,7 @@ def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str
             "discs."
         )
     if followed < touching:
-        said.append(f"{followed:,} of the asperities can be selected.")
+        said.append(f"{followed:,} of the touching asperities can be followed.")
     if forces < next(iter(FORCES.values())):
         said.append(f"The slider has {forces} forces.")
     return said

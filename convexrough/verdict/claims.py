@@ -52,7 +52,7 @@ OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuc
 class Manner(Reading):
     """How a file of forces is read.
 
-    sign      : -1 where compression is negative;  floor : [force] loads up to this are noise
+    sign      : -1 if compression is negative;  floor : [force] loads of at most this size are noise
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : True if asperities without a row are open
     nodes     : True if rows are nodes or pixels, summed at the nearest asperity

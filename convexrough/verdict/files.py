@@ -17,7 +17,7 @@ from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_f
 from convexrough.verdict.report import Verified
 from convexrough.verdict.verdict import verify_on
 
-#: Statuses in a file of shear forces. With "undecided" the force implies the claim.
+#: Statuses in a file of shear forces. For "undecided" the force itself decides what is claimed.
 STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
@@ -32,7 +32,7 @@ def verify_files(
 ) -> Verified:
     """The verdicts on the claims of files. Errors name the file.
 
-    within : largest error, as a fraction of the largest load or shear force
+    within : largest error allowed, as a fraction of the largest load or shear force
     shear, force : a file of shear forces and their total [force]; both or neither
     """
     tolerance("--within", within)

@@ -100,7 +100,7 @@ class Verdict(Claim, Table, Plottable):
         return frozen(self.certificate.load_errors + ignored)
 
     def nearby(self) -> tuple[Array, Array] | None:
-        """The solution's loads and error bounds; None without a solution."""
+        """Loads and error bounds of `solution`; None without a solution."""
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
