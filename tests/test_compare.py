@@ -17,6 +17,7 @@ from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 import convexrough as cr
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
+from convexrough.normal.certificate import OPEN, TOUCHING
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, ConicCVXPY, Newton, Solution
 
@@ -180,13 +181,12 @@ def test_each_kind_of_contradiction(contact: cr.Contact) -> None:
     assert "approach 5.0000000000000002e-05 +- 0 and 6" in line
     assert contradictions(true, forged(contact, approach=6e-5, approach_error=2e-5)) == []
 
-    statuses = np.where(proof.status == "open", "contact", "open")
-    (line,) = contradictions(true, forged(contact, status=statuses))
+    codes = np.where(proof.status == "open", TOUCHING, OPEN)
+    (line,) = contradictions(true, forged(contact, codes=codes))
     assert "statuses of asperities 0: contact and open; 1: " in line
     assert line.endswith("; and 56 more")
-    undecided = np.full(len(statuses), "undecided")
-    assert contradictions(true, forged(contact, status=undecided)) == []
-    assert contradictions(true, forged(contact, status=statuses, scope="none")) == []
+    assert contradictions(true, forged(contact, codes=0 * codes)) == []
+    assert contradictions(true, forged(contact, codes=codes, scope="none")) == []
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ class OtherSolutions(NamedTuple):
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
         """The bounds for loads (n,) up to `near`, and approaches up to `approach_bound`."""
+
         def radii(loads: Array) -> Array:
             return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
 
