@@ -583,7 +583,8 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
     """Compare claims with what is proved. Raises Refused if a claim is not proved."""
     if isinstance(proved, dict):
         for key, claim in zip(proved, table(claimed, *proved), strict=True):
-            hold(f"{what} {key}", claim, proved[key])
+            if key != "loss" or claim is not None:  # null claims no loss
+                hold(f"{what} {key}", claim, proved[key])
     elif isinstance(proved, list):
         for i, claim in enumerate(as_list(claimed, what, len(proved))):
             hold(f"{what} [{i}]", claim, proved[i])

@@ -203,8 +203,9 @@ def solver_named(name: str) -> solvers.Solver:
     expected = "package.Class of a solver that can be imported and needs no arguments"
     try:
         made = getattr(import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError, ValueError, SystemExit) as error:
-        raise InputError("solver", found=f"{name} ({error})", expected=expected) from error
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
+        found = f"{name} ({type(error).__name__}: {error})"
+        raise InputError("solver", found=found, expected=expected) from error
     return solvers.named(made)
 
 

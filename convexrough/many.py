@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import index
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -64,7 +65,7 @@ class Contacts(Table):
 
     def __getitem__(self, k: int) -> Contact:
         """The contact of scene k."""
-        k = range(len(self))[k]
+        k = range(len(self))[index(k)]
         known: dict[int, Contact] = self.__dict__.setdefault("_known", {})
         if k not in known:
             name = "load" if self.by_load else "approach"

@@ -227,6 +227,18 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert json.loads(ran.out)["normal"]["solver"] == "conic in CVXPY + Newton step"
 
 
+def test_a_module_that_fails_is_named(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "a.toml").write_text(scene_text())
+    for name, text in (("unlicensed", "raise RuntimeError('no licence')"), ("broken", "def (")):
+        (tmp_path / f"{name}.py").write_text(text)
+        ran = command("compare", "a.toml", "--solver", f"{name}.Solver")
+        assert (ran.status, ran.out) == (2, "")
+        assert f"found {name}.Solver ({'Run' if name == 'unlicensed' else 'Syn'}" in ran.err
+
+
 def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text())
     assert command("compare", "a.toml", "--solver", "conic", "--log", "log.csv").status == 0

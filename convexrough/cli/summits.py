@@ -154,7 +154,7 @@ def summits(
     how.check()
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
-    _claim(out, force)
+    _claim(out, formats, force, reads=[surface, *([how.scene] if how.scene else [])])
     with progress(f"reading {surface}"):
         scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
         with blamed_on(surface):
@@ -169,14 +169,24 @@ def summits(
     return DONE if scanned.certified else NOT_CERTIFIED
 
 
-def _claim(path: Path, force: bool) -> None:
-    """Raise FileError unless this path may be written; called before anything is computed."""
+def _claim(path: Path, formats: tuple[str, ...], force: bool, reads: list[Path]) -> None:
+    """Raise FileError unless the table and the files beside it may be written.
+
+    reads : input files, which must not be replaced
+    """
     if path.suffix.lower() != ".csv":
         raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
-    if path.exists() and not force:
-        raise FileError(f"{path}: exists already; --force replaces it, --out names another")
     if not path.parent.is_dir():
         raise FileError(f"{path}: no folder {path.parent}")
+    figures = [
+        f"{stem}.{kind}" for stem in ("map", "histograms", "provability") for kind in formats
+    ]
+    also = (path.with_name(f"{path.stem}-{name}") for name in ("provability.csv", *figures))
+    for each in filter(Path.exists, (path, *also)):
+        if any(each.samefile(read) for read in reads if read.exists()):
+            raise FileError(f"{each}: is an input; --out names another file")
+        if not force:
+            raise FileError(f"{each}: exists already; --force replaces it, --out names another")
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:

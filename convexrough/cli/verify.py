@@ -126,6 +126,9 @@ def verify(
         raise click.UsageError("--shear and --shear-force go together.")
     if explain and (out or junit or proof):
         raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
+    if junit is not None and junit.suffix.lower() != ".xml":
+        found_ending = junit.suffix or "no ending"
+        raise FileError(f"--junit {junit}: found {found_ending}, expected .xml")
     alone = [Path("proof.json")] if proof and out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
@@ -207,11 +210,15 @@ def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Pat
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
+    """The proof from the claimed loads, or if the claim holds, from the solution near them."""
     import numpy as np
 
+    from convexrough.contact import solve
     from convexrough.proof import prove
 
-    claimed = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
+    loads = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        return prove(file.scene, claimed, **control)
+        if found.holds:  # the loads may be too inaccurate for exact arithmetic
+            loads = solve(file.problem(), start=loads).loads
+        return prove(file.scene, loads, **control)

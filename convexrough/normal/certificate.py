@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.boxes import Scope, lowest_approach_bound
@@ -169,8 +168,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     """The certificate of loads (n,) [force] of the whole scene, for an assembled problem."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
-        expected = "a positive load on an asperity that can touch: the total is prescribed"
-        raise InputError("loads", found="none", expected=expected)
+        given = np.ones(len(given))
     pair, missing = completed(problem, scaled(problem, Pair.exact(given)))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
     start = trial(problem, pair, missing, product)

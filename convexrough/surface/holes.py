@@ -66,6 +66,19 @@ def repeated(heights: Array) -> int:
     return int(np.count_nonzero(heights == values[most]))
 
 
+def copied(heights: Array) -> float:
+    """The share of rows that equal the row before, or of columns if it is larger.
+
+    Rows and columns of equal heights do not count.
+    """
+    return max(
+        float(((lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)).mean())
+        if len(lines) > 1
+        else 0.0
+        for lines in (heights, heights.T)
+    )
+
+
 def filled(heights: Array) -> Array:
     """The map with each hole (nan) filled by the mean of its neighbours.
 

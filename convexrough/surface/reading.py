@@ -34,6 +34,9 @@ MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.
 #: Relative difference up to which two pixel sizes count as equal.
 SAME = 1e-6
 
+#: The same for the steps of x and y, which may be rounded.
+ROUNDED = 1e-3
+
 
 def read(
     path: str | os.PathLike[str],
@@ -158,8 +161,13 @@ def _arrays(path: Path) -> HeightGrid:
     both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
     units = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
     heights = _numbers(named[chosen])
-    if both is None and "x" in named and "y" in named:
-        heights, both = _placed(path, heights, *(_numbers(np.squeeze(named[it])) for it in "xy"))
+    if "x" in named and "y" in named:
+        heights, apart = _placed(path, heights, *(_numbers(np.squeeze(named[it])) for it in "xy"))
+        if both is not None and not np.allclose(both, apart, rtol=ROUNDED, atol=0.0):
+            expected = f"{apart[0]:g} by {apart[1]:g}, the steps of x and y"
+            said = f"{both[0]:g} by {both[1]:g}"
+            raise InputError("pixel", found=said, expected=expected, where=str(path))
+        both = both or apart
     return HeightGrid(heights, both, *units)
 
 

@@ -34,6 +34,9 @@ ROUND = 0.1
 #: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
+#: Share of rows that equal the one before which causes a warning. At 1 the map is a profile.
+MANY_COPIED = 0.25
+
 #: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
 
@@ -51,6 +54,8 @@ class Surface(Record, Plottable):
         by default determined from `heights`
     repeated : number of pixels with the most frequent lower height if these are surprisingly many,
         else 0; by default determined from `heights`
+    copied  : share of rows that equal the row before, or of columns if it is larger; by default
+        determined from `heights`
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, and for pixels with one side more
@@ -69,6 +74,7 @@ class Surface(Record, Plottable):
     source: str
     clipped: int
     repeated: int
+    copied: float
 
     def __init__(
         self,
@@ -80,6 +86,7 @@ class Surface(Record, Plottable):
         source: str = "",
         clipped: int | None = None,
         repeated: int | None = None,
+        copied: float | None = None,
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
@@ -90,6 +97,8 @@ class Surface(Record, Plottable):
         object.__setattr__(self, "clipped", there)
         alike = holes.repeated(self.heights) if repeated is None else repeated
         object.__setattr__(self, "repeated", alike)
+        same = holes.copied(self.heights) if copied is None else copied
+        object.__setattr__(self, "copied", same)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -163,6 +172,11 @@ class Surface(Record, Plottable):
             yield (
                 f"{self.repeated:,} pixels had exactly the same height before a trend was removed, "
                 "many more than any other height: if these are missing values, make them nan"
+            )
+        if MANY_COPIED <= self.copied < 1:
+            yield (
+                f"{self.copied:.0%} of the rows or columns equal the one before: the map seems to "
+                "be enlarged by repeating pixels, and tip radii are wrong; use the map as measured"
             )
         if not FLAT <= self.rms_slope <= STEEP:
             rare = f"steeper than {STEEP:g}" if self.rms_slope > STEEP else f"flatter than {FLAT:g}"

@@ -38,6 +38,10 @@ TOTAL = 1e-4
 #: wrong; otherwise all may be.
 FEW_FAR = 0.1
 
+#: Largest accepted distance of a loaded node from its asperity, as a fraction of the distance of
+#: this asperity from its nearest neighbour. At 1 a node may be an asperity that the scene lacks.
+REACH = 0.9
+
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
@@ -110,13 +114,13 @@ class Placing:
         apart = np.full(len(self.scene), self.scene.sphere_radius)
         if len(self.scene) > 1:
             apart = nearest_distances(self.positions)
-        far = loaded & (distances > apart[owners])
+        far = loaded & (distances > REACH * apart[owners])
 
         def fits(points: Array) -> bool:
             """True if points are near to several asperities, and nearer than random points."""
             near, their = _nearest(places, points)
             parts = near / apart[their]
-            return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
+            return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
 
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
         if loaded.any() and not fits(self.points[most]):
@@ -128,9 +132,16 @@ class Placing:
             found = (
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             )
-            self._refuse(i, found, f"less than to its neighbour, {apart[owners[i]]:.3g}")
+            limit = f"{REACH * apart[owners[i]]:.3g}, {REACH:g} of that asperity's distance"
+            self._refuse(i, found, f"at most {limit} from its neighbour")
         if self.column == "pressure":
             self._refuse_repeated(self.points @ [1, 1j], loaded, "each node or pixel once")
+        elif any(bare(name).lower() in INDEX for name in self.table.others):
+            cells = *self.table.columns.values(), *self.table.others.values()
+            firsts = dict[tuple[object, ...], int]()
+            rows = enumerate(zip(*(each.tolist() for each in cells), strict=True))
+            same = np.array([firsts.setdefault(row, i) for i, row in rows])
+            self._refuse_repeated(same, loaded, "each node once")
         self.how = f"{len(owners):,} nodes summed at their nearest asperities"
         return owners
 
@@ -291,12 +302,15 @@ class Placing:
         exchange = _options("column", {"x": called["y"], "y": called["x"]})
         yield f"x and y are exchanged, or the array is turned: {exchange}", points[:, ::-1]
         for names, verb in (("x", "has"), ("y", "has"), ("xy", "have")):
-            ways = _options("scale", dict.fromkeys(names, "-1"))
+            factors = {name: -self.table.factors.get(name, 1.0) for name in names}
+            ways = _options("scale", {name: f"{each:.15g}" for name, each in factors.items()})
             signs = [-1 if name in names else 1 for name in "xy"]
             yield f"{' and '.join(names)} {verb} the other sign: {ways}", points * signs
         for power in (*range(-9, 0), *range(1, 10)):
             found = f"found x, y 10^{power} times as large as the scene's"
             ways = _options("scale", dict.fromkeys("xy", f"{10.0**-power:g}"))
+            if any(bare(self.table.called[name]) != self.table.called[name] for name in "xy"):
+                ways = "correct their units in the header"
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
     def _shifted(self, points: Array) -> str:

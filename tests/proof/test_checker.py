@@ -281,6 +281,11 @@ def test_a_loss_is_claimed_in_order_alone() -> None:
     claim = document["claims"]["shear"][0]
     assert (claim["order"], claim["loss"]) == ("proved for one step", None)
     refused(document, "proved 'proved for one step'", claims__shear__0__order="proved")
+    ordered = cr.press(replace(scenes.paper(), friction=0.5), approach=5e-5)
+    state = cr.shear(ordered, force=0.4 * 0.5 * ordered.load)
+    weaker = json.loads(json.dumps(ordered.proof(sheared=[state]).document))
+    weaker["claims"]["shear"][0] |= {"order": "proved for one step", "loss": None}
+    assert "(proved for one step)" in checker.check(weaker, print)
     refused(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
 
 

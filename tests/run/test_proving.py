@@ -6,8 +6,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from scene_files import HEXAGONAL, scene_text
+
+import convexrough as cr
 
 
 def test_run_proves_and_check_accepts(command: Any, tmp_path: Path) -> None:
@@ -55,6 +58,16 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     wrong = command("verify", "first.toml", "wrong.csv", "--proof", "--force")
     assert wrong.status == 3
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
+
+
+def test_inaccurate_loads_that_hold_are_proved(command: Any, tmp_path: Path) -> None:
+    command("new", "first.toml")
+    scene = cr.read_scene("first.toml")
+    loads = scene.press().loads
+    off = loads * (1 + 0.009 * (-1.0) ** np.arange(len(loads)))
+    (tmp_path / "loads.csv").write_text("load\n" + "".join(f"{each!r}\n" for each in off.tolist()))
+    assert command("verify", "first.toml", "loads.csv", "--proof").status == 0
+    assert command("check", "proof.json").status == 0
 
 
 def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:

@@ -42,6 +42,13 @@ def test_arrays(tmp_path: Path) -> None:
     surface = raw(tmp_path / "a.npz")
     assert (surface.pixel, surface.unit) == ((2.0, 3.0), "mm")
     assert_allclose(surface.heights, 1e-3 * HEIGHTS, rtol=1e-15)
+    y, x = (step * np.arange(n) for step, n in zip((3.0, 2.0), HEIGHTS.shape, strict=True))
+    for pixel in ([2.0, 3.0], [2.0, 2.0]):
+        np.savez(tmp_path / "x.npz", heights=HEIGHTS, pixel=pixel, x=x, y=y)
+        if pixel[1] == 3.0:
+            assert raw(tmp_path / "x.npz").pixel == (2.0, 3.0)
+    with pytest.raises(cr.InputError, match="pixel: found 2 by 2, expected 2 by 3, the steps of x"):
+        raw(tmp_path / "x.npz")
     np.savez(tmp_path / "b.npz", whatever=HEIGHTS.astype(np.float32), other=np.zeros(3))
     assert_array_equal(raw(tmp_path / "b.npz", pixel=1.0).heights, HEIGHTS.astype(np.float32))
     np.save(tmp_path / "i.npy", (100 * HEIGHTS).astype(np.int16))

@@ -148,6 +148,27 @@ def test_not_certified_is_exit_status_three(
 
 
 @pytest.mark.usefixtures("surface")
+def test_inputs_and_files_beside_the_table_are_kept(command: Any) -> None:
+    Path("scan.csv").write_text("1,2,1\n2,3,2\n1,2,1\n")
+    for out, kept in (
+        ("scan.csv", "scan.csv: is an input; --out names another file"),
+        ("link.csv", "link.csv: is an input"),
+    ):
+        if out == "link.csv":
+            Path(out).symlink_to("scan.csv")
+        outcome = command("summits", "scan.csv", "--pixel", "1", "--out", out, "--force")
+        assert outcome.status == 2
+        assert kept in outcome.err
+    for name in ("mine-map.pdf", "mine-provability.csv"):
+        Path(name).write_text("mine")
+        outcome = command("summits", "scan.npz", "--out", "mine.csv", "--formats", "png,pdf")
+        assert outcome.status == 2
+        assert f"{name}: exists already; --force replaces it" in outcome.err
+        Path(name).unlink()
+    assert Path("scan.csv").read_text().startswith("1,2,1")
+
+
+@pytest.mark.usefixtures("surface")
 def test_nothing_is_overwritten_unasked(command: Any) -> None:
     Path("summits.csv").write_text("mine")
     outcome = command("summits", "scan.npz")

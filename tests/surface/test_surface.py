@@ -168,6 +168,10 @@ def test_spikes_and_drop_outs_are_named() -> None:
     told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
     assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
     assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
+    for enlarged in (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3]):
+        (said,) = cr.surface.Surface(enlarged, 10.0).detrend("plane").warnings
+        assert "of the rows or columns equal the one before: the map seems to be enlarged" in said
+    assert cr.surface.Surface(np.tile(made[0], (50, 1)), 10.0).warnings == ()  # a profile
     grooved[7, 9:11] = 0.0
     grooved[90, 0] = 80.0
     (said,) = cr.surface.Surface(grooved, 10.0).warnings

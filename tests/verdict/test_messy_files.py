@@ -143,6 +143,15 @@ def patches(case: Case) -> dict[str, Any]:
     return dict(x=points[:, 0], y=points[:, 1], load=np.repeat(case.loads[touched] / 4, 4))
 
 
+def beside(case: Case, columns: dict[str, Any], part: float) -> dict[str, Any]:
+    """The rows, and a load farther out than an asperity by this part of its nearest distance."""
+    places = case.contact.scene.contact_points
+    out = int(np.argmax(places[:, 0]))
+    apart = np.sort(np.hypot(*(places - places[out]).T))[1]
+    more = (places[out, 0] + part * apart, places[out, 1], 1e-3 * case.loads.max())
+    return {name: [*each, one] for (name, each), one in zip(columns.items(), more, strict=True)}
+
+
 def fine_and_coarse() -> Any:
     """The pixels on the left, and every third one of every third row on the right."""
     row, column = np.divmod(np.arange(121**2), 121)
@@ -336,6 +345,13 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                         "x and y are exchanged, or the array is turned: --column x=y --c"),
     "columns that differ in case": (lambda case: case.table(Load=case.loads), "",
                                     "found 'load' and 'Load', expected one of them: --column"),
+    "a load at a site that the scene lacks": (
+        lambda case: beside(case, patches(case), 1.0), "a.csv --nodes",
+        "0.9 of that asperity's distance from its neighbour"),
+    "a node twice": (
+        lambda case: {name: [*each, each[0]] for name, each in
+                      ({"node": np.arange(len(patches(case)["x"]))} | patches(case)).items()},
+        "a.csv --nodes", "found the same position as in row", "expected each node once"),
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",
                 "all are shifted by [0.0003, 0]"),
     "loaded nodes only": (lambda case: touching(case, case.table()), "",
@@ -486,6 +502,27 @@ def test_units_of_summits(
     assert (outcome.status, outcome.out) == (2, "")
     assert said in outcome.err
     assert ("convert = true" in outcome.err) == ("of force" not in said)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ((-1e3, 1e3), "x has the other sign: --scale x=-0.001"),
+        ((1e6, 1e6), "10^3 times as large as the scene's, expected the scene's unit of length: "
+         "correct their units in the header"),
+    ],
+)  # fmt: skip
+def test_advice_where_headers_name_units(
+    tmp_path: Path, command: Any, case: Case, factors: tuple[float, float], said: str
+) -> None:
+    write_scene(tmp_path, units=METRES + "\nconvert = true")
+    x, y = (PLACES[case.order] * factors).T
+    made = put(tmp_path, {"x [mm]": x, "y [mm]": y, "load": case.loads[case.order]})
+    outcome = command("verify", "scene.toml", made)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert said in outcome.err
+    if "--scale" in said:
+        assert command("verify", "scene.toml", made, *said.split()[-2:]).status == 0
 
 
 def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None:
