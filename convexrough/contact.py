@@ -50,8 +50,8 @@ class Contact(Cached, Table, Plottable):
     approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : estimated relative error of the displacements at loaded asperities, made by
-        point forces in place of pressures: the largest of `surface.model_errors`
+    model_error   : estimate of the relative error of displacements at loaded asperities that arises
+        because point forces replace pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
         1, contact discs overlap and the model fails
     candidates    : number of asperities that can touch; the solver leaves out the others

@@ -89,9 +89,10 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     """(...) [length] sum of both surfaces' displacements along x, relative to the distant bodies.
 
-    It is the sum over asperities of (3.91) in Johnson (1985) for both bodies: [A3] and [A4] of Dini
-    and Hills (2009). Where the surfaces stick, the exact value is the relative displacement of the
-    bodies. This sum only approximates it, because `shear` averages compliances over directions.
+    It adds, over the asperities, the displacement (3.91) of Johnson (1985) for both bodies. Dini
+    and Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the
+    relative displacement of the bodies. This sum only approximates it, because `shear` averages
+    compliances over directions.
     """
     asperities = _Sheared(state)
     material = state.contact.scene.material

@@ -38,7 +38,7 @@ def run(
 ) -> int:
     """Compute a scene; write tables, certificate and figures.
 
-    Results go to the folder SCENE-results unless --out names another. If the file has a table
+    Results of a.toml go to the folder a-results unless --out names another. If the file has a table
     [sweep], the command does the same as `convexrough sweep`.
     """
     from convexrough import checks

@@ -99,7 +99,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 @click.argument("surface", type=PATH)
 @click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file.")
 @click.option("--radius", metavar="R", type=float,
-              help="Radius of the sphere in the unit of the map, without --scene.")  # fmt: skip
+              help="Radius of the sphere, in the unit of the map; not with --scene.")  # fmt: skip
 @click.option("--approach", metavar="D", type=float,
               help="Prescribed approach, in the unit of the map.")  # fmt: skip
 @click.option("--load", metavar="P", type=float, help="Prescribed load.")

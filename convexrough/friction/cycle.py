@@ -207,9 +207,8 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative. In gross sliding it has none in two cases:
-        if several asperities start to slide last, at the same force, or if the approach is kept
-        constant.
+        Raises InputError if the loss has no derivative. In gross sliding it has none if the
+        approach is kept constant, or if the last asperities to slide start at one force.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -429,7 +428,10 @@ class _Closed(Walk):
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
-    """The steady cycles of closed paths with one start; `asked` has points, loads and forces."""
+    """The steady cycles of several closed paths that begin from the same memory curve.
+
+    asked : points, loads and forces of each path
+    """
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
@@ -545,7 +547,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop through the points where Q has fallen, and then risen again, by 2 `way`."""
+    """The loop through Q = maximum - 2 way as Q falls, and Q = minimum + 2 way as it rises."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

@@ -132,9 +132,8 @@ class ShearState(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if there is no derivative. In gross sliding there is none in two cases: if
-        several asperities start to slide last, at the same force, or if the approach is kept
-        constant.
+        Raises InputError if there is no derivative. In gross sliding there is none if the approach
+        is kept constant, or if the last asperities to slide start at one force.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -165,8 +164,8 @@ def shear(
 
     Prescribe one of the two:
 
-    force        : [force] shear force Q. A force within 16 roundoffs of the friction limit f P
-        counts as f P: gross sliding
+    force        : [force] shear force Q. If its relative difference from the friction limit f P is
+        at most 16 * 2^-53, it counts as f P, which means gross sliding
     displacement : [length] relative tangential displacement of distant points
 
     Raises InputError if the scene has no friction, |Q| exceeds f P, or the displacement exceeds
@@ -274,7 +273,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
     `force_errors` are bounds on the differences between the given forces and the solution. An
     asperity gets the status that it has in the solution if its entry of `force_errors` is small
-    enough. For "sliding" it must be below 1 % of the friction limit f P_i; for "partial" it must be
+    enough, or if it is open. For "sliding" it must be below 1 % of the friction limit f P_i; for "partial" it must be
     below the margin f P_i - |Q_i|, with the force Q_i of the solution. Otherwise the asperity is
     "undecided". The rest of the certificate is that of the solution.
 
