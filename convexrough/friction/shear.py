@@ -272,10 +272,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     force  : [force] the prescribed sum of the shear forces
 
     `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity gets the status that it has in the solution if its entry of `force_errors` is small
-    enough, or if it is open. For "sliding" it must be below 1 % of the friction limit f P_i; for "partial" it must be
-    below the margin f P_i - |Q_i|, with the force Q_i of the solution. Otherwise the asperity is
-    "undecided". The rest of the certificate is that of the solution.
+    asperity gets the status that it has in the solution if it is open there, or if its entry of
+    `force_errors` is small enough. For "sliding" it must be below 1 % of the friction limit f P_i;
+    for "partial" it must be below the margin f P_i - |Q_i|, with the force Q_i of the solution.
+    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.
