@@ -33,7 +33,14 @@ from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import points_of, pressed_for
-from convexrough.friction.state import Point, by_status, displacements_of, states_of, stick_radii
+from convexrough.friction.state import (
+    LevelSums,
+    Point,
+    by_status,
+    displacements_of,
+    states_of,
+    stick_radii,
+)
 from convexrough.friction.walk import Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
@@ -438,7 +445,8 @@ def _cycles(
     for needed in sorted((each.needed for each in closed), key=min):
         levels.order(needed)  # a proof for the widest range of loads holds for the others
     spent = losses(levels, [pieces for each in closed for pieces in (each.first, each.later)])
-    moved = displacements_of(levels, [curve for each in closed for curve in each.steady])
+    steady = LevelSums.of([curve for each in closed for curve in each.steady])
+    moved = displacements_of(levels, steady)
     ends = np.cumsum([0, *(each.once for each in closed)]).tolist()
     return [
         _cycle(contact, *path[1:], each, spent[2 * k : 2 * k + 2], moved[slice(*far)])

@@ -93,9 +93,8 @@ class LevelSums(NamedTuple):
         return total
 
 
-def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> Ball:
+def displacements_of(levels: FrictionLevels, sums: LevelSums) -> Ball:
     """(m,) [length] the displacement X of each curve."""
-    sums = LevelSums.of(curves)
     approaches = Ball.stacked([levels.at(load).approach for load in sums.used])
     return sums.total(approaches) * levels.travel_unit
 
@@ -111,7 +110,7 @@ def states_of(
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
     travel = levels.travel_unit
     fields = (
-        displacements_of(levels, curves),
+        displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,
         sums.total(moved) * travel,
         -sums.total((-moved).positive_part()) * travel,
