@@ -193,7 +193,7 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 
 
 def solver_named(name: str) -> solvers.Solver:
-    """The solver with this name in scene files, or `package.Class()` for a name with a dot.
+    """The solver that scene files call by this name; for a name with a dot, `package.Class()`.
 
     Raises InputError where there is no such solver.
     """

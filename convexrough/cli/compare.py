@@ -38,7 +38,7 @@ def compare(
     If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
     solvers are compared with Newton's method.
 
-    The exit status is 3 if a result is not certified, if a load differs from Newton's by more than
+    The exit status is 3 if no result is certified, if a load differs from Newton's by more than
     --within, if a solver does not support the scene, or if two certified results contradict each
     other, which would reveal a mistake in the mathematics or the code.
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from convexrough.cli.options import PATH, figure_options, json_option
+from convexrough.cli.options import FORMATS, PATH, figure_options, json_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
@@ -154,7 +154,7 @@ def summits(
     how.check()
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
-    _claim(out, formats, force, reads=[surface, *([how.scene] if how.scene else [])])
+    _claim(out, force, reads=[surface, *([how.scene] if how.scene else [])])
     with progress(f"reading {surface}"):
         scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
         with blamed_on(surface):
@@ -169,8 +169,17 @@ def summits(
     return DONE if scanned.certified else NOT_CERTIFIED
 
 
-def _claim(path: Path, formats: tuple[str, ...], force: bool, reads: list[Path]) -> None:
-    """Raise FileError unless the table and the files beside it may be written.
+def _outputs(table: Path) -> list[Path]:
+    """The table of summits and all files that a run may write beside it."""
+    figures = [
+        f"{stem}.{kind}" for stem in ("map", "histograms", "provability") for kind in FORMATS
+    ]
+    names = (f"{table.stem}-{name}" for name in ("provability.csv", *figures))
+    return [table, *map(table.with_name, names)]
+
+
+def _claim(path: Path, force: bool, reads: list[Path]) -> None:
+    """Raise FileError unless the table and the files beside it may be replaced or written.
 
     reads : input files, which must not be replaced
     """
@@ -178,11 +187,7 @@ def _claim(path: Path, formats: tuple[str, ...], force: bool, reads: list[Path])
         raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
     if not path.parent.is_dir():
         raise FileError(f"{path}: no folder {path.parent}")
-    figures = [
-        f"{stem}.{kind}" for stem in ("map", "histograms", "provability") for kind in formats
-    ]
-    also = (path.with_name(f"{path.stem}-{name}") for name in ("provability.csv", *figures))
-    for each in filter(Path.exists, (path, *also)):
+    for each in filter(Path.exists, _outputs(path)):
         if any(each.samefile(read) for read in reads if read.exists()):
             raise FileError(f"{each}: is an input; --out names another file")
         if not force:
@@ -190,7 +195,10 @@ def _claim(path: Path, formats: tuple[str, ...], force: bool, reads: list[Path])
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """Write the table of summits, the results against pruning and the figures; return paths."""
+    """Write the table of summits, the results against pruning and the figures; return paths.
+
+    Other files of an earlier run are removed.
+    """
     from convexrough.run.results import write_figures, write_tables
     from convexrough.surface.report import curve_columns, summit_columns
 
@@ -206,4 +214,6 @@ def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> li
         )
         named = {f"{path.stem}-{stem}": figure for stem, figure in pictures.items()}
         files += write_figures(path.parent, named, **saved)
+    for each in set(_outputs(path)) - set(files):
+        each.unlink(missing_ok=True)
     return files

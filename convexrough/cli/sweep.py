@@ -124,6 +124,7 @@ def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bo
     if out is not None:
         with progress("writing results"):
             lines += written(out, report.write_summary(out, table, found, overwrite=overwrite))
+        lines += report.figures_left_out(table)
     echo({**said, "quantiles": rows_of(found)}, lines, as_json)
     return _status(said)
 

@@ -68,7 +68,7 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
               help="Largest distance of a position from its asperity; default 1 % of the smallest "
               "spacing.")  # fmt: skip
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Header or number (from 1) of the column with load, x, y, ...")  # fmt: skip
+              help="Read NAME (load, x, y, ...) from this column, a header or number.")  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
               help="Multiply the numbers of a column by FACTOR.")  # fmt: skip
 @click.option("--sign", type=click.Choice(["1", "-1"]), default="1",

@@ -41,7 +41,8 @@ class Number(NamedTuple):
     value    : J
     scaled   : the part of J that consists of energies and loads. If the modulus and all loads are
         multiplied by a number, this part is multiplied by the same number
-    pulled   : for each level the derivatives of its part of J, for the candidates of `problem`
+    pulled   : for each level the derivatives of its part of J by the load, and by offsets, local
+        coefficients and compliances of the candidates
     slopes   : derivatives of J by parameters outside the scene's geometry, by name
     steep    : if J contains D0 at the load 0, the factors of dD0/dL, which is infinite there
     sides    : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
@@ -101,8 +102,9 @@ class Gradient(Table, Plottable):
     derivative is at constant values of the other parameters listed here. Shear forces Q are kept
     constant; their fractions of f P, or a prescribed displacement, are not. If instead the
     displacement X is kept constant, a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is
-    twice the derivative of W by `maximum`. X_Q is the derivative of X by `force`, from the gradient
-    of the `shear` state whose force is the amplitude of the cycle.
+    the derivative of W by the amplitude of the cycle, twice that by `maximum`. X_Q is the
+    derivative of X by `force`, from the gradient of the `shear` state whose force is the amplitude
+    of the cycle.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
@@ -113,7 +115,7 @@ class Gradient(Table, Plottable):
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant
     heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for
-        screened asperities, and for open ones unless the number contains their gap
+        asperities that cannot touch, and for open ones unless the number contains their gap
     positions       : (n, 2) derivatives by x and y, with zeros as in `heights`
     sphere_radius   : derivative by the radius; None for shapes other than a sphere
     contact_modulus : derivative at constant Poisson's ratio

@@ -244,7 +244,7 @@ def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """The factor at which the shear force over f of each asperity varies by 2 P_i."""
+        """The factor at which each asperity's shear force, divided by f, varies by 2 P_i."""
         ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
         return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
 

@@ -91,7 +91,7 @@ class Certificate(Table):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) "contact" (its load is proved positive), "open" (its gap is) or "undecided"."""
+        """(n,) "contact" if a load is proved positive, "open" if a gap is, else "undecided"."""
         return frozen(STATUSES[self.codes])
 
     @property
@@ -237,7 +237,7 @@ def _apart(loads: Array, found: Proved) -> Array:
 
 
 def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
-    """(N,) bounds on the errors of loads. Those of asperities that cannot touch are the loads."""
+    """(N,) bounds on the errors of loads: the loads themselves where an asperity cannot touch."""
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
     errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
@@ -299,7 +299,10 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2: loads s where contact is impossible."""
+    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on screened asperities.
+
+    These cannot touch; g are their gaps.
+    """
     screened = loads.copy()
     screened[problem.candidates] = 0.0
     which = np.flatnonzero(screened)

@@ -76,7 +76,8 @@ class Program(Record):
         """(n,) [force] loads of all asperities of the scene, from a solver's solution.
 
         values : the solution x, with or without the last variable that a file in CBF adds. For
-            the dual, the multipliers of the equations in the order of the file, of either sign
+            the dual, the multipliers of the equations in the order of the file; solvers differ in
+            their sign, and both signs are accepted
 
         Raises InputError for a wrong number of values.
         """
@@ -142,7 +143,7 @@ def program(
     """The contact problem of a scene as a convex program in standard form.
 
     form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
-        program, with an error of about 0.4 / bristles^2 of the largest load)
+        program, with an error of about 0.4 / bristles^2 of the largest load without coupling)
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 
@@ -241,7 +242,7 @@ def _bristle_error(rows: BristleProgram, own: Array) -> float:
     """Estimated error of the loads of the bristle program, relative to the largest load.
 
     With m bristles and the box 0 <= load <= B, the load of one asperity has an error of at most
-    0.375 B / m^2. Coupling magnifies it by at most one over the smallest scaled eigenvalue.
+    0.375 B / m^2. Coupling multiplies it by at most 1 / lambda, the smallest scaled eigenvalue.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])

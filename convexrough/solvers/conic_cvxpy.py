@@ -214,7 +214,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @property
     def variables(self) -> dict[str, Any]:
-        """The variables p, y1 (with five cones) or y2 to y5, and z, by name."""
+        """The variables by name: p, y2 to y5 and z; with five cones also y1."""
         return {variable.name(): variable for variable in self.program.variables()}
 
     @property

@@ -94,6 +94,13 @@ def write_summary(
         return write_tables(new, {"quantiles": found}) + write_figures(new, figures)
 
 
+def figures_left_out(table: SweepTable) -> list[str]:
+    """A line with the number of figures that `write_summary` leaves out; [] if it draws all."""
+    more = len(table.swept) * len(table.measured) - MOST_FIGURES
+    advice = "cr.open_sweep(DIR).plot(quantity, key) draws each in Python"
+    return [f"not drawn: {more} more figures; {advice}"] if more > 0 else []
+
+
 def progress_kept(folder: Path, plan: Plan) -> str:
     """A message about the rows of an interrupted sweep in a folder, and how to continue it."""
     if not (folder / MANIFEST).exists():

@@ -164,7 +164,12 @@ def test_inputs_and_files_beside_the_table_are_kept(command: Any) -> None:
         outcome = command("summits", "scan.npz", "--out", "mine.csv", "--formats", "png,pdf")
         assert outcome.status == 2
         assert f"{name}: exists already; --force replaces it" in outcome.err
-        Path(name).unlink()
+        assert (
+            command("summits", "scan.npz", "--out", "mine.csv", "--no-figures", "--force").status
+            == 0
+        )
+        assert not Path(name).exists()
+        Path("mine.csv").unlink()
     assert Path("scan.csv").read_text().startswith("1,2,1")
 
 

@@ -201,7 +201,7 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
 
 
 @pytest.mark.usefixtures("no_processes")
-def test_the_command(command: Any, tmp_path: Path) -> None:
+def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
     status, out, err = command("sweep", "a.toml", "--workers", "1")
     assert (status, err) == (0, "")
@@ -213,6 +213,11 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
     assert len([line for line in out.splitlines() if "loss_0.37" in line]) == 4 + 1
     written = {path.name for path in (tmp_path / "b").iterdir()}
     assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
+    assert "not drawn" not in out
+    monkeypatch.setattr("convexrough.sweeps.report.MOST_FIGURES", 1)
+    status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
+    (drawn,) = (tmp_path / "c").glob("*.png")
+    assert f"not drawn: {len(written) - 3} more figures; cr.open_sweep(DIR).plot(" in out
 
 
 @pytest.mark.usefixtures("no_processes")
