@@ -338,6 +338,8 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
         loads = checks.array("loads", solution.loads, length=len(problem), sign="not negative")
     except InputError as error:
         raise SolverError(f"no loads were found: {error}", solver=solver.name) from error
+    if problem.load is not None and not loads.any():
+        raise SolverError("all loads are 0, but a total is prescribed", solver=solver.name)
     return replace(solution, loads=loads)
 
 

@@ -1,8 +1,8 @@
 """Assertions for the tests of other software: forces are certified, or two results agree.
 
 Each function raises AssertionError with the asperities concerned, their errors and statuses; none
-needs a test framework. Each raises InputError for loads that are negative or not finite, and if the
-number of loads is wrong.
+needs a test framework. Each raises InputError for numbers that are not finite, for negative loads,
+and if their number is wrong.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def assert_shear_certified(
 ) -> ShearCertificate:
     """The certificate of shear forces, after a check that exactly the claimed asperities slide.
 
-    forces  : (n,) [force] along the shear force, after loading from rest, from any source
+    forces  : (n,) [force] shear force of each asperity on first loading, from any source
     force   : [force] their prescribed sum
     within  : largest error of a force, as a fraction of the largest force
     sliding : (n,) True where sliding is claimed; default: where the force is the coefficient of
@@ -96,7 +96,7 @@ def assert_agree(
 
     A contradiction is what `compare.contradictions` reports: proved statuses differ, or values
     differ by more than the sum of their error bounds. Raises AssertionError with the asperities
-    concerned, and InputError if the two results are of different problems.
+    concerned, and InputError if the numbers of asperities or the prescribed quantities differ.
     """
     __tracebackhide__ = True
     within = tolerance("within", within)

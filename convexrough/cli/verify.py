@@ -170,7 +170,8 @@ def verify(
     lines = report.describe_verdict(found)
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
-    echo(summary, lines, as_json, cautions_about(file.scene, found.verdict.loads))
+    claimed = found.verdict.loads * found.verdict.claimed
+    echo(summary, lines, as_json, cautions_about(file.scene, claimed))
     for claim in found.claims:
         for hint in claim.hints():
             say_aside("hint", hint)

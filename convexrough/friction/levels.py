@@ -6,7 +6,7 @@ coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
 
 A rational number [force] identifies a level. If the load is prescribed, this number is the total
 load of the level. If the approach is prescribed, the load P is only known to thirty digits. Then
-the float64 number nearest to P identifies P, and a number smaller by x identifies the load P - x.
+the float64 number p nearest to P identifies P, and p - x identifies the load P - x.
 The number 0 always identifies the load 0.
 """
 
@@ -125,7 +125,7 @@ class FrictionLevels:
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
-        """[force] the load P - Q / f at which first loading reaches the displacement X >= 0.
+        """[force] P - Q / f for the shear force Q at which first loading has displaced by X >= 0.
 
         The level there has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
         exceeds the displacement of gross sliding.
@@ -244,10 +244,10 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
     Order means that no indentation falls as the load rises. The result is "proved", "proved for one
-    step" or "fails", as in `Cycle.order`. Later results for this contact reuse the proof. For some
-    asperities, mostly at the edge of the contact, the proof needs a search, which takes some
-    milliseconds for each. Without this call the search is made for at most 1,000 asperities, and
-    only if at most 10,000 touch.
+    step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse the
+    proof. For some asperities, mostly at the edge of the contact, the proof needs a search, which
+    takes some milliseconds for each. Without this call the search is made for at most 1,000
+    asperities, and only if at most 10,000 touch.
 
     most : largest number of asperities for which the search is made; at most ten times as many may
         touch

@@ -91,7 +91,8 @@ def phase_losses(
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
     phases  : (m,) [rad] from -pi to pi
     factors : (k,) factors by which both amplitudes are multiplied
-    chords  : number of chords per ellipse; the relative error of the loss is about chords^-2
+    chords  : number of chords per ellipse. They reduced the loss by a fraction of at most
+        12 / chords^2 in tests
     influence : compliance operator, as in `load_path`
 
     Raises the errors of `elliptic_path` and `steady`.

@@ -96,7 +96,7 @@ class LatticeInfluence:
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) indices of the sites in rows as long as the transforms."""
+        """The box, and (n,) flat indices of sites in an array with rows of the padded length."""
         basis, places = self.lattice.basis / self.spacing, self.places
         if len(places) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)

@@ -179,7 +179,7 @@ class Claim(ABC):
         elif power := _power_of_ten(abs(factor)):
             prefix = PREFIXES.get(power)
             unit = self.of.units.force or "N"
-            example = f", as {prefix}{unit} for {unit}" if prefix else ""
+            example = f", as {prefix}N for N" if prefix and unit == "N" else ""
             modulus = ", or of the modulus" if self.total_prescribed is None else ""
             size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
         return " and ".join(filter(None, ("have the other sign" if factor < 0 else "", size)))

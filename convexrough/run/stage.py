@@ -1,6 +1,6 @@
 """Base classes of stages and of their results.
 
-A stage is a table of the scene file that requests a result, and checks its own keys. It computes
+A stage is a table of the scene file that requests a result. Its class checks the keys, and computes
 the result from a pressed contact; printed lines, tables, figures and the summary are derived from
 it. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
 an entry in `STAGES` there; docs/architecture.md shows an example with 40 lines.
@@ -56,7 +56,7 @@ MOST_PRINTED = 20
 
 
 class Stage(FileTable):
-    """A table of the scene file that requests a result of a pressed contact, and checks itself.
+    """A table of the scene file, which requests a result of a pressed contact; it checks its keys.
 
     name       : name of the table
     frictional : True if it needs the table [friction]
@@ -112,7 +112,7 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`; for other names, the attribute `name`.
+    """If `name` is a status, the number of asperities with it; else the attribute `name`.
 
     The attribute is that of `found`, or of `found.certificate` if `found` has no such attribute.
     """
@@ -242,7 +242,7 @@ class Result(Table, Plottable):
 
 
 class Steps(Result):
-    """The result of a stage with consecutive steps: one object with an entry for each step."""
+    """The result of a stage with consecutive steps; arrays of `found` have an entry for each."""
 
     steps = True
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, blamed_on
 from convexrough.scene.asperities import Asperities
 from convexrough.tabular.arrays import reading
@@ -18,6 +19,9 @@ from convexrough.tabular.units import parsed
 
 #: Columns of results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
+
+#: Relative rounding error of means and sums in a table.
+ROUNDED = 1e-3
 
 
 def read_text(path: Path, most: int) -> str:
@@ -63,6 +67,9 @@ def read_summits(
             found = f"{cells[0]:g}, {cells[1]:g}, ..."
             expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
+    if what := _summary_in_last_row([*columns.values()]):
+        raise InputError(table.rows[-1], found=f"the {what} of the other rows",
+                         expected="an asperity: remove this row", where=str(path))  # fmt: skip
     given = columns.get("tip_radius")
     if (given is None) == (tip_radius is None):
         found = "neither" if given is None else "both"
@@ -73,6 +80,20 @@ def read_summits(
     assert radii is not None  # one of the two
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
+
+
+def _summary_in_last_row(columns: list[Array]) -> str:
+    """ "means" or "sums" if the last entries of all columns are those of the others; else ""."""
+    if (
+        len(columns[0]) < 4
+        or any(np.ptp(each[:-1]) == 0 for each in columns[2:])
+        or not columns[2:]
+    ):
+        return ""  # the middle of a regular array is its mean
+    for what, of in (("means", np.mean), ("sums", np.sum)):
+        if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
+            return what
+    return ""
 
 
 def is_permuted(cells: NDArray[Any]) -> bool:

@@ -51,7 +51,7 @@ def sweep(
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
 ) -> SweepTable:
-    """A table of measured numbers of many scenes.
+    """A table with a row for each of many scenes, and a column for each measured number.
 
     what     : a sweep file; or its tables, as a mapping; or scenes
     approach, load : only if `what` is scenes: either approaches [length] or loads [force], one

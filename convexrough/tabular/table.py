@@ -398,7 +398,8 @@ def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str
 
     for i, name in enumerate(source.header or []):
         for each in (each for each in wanted if each not in places and i not in places.values()):
-            if SequenceMatcher(None, bare(name).lower(), each).ratio() > LOOKS_LIKE:
+            alike = SequenceMatcher(None, bare(name).lower(), each).ratio()
+            if LOOKS_LIKE < alike < 1:  # equal names are those of columns called otherwise
                 expected = f'a known column; did you mean "{each}"?'
                 yield f"columns: found {bare(name)!r}, expected {expected}"
 

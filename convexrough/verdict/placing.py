@@ -58,8 +58,9 @@ Fits = Callable[[Array], bool]
 
 @dataclass
 class Placing:
-    """How the rows of a table are assigned to asperities: `how` in words, and `mistakes`.
+    """The assignment of the rows of a table to asperities.
 
+    how, mistakes : how this was done, in words; sentences on what is wrong with the rows
     column : the name of the column of loads, pressures or forces
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : True if asperities without a row are open
@@ -107,7 +108,7 @@ class Placing:
         return found
 
     def nearest(self, values: Array) -> Indices:
-        """The nearest asperity of each node or pixel; a loaded one must be near its asperity."""
+        """The nearest asperity of each node or pixel; `mistakes` gets loaded ones that are far."""
         assert self.points is not None
         places, loaded = self.scene.contact_points, values != 0
         distances, owners = _nearest(places, self.points)
@@ -117,7 +118,7 @@ class Placing:
         far = loaded & (distances > REACH * apart[owners])
 
         def fits(points: Array) -> bool:
-            """True if points are near to several asperities, and nearer than random points."""
+            """True if all are near asperities, not all near one, and nearer than random points."""
             near, their = _nearest(places, points)
             parts = near / apart[their]
             return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
@@ -148,7 +149,7 @@ class Placing:
     # By an index, or in order
 
     def _numbered_or_in_order(self) -> tuple[Indices, bool]:
-        """The asperities by a column that numbers them, and True; else those in order."""
+        """(asperities, True) by a column that numbers them; else (asperities in order, False)."""
         headers = self.table.others
         places = {it[0].lower(): it for it in headers if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
         if len(places) == 2:
@@ -164,7 +165,7 @@ class Placing:
         return np.arange(rows), False
 
     def _indices(self) -> dict[str, Indices]:
-        """Unread columns of whole numbers: indices by name, then permutations of any name."""
+        """Unused columns that can be indices, by header: first those that are called so."""
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
@@ -284,11 +285,11 @@ class Placing:
         return owners
 
     def _misread(self, rows: NDArray[np.bool_], fits: Fits) -> str:
-        """A sentence on the columns, sign or unit of x and y with which rows fit; else ""."""
+        """A sentence on other columns, signs or units of x and y if the rows fit then; else ""."""
         return next((said for said, points in self._readings(rows) if fits(points)), "")
 
     def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
-        """Other readings of x and y: what to say of each, and its points."""
+        """Other ways to interpret x and y: the message, and the points that each gives."""
         held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
         called = {name: quote(bare(self.table.called[name])) for name in held}
         headed = not all(map(str.isdecimal, called.values()))
@@ -299,7 +300,8 @@ class Placing:
                 named = dict(zip(held, map(called.__getitem__, order), strict=True))
                 yield f"{found}: {_options('column', named)}", np.column_stack((held[a], held[b]))
         points = np.column_stack((held["x"], held["y"]))[rows]
-        exchange = _options("column", {"x": called["y"], "y": called["x"]})
+        exchanged = {"x": called["y"], "y": called["x"]}
+        exchange = _options("column", exchanged if headed else called | exchanged)
         yield f"x and y are exchanged, or the array is turned: {exchange}", points[:, ::-1]
         for names, verb in (("x", "has"), ("y", "has"), ("xy", "have")):
             factors = {name: -self.table.factors.get(name, 1.0) for name in names}
@@ -345,14 +347,14 @@ class Placing:
     def _refuse_repeated(
         self, places: NDArray[Any], chosen: NDArray[np.bool_], expected: str
     ) -> None:
-        """Add a mistake for each row, of those chosen, with the place of an earlier one."""
+        """Add a mistake for each chosen row that has the same place as an earlier row."""
         _, first, back = np.unique(places, return_index=True, return_inverse=True)
         for i in np.flatnonzero((first[back] != np.arange(len(places))) & chosen):
             self._refuse(i, f"the same position as in {self.table.rows[first[back[i]]]}", expected)
 
 
 def unused(table: ReadTable) -> str:
-    """The end of a message, with names of columns that are not read, some if they are many."""
+    """The end of a message: the names of at most `MOST_UNREAD` columns that are not used."""
     names = [*filter(None, table.others)]
     more = f" and {len(names) - MOST_UNREAD} more" if len(names) > MOST_UNREAD else ""
     return f"; not used: {', '.join(names[:MOST_UNREAD])}{more}" if names else ""

@@ -71,6 +71,11 @@ def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
         cr.press(paper(), **control, solver=Liar(NO_LOADS[kind]))
 
 
+def test_loads_that_are_all_zero_are_an_error_under_a_total() -> None:
+    with pytest.raises(cr.SolverError, match="liar: all loads are 0, but a total is prescribed"):
+        cr.press(paper(), load=2e-7, solver=Liar(lambda loads, rng: 0.0 * loads))
+
+
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("kind", WRONG)
 @pytest.mark.parametrize("name", ["paper", "rough, closest"])

@@ -408,6 +408,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pixels under other names": (
         lambda case: case.pixels("X1 X2 pressure"), "",
         "found neither x nor y, expected both, of nodes or pixels; not used: X1, X2"),
+    "no header, y and x exchanged": (
+        lambda case: matrix(case.table())[:, [1, 0, 2]], "a.npy",
+        "x and y are exchanged, or the array is turned: --column x=2 --column y=1 --column load=3"),
     "a row twice": (lambda case: (text := lines(case.table())) + text.splitlines()[3] + "\n", "",
                     "rows: found 13, expected 12, one per asperity of the scene\n",
                     "row 14: found the same position as in row 4, expected each asperity once"),
@@ -425,7 +428,8 @@ REFUSED: dict[str, tuple[Any, ...]] = {
 #: One cause is all there is to say.
 MOVED = ("x and y exchanged", "x mirrored", "shifted", "places in mm", "places in km",
          "pixels in mm", "pixels shifted", "nodes in km", "nodes mirrored",
-         "nodes exchanged", "no header, and another order")  # fmt: skip
+         "nodes exchanged", "no header, and another order",
+         "no header, y and x exchanged")  # fmt: skip
 
 
 @pytest.mark.sample(8)
@@ -523,6 +527,16 @@ def test_advice_where_headers_name_units(
     assert said in outcome.err
     if "--scale" in said:
         assert command("verify", "scene.toml", made, *said.split()[-2:]).status == 0
+
+
+@pytest.mark.parametrize("of", [np.mean, np.sum])
+def test_a_row_of_means_is_no_asperity(tmp_path: Path, command: Any, case: Case, of: Any) -> None:
+    columns = {"x": PLACES[:, 0], "y": PLACES[:, 1], "height": HEIGHTS}
+    more = {name: np.round([*each, of(each)], 12) for name, each in columns.items()}
+    (tmp_path / "summits.csv").write_text(lines(more))
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert f"row 14: found the {of.__name__}s of the other rows, expected an" in outcome.err
 
 
 def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None:
