@@ -54,7 +54,7 @@ def _together(*options: Callable[[Command], Command]) -> Callable[[Command], Com
 
 
 def _formats(given: str) -> tuple[str, ...]:
-    formats = tuple(each.strip().lower() for each in given.split(","))
+    formats = tuple(dict.fromkeys(each.strip().lower() for each in given.split(",")))
     if unknown := [each for each in formats if each not in FORMATS]:
         raise click.BadParameter(f"found {unknown[0]!r}, expected {', '.join(FORMATS)}")
     return formats

@@ -238,7 +238,7 @@ class Claim(ABC):
         after scaling them to the sum of the solution.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
-        if nearby is None or (self.near_enough and not len(wrong)):
+        if nearby is None or self.near_enough:
             return frozen(wrong[np.argsort(-self.errors[wrong], kind="stable")])
         true, bounds = nearby
         scales = [1.0]
@@ -247,7 +247,7 @@ class Claim(ABC):
         apart = min((np.abs(scale * self.values - true) for scale in scales), key=np.sum)
         least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
         order = np.argsort(-apart, kind="stable")
-        stand_out = apart > least
+        stand_out = (apart > least) & (np.abs(self.values - true) > least)  # also unscaled
         stand_out[wrong] = True
         return frozen(order[stand_out[order]])
 

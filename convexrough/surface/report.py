@@ -174,8 +174,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     described = labelled(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
-        doubts = surface.warnings or (scanned.contact is not None and scanned.contact.warnings)
-        more = ", but see the warnings" if doubts else ""
+        more = ", but see the warnings" if any(warnings_about(scanned)) else ""
         described += ["", *_describe_curve(scanned.curve, surface.unit, more)]
     if scanned.contact is not None:
         described += _describe_crowded(scanned.contact)

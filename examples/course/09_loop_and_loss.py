@@ -71,8 +71,8 @@ assert abs(naive_loss(0.5) / cr.cycle(pressed, maximum=0.5 * limit).loss - 1) < 
 assert abs(naive_loss(1e-6) / tiny.loss - 1) > 10
 
 # %%
-# At large amplitudes the result is right. At small amplitudes no digit is right, and even the sign
-# is wrong: energies of size :math:`P D_0` are subtracted, and their difference is of third order in
+# At large amplitudes the result is right. At small amplitudes no digit is right, sometimes not even
+# the sign: energies of size :math:`P D_0` are subtracted, and their difference is of third order in
 # :math:`Q`. Dampers work at small amplitudes.
 #
 # The repair

@@ -34,6 +34,9 @@ def test_a_run(command: Any) -> None:
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     assert "indentations increase with the load: proved" in outcome.out
+    assert (
+        outcome.out.count("a path of 12 chords; the ellipse loses more, in our tests by at m") == 1
+    )
     summary = json.loads(Path("out/summary.json").read_text())
     assert summary["path"]["displacement"][3] == pytest.approx(
         -1.4399972915528e-06, rel=1e-11, abs=0.0

@@ -216,6 +216,13 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     assert row["force_error"] >= spoiled[4] - state.forces[4]
     assert "the total force is not the prescribed one" in outcome.err
 
+    other = cr.shear(contact, force=1.1 * state.force)
+    right = np.abs(other.forces - state.forces) <= 1e-12 * state.forces.max()
+    assert right[contact.loads > 0].any()
+    found = json.loads(command(*asked, shear_file(other.forces), "--json").out)
+    assert found["shear_verdict"]["suspects"]
+    assert not right[found["shear_verdict"]["suspects"]].any()
+
 
 def test_wrong_use(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -131,6 +131,9 @@ class PathResult(Steps):
         "sliding": "sliding",
     }
 
+    def lines(self) -> list[str]:
+        return [*super().lines(), *chords_of(self.stage)]
+
     def summary(self) -> Summary:
         (path,) = self.found
         return super().summary() | {"presses": path.presses}
@@ -229,13 +232,7 @@ class SteadyResult(Single):
         return tables
 
     def lines(self) -> list[str]:
-        said, stage = super().lines(), cast("SteadyStage", self.stage)
-        if stage.ellipse is not None:
-            n = stage.ellipse.chords
-            more = (
-                f"the ellipse loses more, in our tests by at most {CHORDS_ERROR / n**2:.1g} of it"
-            )
-            said.append(f"loss and error are those of a path of {n} chords; {more}")
+        said = [*super().lines(), *chords_of(self.stage)]
         for losses in self.found[1:]:
             printed = {"phase": "phase", "factor": "factor", "loss": "loss"}
             printed |= {"smooth": "smooth sphere"}
@@ -250,6 +247,15 @@ class SteadyResult(Single):
         for losses in self.found[1:]:
             figures |= phase_figures(losses)
         return figures
+
+
+def chords_of(stage: Stage) -> list[str]:
+    """A line on the chords that replace an ellipse; [] without an ellipse."""
+    if not isinstance(stage, _Points) or stage.ellipse is None:
+        return []
+    n = stage.ellipse.chords
+    more = f"the ellipse loses more, in our tests by at most {CHORDS_ERROR / n**2:.1g} of it"
+    return [f"losses and errors are those of a path of {n} chords; {more}"]
 
 
 def _by_phase(losses: PhaseLosses) -> Columns:
