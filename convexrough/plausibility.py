@@ -46,10 +46,11 @@ def limits_of(contact: Contact) -> dict[str, Any]:
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius
-    array_extent : the smaller of max |x| / a and max |y| / b over the asperities, with the half
-        widths a and b of the contact of a smooth body at this load; None without such a contact,
-        and where the asperities are too few for an array (`is_array`)
-    rim_touching : share of the rim, the farthest asperity in each of 16 sectors, that touches
+    array_extent : the smaller of max |x| / a and max |y| / b over the asperities. a and b are the
+        half widths of a smooth body's contact at this load. None for a flat or a cylinder, at load
+        0, and where the asperities are too few for an array (`is_array`)
+    rim_touching : the rim consists of the farthest asperity in each of 16 sectors; the share of
+        these asperities that touch
     axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -232,7 +233,7 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """`array_extent` of `limits_of`; for a row of asperities along x or y only its own ratio."""
+    """`array_extent` of `limits_of`; for a row along one axis, only the ratio of this axis."""
     smooth = smooth_reference(scene, load) if load > 0 and is_array(scene) else None
     if smooth is None:
         return None

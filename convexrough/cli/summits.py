@@ -140,11 +140,12 @@ def summits(
 ) -> int:
     """Find the summits of a measured surface.
 
-    SURFACE is .npy, .npz, .mat, a text file with a matrix or columns x, y, height, or an
-    instrument's file. The command can also press a sphere on the middle of the map: give --scene;
-    or --radius and --approach; or --radius, --load and --modulus. It then reports contacts,
-    certificate, crowding and model error for several values of --prune, and recommends one of these
-    values. With --whole it also presses every pixel at the same approach, for comparison.
+    SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text file with a matrix of
+    heights or three columns: x, y and height. The command can also press a sphere on the middle of
+    the map: give --scene; or --radius and --approach; or --radius, --load and --modulus. It then
+    reports contacts, certificate, crowding and model error for several values of --prune, and
+    recommends one of these values. With --whole it also presses every pixel at the same approach,
+    for comparison.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

@@ -106,7 +106,7 @@ class Law(Protocol[Point]):
 class Stopping:
     """The conditions that end Newton's method. Residuals are relative to their scale.
 
-    accurate  : largest residual of an answer, unless `tolerance` is larger
+    accurate  : an answer is accepted only if its residual is at most this, or `tolerance` if larger
     tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
     linear    : the method also ends if the next step is expected to leave a defect of at most this
@@ -128,8 +128,8 @@ def solve(
 ) -> tuple[Point, int]:
     """The final state, and the number of steps.
 
-    before : 2-norm of an estimated defect one step before the start; it sets the tolerance of the
-        first linear system
+    before : estimate of the 2-norm of the defect that a step before the start would have had; it
+        sets the tolerance of the first linear system
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does

@@ -2,7 +2,7 @@
 
 docs/theory/one-theorem.md states and proves it, with the symbols of this module. Let x be a trial
 point, e its violations of the first-order conditions, x* the solution, and H a positive diagonal
-matrix. On a box with x and x* on which the Hessian is at least mu H with mu > 0, (1) is
+matrix. If a box contains x and x*, and on it the Hessian is at least mu H with mu > 0, (1) is
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.
 
@@ -22,9 +22,11 @@ from convexrough.roundoff import SAFETY
 
 
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
-    """(n,) violations e of the first-order conditions, for residuals F - beta.
-    inside : (n,) False where x is on a lower face of K. True is also valid on an upper face: the e
-        of an interior point, |F - beta|, is at least as large as that of a point on an upper face
+    """(n,) violations e of the first-order conditions.
+
+    residual : (n,) F - beta, the gradient of the energy minus the multiplier of the total
+    inside : (n,) False where x is at a lower bound. At an upper bound True may be given: it gives
+        the violation |F - beta| of an interior point, which is at least as large
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)

@@ -6,10 +6,10 @@ centre is  f c_t [g + (r^2/R) h(c/r)]  with
 
     h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
 
-f c_t g is the amplitude of gross slip, which is 0 if a disc sticks. (r^2/R) h(c/r) is the gap of a
-Hertz contact of radius c at the distance r. The formula holds inside the contact disc at the lowest
-load of the cycle. Outside this disc contact is lost in each cycle, and the slip is not known. The
-shear traction is a sum over the loads s_k at which the slope of the memory curve
+f c_t g is the amplitude of gross slip. It is 0 if a part of the contact disc sticks. (r^2/R) h(c/r)
+is the gap of a Hertz contact of radius c at the distance r. The formula holds inside the contact
+disc at the lowest load of the cycle. Outside this disc contact is lost in each cycle, and the slip
+is not known. The shear traction is a sum over the loads s_k at which the slope of the memory curve
 (docs/theory/paths.md) changes. b_k is the slope below s_k minus the slope above it, and a(s_k) is
 the contact radius at the load s_k:
 
@@ -47,8 +47,9 @@ class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle. Arrays are (n,), and 0 where open.
 
     status           : `Cycle.status`
-    slip_amplitudes  : [length] half the range of slip at the rim that the contact disc has at the
-        lowest load of the cycle; nan where "intermittent", as slip between touches is not known
+    slip_amplitudes  : [length] half the range of slip at one radius, that of the contact disc at
+        the lowest load of the cycle; nan where contact is lost in the cycle ("intermittent"),
+        because slip while it is open is not known
     gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
         sticks, nan where "intermittent"
     losses, loss_errors : [force length] energy lost per cycle, and bounds on its errors:

@@ -49,11 +49,12 @@ class LoadPath(Table, Plottable):
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] the lowest level (total load) that the front of the latest slip
-        reached; nan where nothing slips
+    fronts         : (m,) [force] total load down to which the slip front has moved on the latest
+        segment that changes P or Q; nan if nothing slips there
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
-    order          : what is proved about order between the levels in use, as in `Cycle`
+    order          : "proved" if it is proved that no indentation falls as the load rises between
+        the total loads that the path uses; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
 
@@ -118,7 +119,8 @@ class LoadPath(Table, Plottable):
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
             of the last loss is 1, and all others are 0
-        holding : quantity kept constant, as in `Contact.gradient`. The forces Q are constant, too
+        holding : quantity kept constant, as in `Contact.gradient`. Derivatives by anything but
+            `forces` are at constant forces Q, not at constant Q / (f P)
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
 
@@ -146,9 +148,9 @@ def load_path(
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : compliance operator; None for the cheapest that is exact
-    general_steps : number of general steps per segment (docs/theory/without-order.md), whose
-        results are not proved. None uses the memory curve, or, if an indentation falls as the load
-        rises, as many general steps as needed
+    general_steps : number of steps per segment of a method that does not need order
+        (docs/theory/without-order.md). Its results are not proved. None uses the memory curve, or,
+        if an indentation falls as the load rises, as many general steps as needed
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.

@@ -87,7 +87,7 @@ class Objective(Record):
                 raise InputError("by", found=repr(name), expected=expected)
 
     def _able(self) -> list[str]:
-        """The parameters on which the number depends."""
+        """The parameters on which the result depends."""
         known = [*EACH, *WHOLE, *ELASTIC, *PRESCRIBED]
         if NUMBERS[self.of] != "force":
             known.remove("force")
@@ -198,7 +198,7 @@ class Objective(Record):
 
 
 def _loss(contact: Contact, force: float | None) -> Gradient:
-    """The gradient of the loss of the cycle from -force to force; errors name `force`."""
+    """The gradient of the loss of the cycle from -force to force; InputErrors name `force`."""
     if force is not None:
         checks.non_negative("force", force)
     try:
@@ -210,7 +210,7 @@ def _loss(contact: Contact, force: float | None) -> Gradient:
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter. The force of a cycle changes maximum and minimum."""
+    """The derivative by a parameter; `force` is the maximum and minus the minimum of a cycle."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

@@ -1,7 +1,7 @@
 """The proof that a solution exists near given loads, and bounds on the distance to it.
 
-The theorem of docs/theory/one-theorem.md is applied on a box of loads on which the energy is convex
-(`boxes`), and then on a smaller box that the first result proves to hold the solution
+The theorem of docs/theory/one-theorem.md is applied twice: on a box of loads on which the energy is
+convex (module `boxes`), and on a smaller box, which by the first result contains the solution
 (docs/theory/certificate.md). P are the loads, D0 the approach, A the compliance operator, H the
 local Hessian; a star marks the solution.
 """
@@ -51,7 +51,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """A proved solution, as balls over the n candidates of `problem`, in scaled units.
+    """A proved solution in scaled units: a ball for each of the n asperities of `problem`.
 
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
@@ -130,7 +130,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution in this box, or bounds (n,) on load errors, which are too large for the box."""
+    """The solution in this box; or bounds (n,) on load errors, if they reach beyond the box."""
     known = solution_in(problem, box, state)
     if not known.inside:
         return known.at_first
@@ -138,9 +138,9 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
 
 
 class Known(NamedTuple):
-    """What the theorem proves in a box: for one problem or in rows.
+    """What the theorem proves in a box, for one problem, or for many with a row each.
 
-    inside   : True if the box is proved to hold the solution, on which the other fields rest
+    inside   : True if it is proved that the box contains the solution; if not, nothing is proved
     at_first : (n,) bounds on the errors of the trial loads, valid if `inside`
     distance, compliance, loads, indentation, approach : the fields of `Proved`
     """
@@ -187,8 +187,10 @@ class _Missing(NamedTuple):
 
     docs/theory/one-theorem.md derives it.
 
-    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals, where
-        (1 + t) P have the prescribed total; 0 if they have it
+    t is the number for which (1 + t) P has the prescribed total.
+
+    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals; 0 if P
+        has this total
     """
 
     loads: Any
@@ -226,8 +228,9 @@ def _smaller(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tupl
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
     """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
 
-    If none is proved to touch, D0* is at most this at each asperity, because gaps are not negative.
-    D0* is at least -max d, the approach at which contact begins.
+    At an open asperity D0* is at most that right side, because gaps are not negative. So if none is
+    proved to touch, the least right side bounds D0* from above. D0* is at least -max d, the
+    approach at which contact begins.
     """
     if problem.load is None:
         return state.approach.radius

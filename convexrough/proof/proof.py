@@ -142,7 +142,7 @@ def refuse_many(scene: Scene) -> None:
 
 
 def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
-    """The contents of the file, with the scene but without argument, states and claims."""
+    """The contents of the file without its entries `argument`, `pressed`, `sheared`, `claims`."""
     scene = trial.scene
     x, y = scene.asperities.positions.T
     given = {

@@ -32,8 +32,9 @@ class Scene(Record):
     sphere_radius : [length] radius R of a sphere; inf for a flat. A pair (Rx, Ry) of radii of
         curvature along x and y makes an ellipsoid, or a cylinder if one of them is inf
     friction      : Coulomb's coefficient f; None if the scene is not sheared
-    geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
-        closest) or "summit" (at the summit of the asperity, as in Dini and Hills 2009)
+    geometry      : position of each contact: "closest" (where the undeformed paraboloids of sphere
+        and asperity are closest) or "summit" (at the summit of the asperity, as in Dini and Hills
+        2009)
     units         : names of the units of length and force, such as ("mm", "N"), for figures and
         reports; no number is converted
 
@@ -75,7 +76,7 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Each finite radius [length], with the slice of axes (0: x, 1: y) along which it holds."""
+        """Pairs of a finite radius [length] and the slice of the axes (0: x, 1: y) that have it."""
         return base.curved(self.sphere_radius)
 
     @property

@@ -132,7 +132,7 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """Initial indentations: those under the given loads (-1 where 0), or `start_indentation`."""
+    """Initial indentations: by Hertz's law, -1 where a load is 0; without loads, estimates."""
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)

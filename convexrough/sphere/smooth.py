@@ -1,9 +1,9 @@
 """`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
-The smooth sphere is the sphere of a scene without asperities, under the same load: Hertz's contact,
-with the theory of Cattaneo, Mindlin and Deresiewicz under shear. Results are for both bodies.
-Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper (Dini and
-Hills 2009), which gives displacements and losses of one body.
+The smooth sphere is the scene's sphere, pressed with the same load on a plane without asperities.
+Under the normal load this is Hertz's contact; under shear the theory of Cattaneo, Mindlin and
+Deresiewicz holds. Results are for both bodies. Source: Johnson, Contact Mechanics (1985), chapters
+4 and 7; equations 12 to 16 of Dini and Hills (2009), who give displacements and losses of one body.
 """
 
 from __future__ import annotations
@@ -181,10 +181,10 @@ class SmoothSphere(Record):
 class SmoothEllipsoid(SmoothSphere):
     """A smooth ellipsoid, with results like those of `SmoothSphere`.
 
-    The contact is an ellipse with the semi-axes a, b. The contact radius is sqrt(a b), the distance
-    of a point is s sqrt(a b) with s^2 = x^2/a^2 + y^2/b^2, and the stick zone is an ellipse of the
-    same shape. The ratio of tangential to normal compliance is approximated by its mean over all
-    directions, Mindlin's ratio; this is exact at nu = 0.
+    The contact is an ellipse with the semi-axes a, b. `contact_radius` is sqrt(a b). For the
+    argument `distance` of a point give s sqrt(a b), with s^2 = x^2/a^2 + y^2/b^2. The stick zone is
+    an ellipse of the same shape. The ratio of tangential to normal compliance is approximated by
+    its mean over all directions, Mindlin's ratio; this is exact at nu = 0.
 
     >>> oval = cr.Scene((1.0, 2.0), scene.asperities, scene.material)
     >>> "{:.4g} {:.4g}".format(*cr.smooth(oval, load=contact.load).semi_axes)

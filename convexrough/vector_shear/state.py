@@ -56,9 +56,9 @@ class VectorShearState(Table, Plottable):
         length of the difference
     solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P the forces are f P_i along Q. Except in symmetric layouts, this state is reached
-    only in the limit of an infinite displacement. The displacement, the slips, `residual` and
-    `duality_gap` are then infinite.
+    At |Q| = f P the forces are f P_i along Q. Unless they displace all asperities equally
+    across Q, this state is reached only in the limit of an infinite displacement. The displacement,
+    the slips, `residual` and `duality_gap` are then infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.holds
@@ -153,7 +153,7 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
-    """The solver's result, checked to be finite. A SolverError gets forces in the scene's units."""
+    """The solver's result, checked to be finite. The forces in a SolverError are converted."""
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
@@ -181,7 +181,8 @@ def _vector(force: ArrayLike) -> Array:
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """The state at |T| = sum P, where all forces and slips are along T.
 
-    If the components of B q across T differ, forces tend to this state only as X goes to infinity.
+    If the displacements B q of these forces q differ across T, forces tend to this state only as
+    the displacement X along T goes to infinity.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
@@ -206,7 +207,7 @@ def _times(vectors: Array, size: Array | float) -> Array:
 
 
 def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) -> float:
-    """Relative difference of the forces from those of `shear`, along the total; 0 at rest."""
+    """Relative 2-norm of the forces minus those of `shear`, directed along the total; 0 at rest."""
     if height == 0:
         return 0.0
     other, _ = problem.from_rest(height)
