@@ -45,7 +45,7 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """2-norm of a residual that solvers need not reduce, because the bounds are larger."""
+        """A 2-norm of the residual at which solvers can stop: these bounds are larger."""
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
@@ -76,10 +76,9 @@ class Influence(Coupling, Protocol):
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length]
     scale  : 1 / (pi E*) in the units of the problem
-    stored : True if the matrix is stored; otherwise products with float32 loads are cheaper than
-        with float64 loads
-    cheap_sums : True if `sums` costs few products; Newton's method then ends early, and `refine`
-        makes the last steps
+    stored : True if the matrix is stored. If it is not, float32 loads make products cheaper
+    cheap_sums : True if `sums` takes only a few times as long as `apply`. Newton's method then ends
+        early, and `refine` makes the last steps
     """
 
     @property
@@ -152,7 +151,8 @@ class Influence(Coupling, Protocol):
 class JointCoupling:
     """The map from loads on the last points of an operator to displacements of the first ones.
 
-    joint : the operator of all;  targets : number of points to which loads are mapped
+    joint : the operator among all points;  targets : number of first points, whose displacements
+        are computed
     """
 
     joint: Influence
@@ -177,7 +177,7 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
 
 
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
-    """(n, 2) points plus their low parts (tails), if given, and a bound on the remaining error."""
+    """The points (n, 2) as pairs, with `tails` as low parts, and a bound on their errors."""
     if tails is None:
         return Pair.exact(points), point_error
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))

@@ -46,7 +46,7 @@ Problem: TypeAlias = NormalProblem | Stack
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Loads of the candidates, and their residuals in the contact law, in scaled units.
+    """Loads of the asperities that can touch, and residuals in the contact law, in scaled units.
 
     loads, product : (n,) P and A P
     local   : (n,) k P^(2/3), to float64
@@ -87,7 +87,7 @@ class Trial:
 
     @property
     def indentation(self) -> Ball:
-        """(n,) indentations D0 + d - A P of these loads, minus gaps where negative."""
+        """(n,) D0 + d - A P: the indentation if positive; if negative, its size is the gap."""
         problem = self.problem
         if problem.load is None:
             return problem.exact_depths - self.product
@@ -159,7 +159,8 @@ def refined_loads(problem: Problem, loads: Array) -> Trial:
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
     """One Newton step, in the rows `todo`.
 
-    enough : factor by which the residual must be reduced: a number, or (m,) for rows
+    enough : the linear solver may stop when it has reduced the residual by this factor: a number,
+        or (m,) for rows
     """
     loads, missing = completed(problem, _after_step(problem, state, enough, todo))
     return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
@@ -191,7 +192,7 @@ def scaled(problem: Problem, loads: Pair) -> Pair:
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads changed to have the prescribed total, and the rounding by which they miss it."""
+    """Loads with the prescribed total, by a change of the largest; a bound on what they miss."""
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():

@@ -90,8 +90,8 @@ class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
     approach [length] or load [force] : what is prescribed; the other is None
-    highest_approach : [length] upper bound on the approach under the prescribed load, up to which
-        the pattern has all asperities that can touch; None if `within` or an approach is given
+    highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
+        has all asperities that can touch up to this approach. None if another quantity chose them
     influence : compliance operator; None for the cheapest
     stages : the tables that request results, by name; the first is [normal]
     text   : text of the file;  seed : seed of its random heights and radii, or None
@@ -165,7 +165,7 @@ def _study(path: Path, text: str) -> Study:
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
-    """Raise InputError unless the summits of a map are in the scene's unit of length."""
+    """Raise InputError unless summits of a map (unit `own`) have the scene's unit (`named`)."""
     if own != named:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
@@ -225,7 +225,7 @@ READ = Layouts(read_summits, _regular)
 def task_of(
     path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
 ) -> Task:
-    """The scene and the stages that checked tables describe.
+    """The scene and the stages described by tables that have been checked.
 
     path    : the scene file, for messages; paths in the tables are relative to its folder
     layouts : functions that make the asperities
@@ -290,8 +290,8 @@ def _lattice(
 ) -> tuple[Scene, float | None]:
     """The scene with asperities up to the distance `within`, or with all that could touch.
 
-    These are the asperities that could touch as [normal] prescribes, or under the largest load of a
-    stage.
+    An asperity could touch if it can be reached at the approach or load in [normal], or at the
+    largest load that a stage names.
     """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips

@@ -100,7 +100,7 @@ AS_IT_IS = Reading()
 
 
 def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """The name in the file of each known column; a pair may be given in either order."""
+    """The header of each known column in `given`, as NAME=COLUMN or COLUMN=NAME."""
     named = {}
     for one, other in given.items():
         name, column = (one, other) if one in known or other not in known else (other, one)
@@ -118,7 +118,7 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the other columns by header, also by an empty one; text where a cell is no number
+    others  : the columns that were not read, by header, which may be empty; text if a cell is none
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -413,7 +413,7 @@ def _named(source: _Source) -> str:
 
 
 def in_sheet(style: str) -> str:
-    """The end of a message that names the sheet read, and others; "" if the file has none."""
+    """The end of a message with the names of the sheet read and of others; "" without sheets."""
     return f" in {style}" if style.startswith("sheet ") else ""
 
 

@@ -157,7 +157,10 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
 def _negative(
     loads: Array, floor: float, sign: float, name: str, mistake: Callable[[int, str], str]
 ) -> Iterator[str]:
-    """A message for each load below -floor, from a column; `mistake` adds its place."""
+    """Messages for loads below -floor: one each, or one for the column if no load is positive.
+
+    name : the column;  mistake : a function that adds the row to a message
+    """
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
@@ -173,12 +176,12 @@ def _negative(
 
 
 def _claims(table: ReadTable) -> list[tuple[str, str]]:
-    """The columns of claims, each with its header."""
+    """The columns that say which asperities touch, each with its header."""
     return [(name, bare(table.called[name]).lower()) for name in CLAIMS if name in table.columns]
 
 
 def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]:
-    """A message for each row that is "contact" or "closed" without a load, or "open" with one."""
+    """A message for each row whose status or flag contradicts its load."""
     touches = loads > floor
     for name, header in _claims(table):
         found = np.char.lower(np.char.strip(table.columns[name]))
@@ -191,7 +194,7 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
 
 
 def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
-    """A note for each column of statuses with other words: which occur with a load, and without."""
+    """A note for each column of statuses on unknown words: which have a load, and which none."""
     for name, header in _claims(table):
         found = np.array([each.strip() for each in table.columns[name]], dtype=str)
         other = np.array([each.lower() not in (*CLAIMS[name], "", "undecided") for each in found])
@@ -213,7 +216,10 @@ def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterat
 
 
 def _areas(path: Path, table: ReadTable, count: int) -> Any:
-    """The areas of nodes, or the one area of a regular grid; `count` asperities."""
+    """The areas of the nodes, or the area of a pixel of a regular grid.
+
+    count : number of asperities of the scene
+    """
     columns = table.columns
     if "area" in columns:
         areas = columns["area"]
@@ -233,9 +239,10 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
 
 
 def _check_one_size(i: Indices, j: Indices, count: int) -> None:
-    """Raise InputError if more than `count` pixels have no neighbours, and lie on a coarser grid.
+    """Raise InputError if more than `count` pixels without neighbours lie on a coarser grid.
 
-    At most `count` pixels without neighbours may be contacts of one pixel, one for each asperity.
+    Then pixels have several sizes. A contact can be one pixel large; there is at most one for each
+    asperity, so up to `count` pixels may have no neighbours.
     """
     if len(i) == (i.max() + 1) * (j.max() + 1):
         return  # a full grid
