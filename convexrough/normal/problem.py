@@ -46,9 +46,8 @@ from convexrough.sphere import hertz
 #: heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which box", 3).
 FITTED = 0.9
 
-#: Number of candidates in a block, chosen to fit into a cache.
-CHUNK = 2**14
-
+#: Number of candidates up to which the prescribed displacements are cached.
+MOST_KEPT = 2**20
 
 #: Largest change of loads, over the largest load, whose float64 product with A gives 29 digits.
 NEARBY = 1e-13
@@ -158,8 +157,13 @@ class NormalProblem:
 
     @property
     def exact_depths(self) -> Ball:
-        """(n,) D, at a prescribed approach."""
-        return self.exact.offsets + self.depth
+        """(n,) D, at a prescribed approach; cached unless it is large."""
+        found: Ball | None = self.__dict__.get("_depths")
+        if found is None:
+            found = self.exact.offsets + self.depth
+            if len(self) <= MOST_KEPT:
+                self.__dict__["_depths"] = found
+        return found
 
     def product(self, loads: Pair) -> Ball:
         """(n,) A P to about thirty digits."""
