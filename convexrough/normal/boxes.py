@@ -1,7 +1,8 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-In crowded contacts a box may have touching asperities only: docs/theory/crowded.md. In comments, h
-is the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
+In crowded contacts a box may be one of the touching asperities only, with all others assumed open:
+docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). In comments, h is
+the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
 operator, and mu = 1 - `convexity_number` the margin of convexity.
 """
 
@@ -25,14 +26,14 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
-#: Convexity number of the loads above which shells are fitted to them. A heuristic.
+#: Shells are fitted to loads whose convexity number is above this. A heuristic.
 FIT_FROM = 0.8
 
 #: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
 MARGINS = (0.1, 1e-3)
 
-#: Least growth of each load in a box of touching asperities, as a fraction of the load and of the
-#: largest load (the sum of both). Heuristics: the proof allows any box.
+#: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
+#: plus LEAST_LEEWAY times the largest load. Heuristics: the proof allows any box.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
 #: Number of touching asperities up to which Cholesky costs no more than overlapping shells.
@@ -43,15 +44,15 @@ CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
 class Box(NamedTuple):
-    """A box of loads that holds the solution, and its convexity; for one problem or a stack."""
+    """A box of loads, and the convexity of the energy on it; for one problem or for a stack."""
 
     scope: Scope
     problem: NormalProblem | Stack  # with the shells that prove convexity
-    loads: Array  # upper ends; the lower ends are 0
-    compliance: Array  # h at the upper ends
+    loads: Array  # (n,) upper ends of the box; the lower ends are 0
+    compliance: Array  # (n,) h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # the solution must still be proved to be below these; infinite where no need
-    fixed_open: NDArray[np.bool_]  # assumed open; this must still be proved
+    faces: Array  # (n,) the proof must show that loads are below these; infinite where not needed
+    fixed_open: NDArray[np.bool_]  # (n,) assumed open; the proof must show that they are
 
     def at(self, rows: Indices, problem: Stack) -> Box:
         """The boxes of some rows of a stack, with `problem` as the stack of these rows."""
@@ -70,8 +71,8 @@ class Box(NamedTuple):
         """A box that contains this one, for use at another load or approach.
 
         The solution at that load or approach may lie outside. Where shells prove convexity, the
-        upper ends are raised to the loads at which each convexity number theta_i is `theta`. So
-        they are far above the error bounds of loads at the rim.
+        upper ends are raised to the loads at which the convexity number of each asperity is that
+        of the box. So at the rim they are far above the error bounds of the loads.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -85,7 +86,7 @@ class Box(NamedTuple):
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
-    """Boxes, the widest first: if possible one with every solution, else a local one."""
+    """At most one box: one that contains every solution if it is convex, else one near `loads`."""
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.compliance(corner)
@@ -111,7 +112,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 
 
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """The least known upper bound on the approach of any solution, from loads and A times loads."""
+    """The least known upper bound on the approach at any solution; `displacement` is A `loads`."""
     if problem.load is None:
         return problem.approach_bound
     return min(problem.approach_bound, problem.overhang(loads, displacement))
@@ -120,7 +121,7 @@ def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Ar
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """A local box of touching asperities, with all others fixed open; None if not proved convex.
+    """A local box of touching asperities, all others fixed open; None if convexity is not proved.
 
     room : (n,) least increase from `loads` to the upper ends of the box
     """
@@ -141,7 +142,7 @@ def box_of_touching(
 
 
 def crowded_margin(influence: Influence, compliance: Array) -> float:
-    """The largest proved mu: by Cholesky for small matrices, else by overlapping shells."""
+    """The largest of CROWDED_MARGINS that Cholesky or overlapping shells prove; 0 if none."""
     if not influence.stored and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / compliance, CROWDED_MARGINS)
     scaled, error = _scaled(influence, compliance), influence.entry_error + 8 * ROUNDOFF
@@ -149,7 +150,7 @@ def crowded_margin(influence: Influence, compliance: Array) -> float:
 
 
 def _scaled(influence: Influence, compliance: Array) -> Array:
-    """H^(-1/2) A H^(-1/2)."""
+    """The matrix H^(-1/2) A H^(-1/2), with the diagonal H of `compliance`."""
     root = 1.0 / np.sqrt(compliance)
     scaled: Array = influence.matrix * root * root[:, None]
     return scaled
@@ -158,8 +159,8 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity.
 
-    They are those in a pair too close for convexity; if there are none, those whose shell meets
-    another shell; if there are none either, all.
+    They are the asperities of pairs too close for convexity. If no pair is, they are those whose
+    shell meets another shell; if no shells meet, all loaded asperities.
     """
     which = np.flatnonzero(loads)
     if len(which) < 2:
@@ -173,7 +174,7 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
 
 
 def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
-    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved by a stored matrix, else 0."""
+    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved; 0 if none, or A is not stored."""
     if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF

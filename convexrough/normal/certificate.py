@@ -184,7 +184,7 @@ def certificate_of(
 ) -> Certificate:
     """The certificate of loads (n,) [force] of the whole scene, from a solution proved near them.
 
-    start : the loads of the asperities that can touch, scaled to a prescribed total
+    start : the loads of the asperities that can touch, scaled to the total if that is prescribed
     """
     length, force = problem.units.length, problem.units.force
     others = NO_OTHERS
@@ -232,12 +232,12 @@ def certificate_of(
 
 
 def _apart(loads: Array, found: Proved) -> Array:
-    """(n,) bounds on the errors of loads in scaled units."""
+    """(n,) bounds on |load - solution| of the asperities that can touch, in scaled units."""
     return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
 
 
 def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
-    """(N,) bounds on the errors of loads: the loads themselves where an asperity cannot touch."""
+    """(N,) [force] bounds on |load - solution|; the load itself where an asperity cannot touch."""
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
     errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
@@ -273,9 +273,9 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 class _Screened(NamedTuple):
     """The asperities that cannot touch: D_i <= 0 in every solution, rounding included."""
 
-    which: Indices  # in the scene
-    below: NDArray[np.bool_]  # D_i < 0; otherwise D0 = d_i = 0
-    coupling: Coupling | None  # from asperities that can touch; None if all can
+    which: Indices  # their indices in the scene
+    below: NDArray[np.bool_]  # True where D_i < 0, False where D0 = d_i = 0
+    coupling: Coupling | None  # maps loads to displacements here; None if all can touch
     indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
 
@@ -299,9 +299,9 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on screened asperities.
+    """Bound on the energy sum (3/5) k s^(5/3) + g's + s'A s / 2 of loads s at the gaps g.
 
-    These cannot touch; g are their gaps.
+    s are the loads on asperities that cannot touch. The bound is 0 if the load is prescribed.
     """
     screened = loads.copy()
     screened[problem.candidates] = 0.0

@@ -20,14 +20,14 @@ from convexrough.scene.scene import Scene
 #: Largest error of forces and totals by default, as a fraction of the largest force or the total.
 WITHIN = 0.01
 
-#: Smallest error of a suspect, as a fraction of the largest error.
+#: A force is a suspect if its error exceeds this fraction of the largest error.
 SUSPICIOUS = 1e-3
 
 #: The prefix of a wrong unit of force, by the power of ten by which it makes forces too large.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
-#: `_moved` treats points as equal within this part of the size of the array, and accepts a symmetry
-#: if at most this part of the error remains.
+#: `_moved` treats points as equal if nearer than SAME_PLACE times the size of the array. It accepts
+#: a symmetry that leaves at most CORRECTED times the error.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
 #: `hints` reports a common factor of the forces if dividing by it leaves at most this part of the
@@ -48,7 +48,7 @@ class Claim(ABC):
 
     one, many : the singular and the plural of the term for a force in messages
     proved    : name in messages of the set of asperities that the claim is about
-    kinds     : names of attributes with the indices of wrong statuses, and what is wrong there
+    kinds     : names of the attributes that hold indices of wrong statuses, with a text on each
     claims    : the statuses that are claimed where `claimed` is True and where it is False
     within : largest error allowed, as a fraction of the largest force, and of the total
     total_prescribed : [force] None where it is not prescribed
@@ -85,7 +85,7 @@ class Claim(ABC):
 
     @property
     def wrong(self) -> dict[str, Indices]:
-        """Indices of asperities with a status that is proved wrong, by the texts in `kinds`."""
+        """Each text in `kinds`, with the indices of the asperities that are wrong in this way."""
         return {said: getattr(self, name) for name, said in self.kinds.items()}
 
     @abstractmethod
@@ -234,8 +234,8 @@ class Claim(ABC):
         """(m,) indices of asperities with a wrong status or a wrong force, likeliest first.
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
-        two. If the sum of the forces differs from that of the solution, they are also compared
-        after scaling them to the sum of the solution.
+        two. If the sum of the forces differs from that of the solution, all forces are
+        also compared after scaling them to the sum of the solution.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or self.near_enough:

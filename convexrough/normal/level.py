@@ -37,7 +37,7 @@ from convexrough.normal.together import NUMBERS, Rows, solved
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: Largest residual of a response after refinement, over that before refinement.
+#: Largest accepted residual of a response after refinement, divided by that before refinement.
 SOLVED = 1e-6
 
 #: Largest number of candidates for which levels are solved together: for more this saves no time.
@@ -48,7 +48,7 @@ Press = Callable[[NormalProblem, Array | None], Array]
 
 
 class Response(NamedTuple):
-    """The result x, beta of `Level.response`, as balls in scaled units.
+    """The solution x, beta of the linear system of `Level.response`, as balls in scaled units.
 
     loads : (n,) x, 0 where open;  approach : beta
     """
@@ -76,11 +76,13 @@ class Springs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The normal solution at one total load, as balls over the candidates, in scaled units.
+    """The normal solution at one total load, as balls in scaled units.
 
     load, approach : () the total load L and D0(L)
-    loads, indentation : (n,) P_i(L) and n_i(L)
-    touching, open : (n,) True where proved
+    loads, indentation : (n,) P_i(L) and n_i(L) of the asperities that could touch (candidates)
+    touching, open : (n,) True where the asperity is proved to touch, or to be open
+    solution : what is proved; None without a proof, and at L = 0
+    trial    : the computed loads and their residuals; None at L = 0
     """
 
     problem: NormalProblem
@@ -144,7 +146,7 @@ class Level:
 
     @cached_property
     def springs(self) -> Springs:
-        """The springs with which `response` solves. Raises ProofError at L = 0."""
+        """The asperities as linear springs, for `response`. Raises ProofError at L = 0."""
         found, state = self.solution, self.trial
         if state is None:
             raise ProofError("at no load the approach has no derivative")
@@ -175,10 +177,10 @@ class Level:
         """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
 
         The solution is refined in pairs of float64 numbers until the residual no longer halves.
-        Bounds on its error follow from docs/theory/one-theorem.md. They allow any x of the
-        asperities for which it is not proved whether they touch.
+        Bounds on its error follow from docs/theory/one-theorem.md. They allow for asperities
+        of which it is not proved whether they touch.
 
-        right : (n,);  total : ()
+        right : (n,) the given right side;  total : the given sum of x
 
         Raises SolverError where the system is singular or nearly so, and no derivative exists.
         """
@@ -193,7 +195,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and beta, the mean weighted by c that is subtracted."""
+            """x / c + A x - right - beta, and the beta with which its mean, weighted by c, is 0."""
             above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
@@ -244,7 +246,10 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Bounds e on the residual if j takes the missing total and others carry `others`."""
+            """Bounds on the residual if j takes the missing load, on this load, and on its effect.
+
+            others : load that asperities carry that may or may not touch
+            """
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
             e = left.size + missing_effect
@@ -309,7 +314,7 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at positive loads (k,), solved together; None where `at` must solve one."""
+        """The levels at k positive loads, solved together; None where only `at` can solve one."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None:
@@ -325,9 +330,10 @@ class Levels:
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The level in the box of `top`, sought without initial loads, then from those of `top`.
+        """The level of `problem`, sought from no initial loads first, then from the loads of `top`.
 
-        If other solutions than that of `top` are possible, only the loads of `top` are tried.
+        It is proved in the box of loads in which `top` was proved. If other solutions than that
+        of `top` are possible, only the loads of `top` are tried.
         """
         top = self.top.solution
         local = top is not None and top.box.scope == "local"
@@ -343,7 +349,7 @@ class Levels:
     def _sought(
         self, problem: NormalProblem, start: Array | None
     ) -> tuple[Trial, Proved | Obstacle]:
-        """Refined loads, and the solution proved in the box of `top` (if `top` is proved)."""
+        """Refined loads, and the solution proved near them in the box of `top`, or the obstacle."""
         state = refined_loads(problem, self._press(problem, start))
         boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
         return state, proved(problem, state, boxes)
@@ -370,7 +376,7 @@ def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | Non
 
 
 def rows_of(levels: Sequence[Level]) -> Rows:
-    """Levels of one scene as rows."""
+    """Levels of one scene as arrays with one row for each level."""
     balls = [(it.load, it.approach, it.loads, it.indentation) for it in levels]
     load, approach, loads, indentation = map(Ball.stacked, map(list, zip(*balls, strict=True)))
     touching, open_ = (
@@ -381,7 +387,7 @@ def rows_of(levels: Sequence[Level]) -> Rows:
 
 @np.errstate(invalid="ignore")  # unproved levels
 def energies(levels: Sequence[Level]) -> Ball:
-    """(k,) the energies V(L) of levels of one scene."""
+    """(k,) the energies V(L) of k levels of one scene; errors are infinite without a proof."""
     high, low, radius = np.zeros((3, len(levels)))
     which = [k for k, level in enumerate(levels) if level.trial is not None]
     if which:

@@ -17,8 +17,8 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: A scene has a radius of at least LEAST_REACH contact radii of the smooth body. The approach is
-#: bounded on a scene whose radius is WIDER times as large.
+#: In `all_that_could_touch` a scene extends to at least LEAST_REACH contact radii of a smooth body.
+#: The approach is bounded on a scene whose radius is WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on
@@ -28,10 +28,11 @@ STRAIGHT = 1e-11
 
 @np.errstate(all="ignore")
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
-    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load;  rows (m, n) have loads (m, 1).
+    """Indentations delta + tau, with the tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in
-    tau, and Newton's method converges to the root from the right.
+    For m problems delta is (m, n) and the load (m, 1). The sum to the power 2/3 is a norm of
+    (delta + tau)+ / k, so it is convex and nearly straight in tau, and Newton's method
+    converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, inverse = indentation - highest, 1.0 / coefficients
@@ -65,9 +66,9 @@ def approach_bound(
     (2) of docs/theory/certificate.md with q = weights / sum(weights), alpha = q k and c = A q.
 
     weights      : (n,) approximate loads, not negative, not all 0
-    displacement : (n,) A times weights, or more
-    coefficients, offsets : (n,) k, and d or less
-    load         : L, or (m, 1) for m rows; the bound has the same shape
+    displacement : (n,) upper bounds on A times weights
+    coefficients, offsets : (n,) k, and lower bounds on d
+    load         : L; or (m, 1), if the other arrays are (m, n) for m problems; then so is the bound
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
@@ -98,7 +99,7 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` for the loads `smooth_loads`.
+    It is `approach_bound` with the weights `smooth_loads`.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
@@ -128,7 +129,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] loads with this total, for the surface displacement of a smooth sphere."""
+    """(n,) [force] Hertz's loads of this total, if the surface sinks as under a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)

@@ -10,21 +10,21 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
-#: If contact radii are at most this fraction of the distance to the nearest neighbour, every other
-#: solution covers a summit: the root a of m = pi / 4 for b = 1 in (1), rounded down.
+#: If contact radii are at most this fraction of the distance to the nearest neighbour, in every
+#: other solution a disc covers a neighbour's summit: the root a of m = pi / 4 for b = 1 in (1).
 ROOMY = 0.52
 
 
 class OtherSolutions(NamedTuple):
     """Properties of all solutions other than the one found."""
 
-    possible: bool
-    crowding: float  # lower bound on their crowding; infinite if there are none
+    possible: bool  # False if it is proved that there are none
+    crowding: float  # lower bound on their crowding (see `Certificate`); infinite if there are none
     cover: bool  # in each of them a disc covers the nearest neighbour's summit
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """The bounds for loads (n,) up to `near`, and approaches up to `approach_bound`."""
+        """The bounds; `near` (n,) bounds the loads found, `approach_bound` any solution's approach."""
 
         def radii(loads: Array) -> Array:
             return problem.radii(problem.compliance(loads)) * (1 + SAFETY)

@@ -22,9 +22,9 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t, the cheapest first; a factor that widens the shells of nearly singular
-#: pairs; and the largest difference of the radii of two neighbours, over their distance.
-#: Heuristics: any radii give valid bounds.
+#: WIDTHS are radii of shells divided by t, the cheapest first. WIDENED is a factor for the shells
+#: of nearly singular pairs. LESS is the largest difference between the radii of two neighbours,
+#: divided by their distance. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -36,15 +36,15 @@ MOST_PAIRS = 200
 #: Overlaps of shells wider than this many times the median are searched one by one, for speed only.
 WIDE = 2.0
 
-#: Largest number of asperities: an elimination takes 5 s at 100,000, and a proof needs several.
+#: Largest number of asperities for which a proof is tried: an elimination takes 5 s at 100,000.
 MOST_ELIMINATED = 200_000
 
 
 class Overlaps(NamedTuple):
     """Pairs of overlapping shells."""
 
-    first: Indices
-    second: Indices
+    first: Indices  # one asperity i of each pair
+    second: Indices  # the other asperity j
     values: Array  # (t_i t_j)^(1/2) (1 / r_ij - U_ij)
     sizes: Array  # (t_i t_j)^(1/2) / r_ij
 
@@ -74,8 +74,8 @@ def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[f
 class Nearest(NamedTuple):
     """The nearest neighbours of each asperity."""
 
-    distances: Array  # (n, m)
-    which: Indices  # (n, m)
+    distances: Array  # (n, m) to the m nearest neighbours
+    which: Indices  # (n, m) indices of these neighbours
     closest: Array  # (n,) the largest (t_i t_j)^(1/2) / r_ij with a neighbour
     meeting: NDArray[np.bool_]  # (n,) true if t_i + t_j > r_ij with a neighbour
 
@@ -94,14 +94,14 @@ class Nearest(NamedTuple):
         return cls(distances, which, closest, meeting)
 
     def wide_radii(self, lengths: Array, width: float) -> Array:
-        """(n,) radii of shells; each `closest` must be below 1."""
+        """(n,) radii of shells, `width` times `lengths` or more; each `closest` must be below 1."""
         radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
         covering: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
         return np.asarray(np.maximum(radii, covering))
 
 
 def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
-    """All pairs whose shells overlap; None if they are too many."""
+    """All pairs of asperities whose shells overlap; None if these may be too many to store."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     tree = cKDTree(points)
@@ -123,7 +123,7 @@ def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
     near = radii[i] + radii[j] > r
     i, j, r = i[near], j[near], r[near]
     large, small = np.maximum(radii[i], radii[j]), np.minimum(radii[i], radii[j])
-    # The energy of two shells, over that of two points.
+    # U_ij r_ij: the energy of two shells, divided by that of two points.
     crossing = 1.0 - (large + small - r) ** 2 / (4.0 * large * small)
     energy = np.where(r <= large - small, r / large, crossing)
     sizes = np.sqrt(lengths[i] * lengths[j]) / r

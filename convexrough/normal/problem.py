@@ -42,14 +42,16 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Weight of contact radii in the radii of fitted shells; half the distances have the rest. A
-#: heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which box", 3).
+#: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
+#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
+#: box", 3).
 FITTED = 0.9
 
 #: Number of candidates up to which the prescribed displacements are cached.
 MOST_KEPT = 2**20
 
-#: Largest change of loads, over the largest load, whose float64 product with A gives 29 digits.
+#: If no load changes by more than this part of the largest one, a float64 product of A with the
+#: changes updates A P to 29 digits.
 NEARBY = 1e-13
 
 #: 1 / pi to 66 digits.
@@ -83,6 +85,7 @@ class NormalProblem:
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     approach_bound : upper bound on D0 at any solution
+    exact_load, exact_approach : the prescribed number as a ball; None if it is a float64 number
     """
 
     scene: Scene
@@ -104,7 +107,7 @@ class NormalProblem:
 
     @cached_property
     def exact(self) -> Data:
-        """The data of the scene to thirty digits."""
+        """The coefficients k, the offsets d and 1 / (pi E*) to about thirty digits."""
         scene, units = self.scene, self.units
         constants = (
             scene.sphere_radius,
@@ -150,14 +153,14 @@ class NormalProblem:
 
     @cached_property
     def places(self) -> Indices:
-        """(N,) index of each asperity in `candidates`, which are in any order; -1 for others."""
+        """(N,) the position of each asperity of the scene in `candidates`; -1 for all others."""
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places
 
     @property
     def exact_depths(self) -> Ball:
-        """(n,) D, at a prescribed approach; cached unless it is large."""
+        """(n,) D = D0 + d, for a prescribed approach D0; cached unless it is large."""
         found: Ball | None = self.__dict__.get("_depths")
         if found is None:
             found = self.exact.offsets + self.depth
@@ -170,7 +173,7 @@ class NormalProblem:
         return self.influence.sums(loads) * self.exact.scale
 
     def plain_product(self, loads: Pair) -> Ball:
-        """(n,) A P for loads >= 0, to the digits of float64."""
+        """(n,) A P for loads >= 0, computed in float64, with bounds on the rounding errors."""
         product, off = self.influence.apply(loads.high), self.influence.rounding(loads.high)
         most = np.maximum(product, 0.0) + off.of(product)
         errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
@@ -180,7 +183,7 @@ class NormalProblem:
         """(n,) the change of the unknowns delta of docs/theory/newton.md in one Newton step.
 
         slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) F(delta), which the step reduces to 0
-        enough : accept a step that reduces the defect by this factor
+        enough : fraction of the defect that the step may leave;  todo : for `Stack.correct` only
 
         On a lattice the step leaves out asperities with slope and defect 0, for smaller transforms.
         """
@@ -199,7 +202,7 @@ class NormalProblem:
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """A P for the loads `others`, from `product` = A `loads` and the difference if cheaper."""
+        """(n,) A P for P = `others`; if cheaper, from `product` = A `loads` and the difference."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:
@@ -284,7 +287,7 @@ class NormalProblem:
         )
 
     def widened(self, which: Indices) -> NormalProblem:
-        """The problem whose candidates are these asperities of the scene, more than before."""
+        """The same problem with more candidates: the asperities `which` of the scene."""
         scene, units = self.scene, self.units
         coefficients = hertz.local_coefficient(
             scene.material.contact_modulus, scene.relative_radii[which]
@@ -301,7 +304,7 @@ class NormalProblem:
         )
 
     def fitted_to(self, loads: Array) -> NormalProblem:
-        """The same problem, with the largest shells that neighbours with these loads allow."""
+        """The same problem, with shells fitted to the contact radii at these loads."""
         shells = fitted_shells(self.influence, self.radii(self.compliance(loads)), FITTED)
         return replace(self, shells=shells)
 
@@ -331,7 +334,7 @@ class NormalProblem:
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
     def bounds(self, approach_bound: float) -> Array:
-        """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on loads of solutions with this D0."""
+        """(n,) bounds (max(D_i, 0) / k_i)^(3/2) on the loads of solutions, for this bound on D0."""
         rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
@@ -343,7 +346,7 @@ class NormalProblem:
         return h
 
     def smooth_indentation(self) -> Array:
-        """(n,) initial indentations: offsets less the displacement under a smooth sphere."""
+        """(n,) initial indentations: offsets less displacement by a smooth sphere, shifted."""
         scene, load = self.scene, self.load
         if load is None:
             load = alone = float(self.bounds(self.approach_bound).sum())
@@ -361,7 +364,7 @@ class NormalProblem:
         return float(self.convexity_at(self.compliance(loads)))
 
     def convexity_at(self, compliance: Array) -> Any:
-        """The `convexity_number` at loads with this compliance; (m, 1) for rows."""
+        """The `convexity_number` at loads with this compliance (n,); (m, 1) for (m, n)."""
         return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
@@ -397,7 +400,7 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """In scaled units: mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*)."""
+    """Mean curvature of the base; in scaled units k^3 for the curvature sum 1, and 1 / (pi E*)."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

@@ -27,11 +27,11 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Problem, Trial
 from convexrough.roundoff import SAFETY
 
-#: Number of boxes of touching asperities that are tried, and the ratio of a box to the latest error
-#: bounds. Heuristics.
+#: Number of boxes of touching asperities that are tried, and the distance from the loads to the end
+#: of the next box, divided by the latest error bounds. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: Relative error above which loads are also bounded through their indentations.
+#: Relative error of a load above which it is also bounded through the indentation.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -57,8 +57,8 @@ class Proved:
     box       : a box of loads that holds exactly one solution
     distance  : bound on || P - P* ||_H
     compliance : (n,) diagonal of H
-    loads, indentation : (n,) of the solution; negative indentations are gaps
-    approach  : of the solution
+    loads, indentation : (n,) those of the solution; a negative indentation is minus the gap
+    approach  : approach of the solution
     """
 
     problem: NormalProblem
@@ -130,7 +130,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution in this box; or bounds (n,) on load errors, if they reach beyond the box."""
+    """The solution proved in this box; or bounds (n,) on load errors that reach beyond the box."""
     known = solution_in(problem, box, state)
     if not known.inside:
         return known.at_first
@@ -138,7 +138,7 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
 
 
 class Known(NamedTuple):
-    """What the theorem proves in a box, for one problem, or for many with a row each.
+    """What the theorem proves in a box, for one problem or for a stack with one problem per row.
 
     inside   : True if it is proved that the box contains the solution; if not, nothing is proved
     at_first : (n,) bounds on the errors of the trial loads, valid if `inside`
@@ -156,7 +156,7 @@ class Known(NamedTuple):
 
 @np.errstate(all="ignore")
 def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
-    """The trial loads with error bounds, by the theorem on the box and then on a smaller one."""
+    """Bounds about the trial loads, by the theorem on the box and then on a smaller box."""
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
 
@@ -183,7 +183,7 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
 
 
 class _Missing(NamedTuple):
-    """The effect of a difference between the prescribed total and the sum of the loads P.
+    """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
     docs/theory/one-theorem.md derives it.
 
@@ -211,7 +211,7 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The loads; the ball (indentation / k)^(3/2) replaces an inexact load if it is smaller."""
+    """Balls of the loads; where a load is inexact, (indentation / k)^(3/2) if that is smaller."""
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
     return elementwise(_smaller, loads, indentation, problem.exact.coefficients)

@@ -1,7 +1,7 @@
 """The contact law on balls, and Newton's method that refines loads to thirty digits.
 
-Functions take one problem or a stack of m problems. Arrays are (n,) for one problem and (m, n) for
-a stack, where quantities with one number per problem are (m, 1).
+Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
+one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
 
 The residual  k P^(2/3) + A P - d - D0  of loads P known as pairs is a ball, whose radius bounds
 the errors of the data, the product and the arithmetic. A correction is one step of
@@ -33,14 +33,16 @@ CORRECTIONS = 12
 #: A correction aims to reduce the residual to this fraction of the residual's rounding error.
 ENOUGH = 0.1
 
-#: Number of candidates up to which refinement with a matrix costs no more than the solution.
+#: Number of candidates (asperities that could touch) up to which refinement with a stored matrix
+#: costs no more than the solution.
 FEW = 700
 
-#: Relative error of the total below which only the largest load is adjusted. Heuristic.
+#: If the sum of the loads misses the total by a smaller part, only the largest load is changed;
+#: otherwise all loads are scaled first. A heuristic.
 FITS = 1e-6
 
 
-#: One problem, or several in rows.
+#: One problem, or a stack with one problem in each row.
 Problem: TypeAlias = NormalProblem | Stack
 
 
@@ -70,7 +72,7 @@ class Trial:
 
     @property
     def excess(self) -> Array:
-        """(n,) violations of the contact law: |gap| where loaded, and the overlap elsewhere."""
+        """(n,) bounds on violations of the law: |gap| where loaded, max(-gap, 0) elsewhere."""
         return excess(self.gap, self.inside)
 
     @property
@@ -87,14 +89,14 @@ class Trial:
 
     @property
     def indentation(self) -> Ball:
-        """(n,) D0 + d - A P: the indentation if positive; if negative, its size is the gap."""
+        """(n,) indentations D0 + d - A P under these loads; a negative one is minus the gap."""
         problem = self.problem
         if problem.load is None:
             return problem.exact_depths - self.product
         return problem.exact.offsets + self.approach - self.product
 
     def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
-        """The trial with the rows `where` replaced by those of the other."""
+        """This trial of a stack, with the rows chosen by `where` replaced by those of `other`."""
         if where.all():
             return other
         select = partial(np.where, where[:, None])
@@ -108,7 +110,7 @@ class Trial:
 
 
 def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
-    """The residuals of loads, given A P and the difference from the prescribed total."""
+    """The trial of these loads; `product` is A P, `missing` is the given total minus their sum."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
@@ -129,7 +131,7 @@ def refines(problem: NormalProblem) -> bool:
 
 
 def refined(problem: Problem, best: Trial) -> Trial:
-    """The loads, corrected until a correction no longer halves the residual."""
+    """The trial `best`, corrected until a correction no longer halves its residual."""
     size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
     for _ in range(CORRECTIONS):
@@ -151,16 +153,15 @@ def refined(problem: Problem, best: Trial) -> Trial:
 
 
 def refined_loads(problem: Problem, loads: Array) -> Trial:
-    """`refined` from loads (n,) >= 0 of any solver."""
+    """The refined trial that starts from loads (n,) >= 0 of any solver."""
     pair, missing = completed(problem, Pair.exact(loads))
     return refined(problem, trial(problem, pair, missing, problem.product(pair)))
 
 
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
-    """One Newton step, in the rows `todo`.
+    """The trial after one Newton step in the rows for which `todo` is True.
 
-    enough : the linear solver may stop when it has reduced the residual by this factor: a number,
-        or (m,) for rows
+    enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
     """
     loads, missing = completed(problem, _after_step(problem, state, enough, todo))
     return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
@@ -192,7 +193,7 @@ def scaled(problem: Problem, loads: Pair) -> Pair:
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """Loads with the prescribed total, by a change of the largest; a bound on what they miss."""
+    """The loads changed to have the prescribed total, and a ball of the difference that is left."""
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
@@ -211,16 +212,16 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
 
 
 def sums(values: Pair) -> Pair:
-    """Sums along the last axis: a number, or (m, 1) for rows."""
+    """Sums along the last axis: a number, or (m, 1) for a stack."""
     total = values.total()
     return total if np.ndim(values.high) == 1 else Pair(*(part[:, None] for part in total))
 
 
 def defect_of(state: Trial) -> Any:
-    """The 2-norm of the residual of the contact law: a number, or (m,) for rows."""
+    """The 2-norm of the residual of the contact law: a number, or (m,) for a stack."""
     return np.sqrt((state.defect**2).sum(axis=-1))
 
 
 def rounding_of(state: Trial) -> Any:
-    """The 2-norm of the rounding errors of the residual: a number, or (m,) for rows."""
+    """The 2-norm of the rounding errors of the residual: a number, or (m,) for a stack."""
     return np.sqrt((state.gap.radius**2).sum(axis=-1))

@@ -1,4 +1,4 @@
-"""Many normal problems with equal numbers of candidates, one in each row.
+"""Many normal problems with equal numbers of asperities that could touch, one in each row.
 
 The functions of `refine` and `proved` take such a stack in place of a single problem.
 """
@@ -67,12 +67,12 @@ class Stack:
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) bounds on the norms of the rows of A."""
+        """(m, 1) for each problem a bound on the largest 2-norm of a row of A."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) bounds on the entries of A."""
+        """(m, 1) for each problem a bound on the largest entry of A."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
@@ -110,11 +110,11 @@ class Stack:
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P of other loads, to about thirty digits."""
+        """(m, n) A P for P = `others`, to about thirty digits; the first two are not used."""
         return self.product(others)
 
     def convexity_at(self, compliance: Array) -> Array:
-        """(m, 1) convexity numbers at loads with this compliance."""
+        """(m, 1) convexity numbers at loads with this compliance (m, n)."""
         return np.asarray(largest(self.shells / compliance) * (1 + SAFETY))
 
     def compliance(self, loads: Array) -> Array:

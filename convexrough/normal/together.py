@@ -25,7 +25,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: Largest number of Newton steps.
 STEPS = 30
 
-#: Squared radius of a rough contact over that of Hertz's smooth contact. A heuristic.
+#: Estimated squared radius of a rough contact, divided by that of the smooth one. A heuristic.
 WIDER = 1.1
 
 #: Newton's method ends if the expected residual is below this fraction of the norm of the
@@ -39,7 +39,7 @@ quietly = np.errstate(all="ignore")
 
 
 class Rows(NamedTuple):
-    """The fields of `level.Level` for k levels: (k,) or (k, n), in scaled units."""
+    """The fields of `level.Level` for k levels of one scene: (k,) or (k, n), in scaled units."""
 
     load: Ball
     approach: Ball
@@ -68,7 +68,7 @@ class Solved:
 
     @cached_property
     def rows(self) -> Rows:
-        """The solutions as levels, with the proved statuses."""
+        """The solution of each row as a level, with the proved statuses."""
         touching = self.indentation.positive | self.loads.positive
         known = self.approach[:, 0], self.loads, self.indentation
         return Rows(self.total, *known, touching, self.indentation.negative)
@@ -100,9 +100,9 @@ class Solved:
 class _Pressed(NamedTuple):
     """A point of Newton's method, with the same quantities as in `solvers.pressing`."""
 
-    own: Array
-    loads: Array
-    gap: Array
+    own: Array  # (m, n) k P^(2/3)
+    loads: Array  # (m, n) P
+    gap: Array  # (m, n) k P^(2/3) + A P - D
 
     @property
     def defect(self) -> Array:
@@ -153,7 +153,7 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions of all rows; `good` are accurate ones with a proved status of all asperities.
+    """The solutions of all rows; a `good` one is accurate, with every asperity's status proved.
 
     prescribed, squares, reach : arguments of `guessed`;  box : default `widest`
     """
@@ -198,7 +198,7 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
 
 @quietly
 def widest(stack: Stack, state: Trial) -> Box:
-    """Boxes that contain every solution and these loads, with convexity shown by `shells`."""
+    """Boxes that contain every solution and these loads; the shells give their convexity."""
     if stack.load is None:
         highest = stack.depth.upper
     else:

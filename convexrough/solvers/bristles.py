@@ -62,8 +62,8 @@ LARGEST_S = 0.99
 #: matrix is definite. A heuristic, far above rounding.
 MARGIN = 0.001
 
-#: Smallest box over the largest. A heuristic: smaller loads need not be resolved, and compliances,
-#: proportional to load^(-1/3), differ by at most a factor of a hundred.
+#: Smallest B_i, divided by the largest. A heuristic: smaller loads need not be resolved, and
+#: compliances, proportional to load^(-1/3), differ by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -102,7 +102,7 @@ class BristleQP:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates, in scaled units. `start` is not used."""
+        """The solution in scaled units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.through(self.run)
         if self.newton_step:
@@ -140,7 +140,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, m, solver, *_convex_box(problem, solver))
 
     def apply(self) -> QuadraticProgram:
-        """The program. Its rows are phi_ij, sum_j e_ij / m, and the total load if prescribed."""
+        """The program; it constrains phi_ij, sum_j e_ij / m, and the total load if prescribed."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
@@ -191,7 +191,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The box of loads, where it is cut to be convex, and the definite matrix A + diag(h)."""
+    """The box B, (n,) True where it was cut for convexity, and the definite A + diag(h)."""
     approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)

@@ -33,13 +33,13 @@ NEGLIGIBLE = 1e-12
 #: interior-point methods lose half their digits. A heuristic: any larger value would do.
 WIDENED = 1.1
 
-#: With a Newton step: the largest accepted residual max |g| over |D0| + max |d_i|. If the first
-#: step leaves more, a second one follows.
+#: With a Newton step: the largest accepted residual max |g|, divided by |D0| + max |d_i|. If the
+#: first step leaves more, a second one follows.
 ACCURATE = 1e-13
 
-#: Without a Newton step: the largest accepted max |P - P(D - A P)| over max P, over the square root
-#: of the tolerance, because the error of loads is proportional to the root of that of the energy.
-#: The value is a heuristic.
+#: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
+#: the tolerance: errors of loads are proportional to the root of that of the energy. P(delta) is
+#: Hertz's load at the indentation delta. The value is a heuristic.
 ROOTS = 10.0
 
 
@@ -69,7 +69,7 @@ class TooDenseError(InputError):
 class ConeBoxes:
     """The asperities of a cone program, their boxes, and the form of their cones.
 
-    members : (m,) candidates in the program
+    members : (m,) the asperities in the program, as indices into `problem.candidates`
     loads   : (m,) B_i, upper ends of the boxes
     S       : (m,) convexity numbers of the boxes
     cut     : (m,) True where B_i is below the a priori bound
@@ -108,7 +108,7 @@ class ConeBoxes:
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The error for members on a cut face; `pressed` (m,) has their `ratios`, 0 for others."""
+        """The error that names the members for which `pressed` (m,), their `ratios`, is not 0."""
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -151,7 +151,7 @@ class ConeSolver(ABC):
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates, with four cones, or five if the solution reaches a cut face.
+        """The solution by four cones or, if it reaches a face where the box was cut, by five.
 
         start : not used
         """
@@ -162,7 +162,7 @@ class ConeSolver(ABC):
 
 
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
-    """The checked solution with one form of the cones."""
+    """The checked solution of the cone program on these boxes."""
     most = float(boxes.loads.sum())
     if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
@@ -210,7 +210,7 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) the `ratios` of TooDenseError for members that a cut face stops, 0 for others."""
+    """(m,) the `ratios` of TooDenseError of members with a load limited by a cut face; else 0."""
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads
@@ -224,7 +224,7 @@ def _after_newton_step(
     """The solution after one or two Newton steps; `alone` is P(D - A P) for P = `loads`.
 
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
-    Each asperity starts from the more accurate of the two, also where a load is almost 0.
+    So an asperity starts from `alone` where h_i exceeds its row sum of A, and else from `loads`.
     """
     light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)

@@ -1,9 +1,9 @@
 """Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
 Asperities are grouped in rings about the axis. All asperities of a ring get the same displacement
-w by the loads of all rings, and by Hertz's law the loads P(w) at the indentations D - w. K are the
-displacements by unit loads spread evenly over the rings. Newton's method solves  w = K P(w)
-(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights and radii).
+w by the loads of all rings, and by Hertz's law the loads P(w) at the indentations D - w. K holds
+the displacement of each ring by a unit load spread evenly over each ring. Newton's method solves
+w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights and radii).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations in scaled units, negative where open; `smooth_indentation` if it fails."""
+    """(n,) indentations in scaled units, negative where open; under a smooth sphere if this fails."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
@@ -90,18 +90,18 @@ def _mean_field(problem: NormalProblem) -> Array:
 class _Rings:
     """For each asperity two neighbouring rings, and its relative position between their middles."""
 
-    first: Indices
-    share: Array
-    count: int
+    first: Indices  # (n,) the inner one of the two rings
+    share: Array  # (n,) 0 in the middle of this ring, 1 in the middle of the next
+    count: int  # number of rings
 
     @classmethod
     def of(cls, places: Array, count: int) -> _Rings:
-        """The rings of asperities; `places` (n,) are squared distances over the width of a ring."""
+        """The rings of asperities at squared distances `places`, in units of a ring's width."""
         first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
         return cls(first, places - 0.5 - first, count)
 
     def sums(self, values: Array) -> Array:
-        """(count,) sums over the rings; beyond the middle of an end ring, this ring gets all."""
+        """(count,) sums over the rings of values (n,), shared by the two rings of each asperity."""
         outer = np.clip(self.share, 0.0, 1.0) * values
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]
@@ -113,7 +113,7 @@ class _Rings:
 
 
 def smooth_contact_radius(problem: NormalProblem) -> float:
-    """Contact radius a [length] of a smooth sphere at the approach or load; inf if it is flat."""
+    """[length] contact radius of the smooth sphere at the prescribed quantity; infinite if flat."""
     scene, units = problem.scene, problem.units
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
     if radius == np.inf:
@@ -124,7 +124,7 @@ def smooth_contact_radius(problem: NormalProblem) -> float:
 
 
 def _disc(distance: Array, radius: Array) -> Array:
-    """The integral of 1 / r over a disc, r from a point at this distance from its centre."""
+    """The integral of 1 / r over a disc, with r from a point at `distance` from its centre."""
     from scipy.special import ellipe, ellipk  # 0.1 s to import: only where there are many
 
     r, a = np.broadcast_arrays(distance, radius)

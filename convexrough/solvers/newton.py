@@ -23,7 +23,7 @@ from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: Number of candidates up to which the iteration includes all of them. It affects speed only.
+#: Number of asperities that could touch up to which the iteration includes all. For speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
@@ -59,7 +59,7 @@ class Newton:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates in scaled units, from any start >= 0."""
+        """The solution in scaled units; `start` (n,) are initial loads >= 0, or None."""
         loads, approach, iterations = self._found(problem, start)
         if self._refines(problem):  # the iteration has stopped early
             trial = refined_loads(problem, loads).frozen()
@@ -103,14 +103,14 @@ class Newton:
         near: Indices,
         indentation: Array,
     ) -> tuple[PressingState, int]:
-        """The solution in which all candidates that are not `near` carry no load."""
+        """The state in which only the asperities `near` may be loaded, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
-            if self._refines(problem):  # refinement does the rest, which is linear
+            if self._refines(problem):  # refinement makes the remaining linear correction
                 stopping = replace(stopping, linear=negligible(indentation))
             return newton.solve(law, state, stopping)
         except SolverError as error:
@@ -132,7 +132,7 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """Initial indentations: by Hertz's law, -1 where a load is 0; without loads, estimates."""
+    """(n,) initial indentations: by Hertz's law, -1 where a load is 0; for None, estimates."""
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)

@@ -13,8 +13,8 @@ from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton's method may end at a defect of this fraction of the indentations, which refinement about
-#: squares. A heuristic.
+#: Newton's method may end if the norm of the defect is this fraction of that of the indentations;
+#: one correction by refinement about squares the fraction. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
 
@@ -122,12 +122,12 @@ class Pressing:
 
 
 def negligible(indentation: Array) -> float:
-    """The 2-norm of F at which the iteration may end and refinement follow."""
+    """The 2-norm of F at which the iteration may end, because a correction follows."""
     return NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
 
 
 def on_constraint(problem: NormalProblem, indentation: Array) -> Array:
-    """Indentations limited to the a priori box, or shifted to satisfy the prescribed load."""
+    """(n,) indentations, limited to the largest possible D, or shifted to the prescribed load."""
     if problem.load is not None:
         return shifted_to_load(indentation, problem.coefficients, problem.load)
     return np.minimum(indentation, problem.approach_bound + problem.offsets)

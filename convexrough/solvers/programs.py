@@ -113,7 +113,7 @@ class RawAnswer(NamedTuple):
     """A solver's answer to a program in standard form."""
 
     x: Array
-    multipliers: Array  # of the rows of A
+    multipliers: Array  # one for each row of A
     iterations: int
     status: str  # as the solver names it
 
@@ -121,7 +121,7 @@ class RawAnswer(NamedTuple):
 class ProgramAnswer(NamedTuple):
     """The answer of a program to a normal problem, not yet checked."""
 
-    loads: Array  # of the asperities in the program, in the problem's order and units
+    loads: Array  # those of the asperities in the program, in the problem's order and units
     approach: float  # prescribed, or from the multiplier of the total load
     iterations: int
 

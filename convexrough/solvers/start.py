@@ -10,7 +10,7 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation, smooth_contact_radius
 
-#: Largest number of candidates for which a product with A is used. It affects speed only.
+#: Largest number of asperities that could touch for which a product with A is used. For speed only.
 FEW = 1000
 
 #: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
@@ -18,16 +18,16 @@ WIDER = 1.1
 
 
 def start_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates in scaled units, negative where open."""
+    """(n,) initial indentations of all asperities that could touch; negative where open."""
     if len(problem) > FEW:
         return mean_field_indentation(problem)
     return _on_hertz_pressure(problem)
 
 
 def _on_hertz_pressure(problem: NormalProblem) -> Array:
-    """D - A P for loads P = x^3 s, s = (1 - r^2 / a^2)^(1/2): like Hertz's pressure.
+    """(n,) D - A P for loads P = x^3 s shaped like Hertz's pressure, s = (1 - r^2 / a^2)^(1/2).
 
-    x follows from a prescribed load, or minimises the energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
+    x follows from a prescribed load, or from  x^2 sum k s^(5/3) + x^3 s'A s = D's  (least energy).
     """
     reach = smooth_contact_radius(problem) or 1.0
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
