@@ -2,8 +2,8 @@
 
 The energy W(T) is the integral of the deflection of the asperity over its shear force T. It is
 convex and consists of one stuck piece, and of a slipping piece for each direction of slip and each
-old layer in which the slip front may end: docs/theory/without-order.md, "The step as one cone
-program".
+layer of the old memory curve in which the slip front may end: docs/theory/without-order.md,
+"The step as one cone program".
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class ConePiece(NamedTuple):
         return found
 
     def cost(self, force: float) -> float:
-        """W - energy."""
+        """W at this force, minus the constant `energy`."""
         if self.rate == 0.0:
             return (self.own + 0.5 * self.softness * (force - self.force)) * (force - self.force)
         level = max((self.force - force) / self.rate, 0.0)

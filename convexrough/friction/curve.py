@@ -141,7 +141,7 @@ class MemoryCurve(Table, Plottable):
         return below._with(self.slopes[last], load, height)
 
     def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
-        """Where a segment of falling load meets the old curve again; else the segment's end."""
+        """The point where a segment of falling load meets the old curve again; else its end."""
         direction = (height - self.height) / (load - self.load)
         over = Fraction(0)  # sign times (path - old curve)
         for k in reversed(range(len(self.slopes))):

@@ -54,9 +54,10 @@ class Bundle:
     """The state of n asperities after a step.
 
     load, height : [force] P and T = Q / f
+    level     : the normal solution at P
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
-    carried   : (n,) T_i
+    carried   : (n,) [force] T_i, the shear forces of the asperities divided by f
     positions : (n,) deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
@@ -246,8 +247,8 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
 
 
 class _Iterate(NamedTuple):
-    eta: Array
-    x: float
+    eta: Array  # (n,) displacements of the asperities in the step
+    x: float  # displacement of the bodies in the step
     own: OwnStep
     slopes: Array  # dT_i / deta_i
     defect: Array  # (n,) defects of the first equation of (1)

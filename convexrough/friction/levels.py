@@ -185,12 +185,12 @@ class FrictionLevels:
         )
 
     def loads(self, level: Level) -> Ball:
-        """(N,) loads P_i in scaled units."""
+        """(N,) the loads P_i of a level, in scaled units."""
         found: Ball = of_rows(self.to_scene, level.loads)
         return found
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) indentations n_i in scaled units; in float64 for asperities that cannot touch."""
+        """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
         others = self._others
         if len(others) == 0:
@@ -226,7 +226,7 @@ class FrictionLevels:
         return among_zeros(values, self.candidates, len(self.scene), axis=-1)
 
     def _balls(self, loads: Sequence[Fraction]) -> Ball:
-        """(k,) the loads in scaled units."""
+        """(k,) the total loads that these numbers identify, in scaled units."""
         if self.by_load:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
@@ -266,7 +266,7 @@ class Snapshot(NamedTuple):
 
     load, loads    : [force] total load, and load of each asperity
     indentations   : [length] indentations, or minus the gap where open
-    touching, open : true where this is proved
+    touching, open : True where the asperity is proved to touch, or to be open
     """
 
     load: float

@@ -31,7 +31,7 @@ Pair: TypeAlias = tuple[Fraction, Fraction]
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) two parts of B, due to partial slip and to sliding, for k pairs of levels P and L."""
+    """The parts (k, n) of all B_i due to partial slip and to sliding, for k pairs P and L."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -63,7 +63,7 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 
 
 def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) the integral of -dB/dL along each piece."""
+    """(k,) the integral of -dB/dL along each piece of a segment (`curve.Piece`)."""
     levels.prepare(load for piece in pieces for load in piece[2:])
     still = np.array([piece.load_constant for piece in pieces], dtype=bool)
     at, found = (

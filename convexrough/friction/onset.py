@@ -23,10 +23,10 @@ from convexrough.friction.levels import FrictionLevels
 #: The largest number of onsets in one call if no compliance matrix is stored.
 MOST_ONSETS = 256
 
-#: Relative distances from the root at which proofs are tried, the closest first.
+#: Relative distances from the computed onset at which proofs are tried, the closest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: Levels that are known already are used if they are nearer than TRIED[ENOUGH] to the root.
+#: Levels that are known already are used if they are nearer than TRIED[ENOUGH] to the onset.
 ENOUGH = 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, that ends them.
@@ -92,7 +92,7 @@ def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """The onset of one asperity, enclosed by levels near the root; known levels are tried first."""
+    """The onset of one asperity, enclosed by levels near it; known levels are tried first."""
     place = int(levels.top.problem.places[asperity])
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -105,7 +105,7 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
 
 
 def root(levels: FrictionLevels, place: int) -> Fraction:
-    """The load at which the indentation of the candidate with the index `place` is 0."""
+    """The load at which the indentation of the asperity `levels.candidates[place]` is 0."""
 
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
@@ -142,7 +142,7 @@ def _short(load: Fraction) -> Fraction:
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
-    """The index and the onset of the asperity that touches last, of those that touch at P."""
+    """The index and the onset of the last asperity to touch among those that touch at P."""
     touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
     depths = levels.top.indentation.value[touching]
     last = int(touching[np.argmin(depths)])

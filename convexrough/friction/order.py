@@ -137,7 +137,7 @@ def order_between(
 
 
 def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """Whether the upper level proves order down to the lower one, by (a) and (b).
+    """True if the upper level proves order down to the lower one, by (a) and (b).
 
     rising : (n,) true for asperities that may touch at the highest load of the path
     most   : as in `order_between`
@@ -286,7 +286,7 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if each asperity is open at `lower`, or `rising` and deeper at `upper`, as proved."""
+    """False if each asperity is proved open at `lower`, or is `rising` and proved deeper above."""
     if upper.solution is None:
         return True
     if lower.solution is None:

@@ -24,7 +24,7 @@ from convexrough.sphere import hertz
 
 
 class OwnCurves(NamedTuple):
-    """The curves of n asperities: polygons of m vertices, of which the last may be repeated.
+    """The curves of n asperities: polygons of m vertices; the last vertex may be repeated.
 
     coefficients : (n,) k of Hertz's law
     levels, heights : (n, m) indentations and deflections at the vertices
@@ -47,12 +47,12 @@ class OwnCurves(NamedTuple):
         )
 
     def cut(self, indentations: Array) -> OwnCurves:
-        """The curves up to these indentations, (n,), or to their ends if these are lower."""
+        """The curves up to these indentations (n,); curves that end below them are unchanged."""
         front = self._front(np.zeros(len(indentations)), indentations)
         return self._ended(front, front.level, front.height, front.load, front.force)
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
-        """A straight step to the ends (n,); the curves must have been cut at `indentations`."""
+        """A straight step that ends here, (n,) each; the curves must be cut at `indentations`."""
         base, moved = self.levels[:, -1], deflections - self.heights[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
@@ -116,7 +116,7 @@ class OwnCurves(NamedTuple):
 
 
 class _Front(NamedTuple):
-    """Points on the curves: each lies before the vertex `after`; all arrays are (n,)."""
+    """One point on each curve, before its vertex with the index `after`; arrays are (n,)."""
 
     after: Indices
     level: Array
@@ -150,5 +150,5 @@ class OwnStep(NamedTuple):
 
     @property
     def fronts(self) -> Array:
-        """Indentations at the slip fronts; the whole indentation where nothing slips."""
+        """(n,) indentations at the slip fronts; the whole indentation where nothing slips."""
         return np.where(self.slips, self.front.level, self.indentations)

@@ -36,8 +36,8 @@ class PhaseLosses(Table, Plottable):
     Arrays have one value for each ellipse: all phases of the first factor, then of the next.
 
     phases, factors : (c,) phase [rad], and factor of both amplitudes
-    losses  : (c,) [force length] energy lost by both bodies per steady cycle, if chords replace the
-        ellipse
+    losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
+        replace the ellipse
     loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
         the chords
     smooth  : (c,) [force length] losses of the smooth sphere; nan if no smooth solution is known

@@ -85,7 +85,7 @@ class LevelSums(NamedTuple):
         return cls(used, places, Ball.around(Pair(high, low), 2.0**-98 * np.abs(high)))
 
     def total(self, values: Ball) -> Ball:
-        """(m, ...) sums of values (k, ...) at the levels."""
+        """(m, ...) for each curve the weighted sum of values (k, ...) at the levels `used`."""
         wide = (slice(None),) + (None,) * (len(values.shape) - 1)
         total = Ball.exact(np.zeros((len(self.places), *values.shape[1:])))
         for j in range(self.places.shape[1]):
@@ -119,7 +119,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from the proofs at P and L."""
+    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from proofs at P and the front."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)

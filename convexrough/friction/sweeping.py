@@ -43,7 +43,8 @@ from convexrough.roundoff import ROUNDOFF
 NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
 
 #: The constraints of weights of least total are at the NEAR nearest asperities, and at one in each
-#: of SECTORS sectors of RINGS rings. The estimate of the gap to the least total contains CENTRED.
+#: of SECTORS sectors of RINGS rings. CENTRED is a factor in the estimate of the distance to the
+#: least total.
 NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
 
 #: Largest number of Newton steps for weights of least total, and the gap at which the steps end.
@@ -52,7 +53,8 @@ STEPS, LEAST = 40, 1e-8
 #: Largest number of searches for weights of least energy; each drops neighbours of weights below 0.
 SEARCHES = 8
 
-#: Number of directions in which the extent of the support is computed; numbers in memory at once.
+#: Number of directions in which the extent of the support is computed, and the count of float64
+#: numbers that are in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
@@ -148,7 +150,7 @@ class _Swept:
         return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
 
     def outside(self, which: Indices) -> Array:
-        """(m,) bounds on rates by sweeping onto one neighbour; -inf where this is not enough."""
+        """(m,) lower bounds on rates by sweeping onto one neighbour; -inf where that fails."""
         near, here = self.neighbours(which, NEIGHBOURS), self.places[which][:, None]
         away, middle = self.places[near] - here, (self.places[near] + here) / 2
         nearer = self._least_along(away) - (away.conj() * middle).real
@@ -157,7 +159,7 @@ class _Swept:
         return np.where(found, self.lost / 2, -np.inf)
 
     def lightest(self, which: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours and their weights of least energy; all 0 where none are found."""
+        """(m, s) neighbours, and their weights of least energy; all are 0 if none are found."""
         near = self.neighbours(which, NEIGHBOURS)
         return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
 
@@ -242,7 +244,7 @@ class _Swept:
         return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) 1 - q of (1), and the k for which q is largest; -inf where all weights are 0."""
+        """(m,) bounds 1 - q_i, -inf where all weights are 0; and the k of (1) that sets q_i."""
         from scipy.sparse import csr_array
 
         total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()

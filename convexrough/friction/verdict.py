@@ -32,7 +32,7 @@ class ShearVerdict(Claim, Record):
     claimed : (n,) true where the asperity is claimed to slide
     within  : largest error allowed, as a fraction of the largest force
     certificate : certificate of the claimed forces
-    solution : the solution, with the certificate of the solution
+    solution : the computed solution, with a certificate of its own
     """
 
     one = "force"

@@ -30,14 +30,14 @@ from convexrough.gradients.pulled import ZERO, Moves, Part
 #: both divided by the largest load. SHIFT is less than any difference of float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
-#: Weights on V, D0 and S at a level.
+#: The weights of V, D0 and S at one level in a weighted sum.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: For each segment: index of the end point, weight of the loss, weight of the last displacement.
+#: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
-#: Changes of P and of T at all points.
+#: The changes of P and of T at all points of a path, per unit of a parameter.
 Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
 
 #: The value of a derivative that does not exist or is infinite.
@@ -69,7 +69,7 @@ class LevelWeights(NamedTuple):
             add(after, run / fall, Fraction(0))
 
     def move(self, curve: MemoryCurve, weight: Fraction) -> None:
-        """Add the displacement of a state, multiplied by a weight."""
+        """Add the displacement of the state with this memory curve, multiplied by a weight."""
         add = self._adder(self.displacements, weight)
         for level, bend in curve.bends:
             add(level, Fraction(0), bend)
@@ -122,7 +122,7 @@ class Along:
         return found
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
-        """The part of each level, the weighted sum of losses, and that of displacements.
+        """The `Part` of each level, the weighted sum of losses, and that of displacements.
 
         moves : derivatives of the load of every level, at fixed T
         """
@@ -170,7 +170,7 @@ class Along:
         return total * times
 
     def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
-        """`factor` times the (m,) derivatives along directions, and (m, 2) from below and above.
+        """The derivatives (m,) along directions, times `factor`; (m, 2) those from below and above.
 
         A derivative is the mean of both sides if these agree within their error bounds. It is nan
         if the sides differ or one does not exist.

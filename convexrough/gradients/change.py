@@ -74,7 +74,7 @@ class ContactChange(Table):
 
     loads    : (n,) [force] loads, in the scene's order
     gaps     : (n,) [length] gaps, in the scene's order
-    approach : [length]
+    approach : [length] approach
     load     : [force] total load
 
     >>> print(f"{contact.change(cr.Direction(load=1e-9)).approach:.4g}")
@@ -98,7 +98,7 @@ class ShearChange(Table):
     pressed : changes of the contact
     forces  : (n,) [force] shear forces, in the scene's order
     slips   : (n,) [length] gross slips, in the scene's order
-    displacement : [length]
+    displacement : [length] tangential displacement of the bodies relative to each other
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print(f"{state.change(cr.Direction(force=1e-9)).displacement:.4g}")
@@ -219,7 +219,7 @@ class _Moved(NamedTuple):
 class _Bent:
     """The changes of a scene's geometry and modulus in one direction.
 
-    everywhere, here : changes of all asperities, and of the candidates only
+    everywhere, here : changes of all asperities, and only of those that could touch (candidates)
     modulus : dlog E*
     """
 
@@ -258,7 +258,7 @@ class _Bent:
         return _Moved(loads, approach + raised - product(level, loads), approach, total)
 
     def _felt(self, level: Level) -> Ball:
-        """(n,) dA P."""
+        """(n,) dA P, the change of A P that is due to the change of A."""
         coupled = level.approach + level.problem.exact.offsets - level.indentation
         change, points = coupled * -self.modulus, self.here.points
         if points.value.any():

@@ -59,7 +59,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
 
 
 def _loss(number: Number, order: Order) -> Number:
-    """The number, a loss, with infinite error bounds unless order is proved."""
+    """The given `Number`, a loss; its error bounds become infinite unless order is proved."""
     return number if order == "proved" else number.times(UNKNOWN, {})
 
 

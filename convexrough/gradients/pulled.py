@@ -29,7 +29,7 @@ class Part:
     """The part of a number that comes from one level: a weighted sum of V, D0, P and n.
 
     energy, approach : weights of V and D0, in the unit of the number over that of the level
-    loads, indentations : (n,) weights of P and n, in such units
+    loads, indentations : (n,) weights of P and n, in the unit of the number over that of the level
     moves : derivatives of the level's total load by parameters of the number
     """
 
@@ -62,9 +62,9 @@ class Part:
 
 
 class Pulled(NamedTuple):
-    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a part.
+    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a `Part`.
 
-    offsets, local, left : (n,) the coefficients
+    offsets, local, left, load : these coefficients; the first three are (n,)
     loads, coupled : (n,) P and A P
     total : L
     steep : weight of D0 if L = 0, where the derivative dD0/dL is infinite

@@ -47,7 +47,7 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Geometry:
-    """The geometry of a problem's candidates in the scene's units, as balls.
+    """The geometry of the n asperities that could touch, in the scene's units, as balls.
 
     points, contact_points : (n, 2) r and c
     tips      : (n,) rho
@@ -165,7 +165,7 @@ class Derivatives:
 
     offsets : (n,) derivatives by d
     local   : (n,) derivatives by log k
-    pulled  : derivatives of each level
+    pulled  : the derivatives of the part of the number that each level contributes
     """
 
     geometry: Geometry
@@ -215,7 +215,7 @@ class Derivatives:
         return self.turning * geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
-        """(n,) derivatives along a change of the geometry."""
+        """(n,) the derivative along a change of the geometry, asperity by asperity."""
         found = self.offsets * by.offsets + self.local * by.local
         return found + (self.turning * by.points).sum() if self.geometry.closest else found
 

@@ -76,7 +76,7 @@ class Frictional:
         return self.known.at(self.known.load - height)
 
     def moves(self, height: Ball, /, **shares: float) -> Moves:
-        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ per force."""
+        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ by each force."""
         by_force = -1.0 / self.known.force_unit
         rates = {name: by_force * share for name, share in shares.items()}
         return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
@@ -202,7 +202,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """Weights of gaps, 0 for asperities that touch; if undecided, balls with 0 and the weight."""
+    """(n,) weights of gaps: 0 where touching; where undecided, balls of 0 and the weight."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
@@ -213,7 +213,7 @@ def _where_open(level: Level, weights: Array) -> Ball:
 
 
 def _wider(level: Level, which: Indices) -> Level:
-    """The level with further candidates, which are open."""
+    """The same level with more asperities `which`, which are open, among its candidates."""
     problem = level.problem.widened(which)
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)

@@ -25,9 +25,9 @@ from convexrough.vector_shear.problem import VectorProblem
 class Shares(NamedTuple):
     """Shares of the n loaded asperities. Errors are proved bounds, infinite without a proof.
 
-    values : (n,) or (n, 2, 2)
+    values : Y, (n,) or (n, 2, 2)
     errors : (n,), or (n, 2) for forces along x and along y
-    loads, load_errors : (n,) in scaled units
+    loads, load_errors : (n,) normal loads and bounds on their errors, in scaled units
     """
 
     values: Array

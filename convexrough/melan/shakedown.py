@@ -232,7 +232,7 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _fall(p: Array, t: Array) -> float:
-    """The decrease of L* per unit of the factor, (r_+ + r_-) / 2."""
+    """The decrease of L* per unit of the factor: the mean of max -(p + t) and max -(p - t)."""
     return float((-(p + t)).max() + (-(p - t)).max()) / 2
 
 

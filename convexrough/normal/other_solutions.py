@@ -24,7 +24,7 @@ class OtherSolutions(NamedTuple):
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """The bounds; `near` (n,) bounds the loads found, `approach_bound` any solution's approach."""
+        """The bounds; `near` (n,) bounds the loads found, `approach_bound` any approach."""
 
         def radii(loads: Array) -> Array:
             return problem.radii(problem.compliance(loads)) * (1 + SAFETY)

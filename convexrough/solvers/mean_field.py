@@ -29,7 +29,7 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations in scaled units, negative where open; under a smooth sphere if this fails."""
+    """(n,) scaled indentations, negative where open; `smooth_indentation` if rings fail."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:

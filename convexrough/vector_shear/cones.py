@@ -31,7 +31,7 @@ class _Lift(NamedTuple):
 
     orders : (k,) order of each variable in u; the first variable is the number 1
     cones  : (cones, 3, k) coefficients of x, y, w
-    share  : (k,) coefficients of m / P = 1 - t^3
+    share  : (k,) coefficients of m / P = 1 - t^3, with the bound m on |q|
     energy : (2, k) the coefficients of the local energy are the first row plus S times the second
     """
 
@@ -41,7 +41,7 @@ class _Lift(NamedTuple):
     energy: Array
 
 
-#: Variables 1, (1 - t^2)^2, t^2 u, t^2 u^2, t^2 u^3, t^3 u^3.
+#: The form with four cones, in the variables 1, (1 - t^2)^2, t^2 u, t^2 u^2, t^2 u^3, t^3 u^3.
 FOUR = _Lift(
     orders=np.array([0.0, 2, 1, 2, 3, 3]),
     cones=np.array(
@@ -56,7 +56,7 @@ FOUR = _Lift(
     energy=np.array([[0, 2 / 5, 0, 7 / 5, -3 / 5, 0], [0, -1 / 3, 0, -5 / 3, 1, 1 / 3]]),
 )
 
-#: Variables 1, u, u^2, u^3, u^4, u^5, t^3 u^3.
+#: The form with five cones, in the variables 1, u, u^2, u^3, u^4, u^5, t^3 u^3.
 FIVE = _Lift(
     orders=np.array([0.0, 1, 2, 3, 4, 5, 3]),
     cones=np.array(

@@ -134,7 +134,7 @@ class Loaded:
         return u.value[self.places], eta.value[self.places]
 
     def increments(self, deflections: Array) -> Array:
-        """(n,) the shear forces u at these deflections; P beyond the threshold."""
+        """(n,) the shear forces u at these deflections eta; u = P beyond the threshold."""
         u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.thresholds))
         return u
 
@@ -163,7 +163,7 @@ class Loaded:
 
     @cached_property
     def elastic(self) -> Ball:
-        """(n,) shares of the total if all stick: derivatives of the loads by their total."""
+        """(n,) parts of the total carried if all stick: derivatives of the loads by their sum."""
         return self.levels.top.tangent.loads[self.places]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:

@@ -35,7 +35,7 @@ MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 class VectorState(NamedTuple):
     """A friction state of the n loaded asperities, in scaled units.
 
-    total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2)
+    total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2) slip_i
     """
 
     total: Array
@@ -48,6 +48,7 @@ class VectorState(NamedTuple):
 class Shift(NamedTuple):
     """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
 
+    values : (n,) one entry for both directions of each asperity
     shares : (n,) S_i = values_i / h_i with the least local compliance h_i; the energy is convex if
         all S_i <= 1: docs/theory/vector-friction.md, "Convexity"
     """
@@ -100,7 +101,7 @@ class VectorProblem(Loaded):
 
     @property
     def product_error(self) -> float:
-        """Bound on the rounding error of (B q)_i over sum_j A_ij |q_j|."""
+        """Bound on the rounding error of (B q)_i, divided by sum_j A_ij |q_j|."""
         entries = self.influence.entry_error
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
