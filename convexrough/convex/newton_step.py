@@ -112,7 +112,7 @@ def _iterate(
     balanced: bool,
     tolerance: float,
 ) -> Array:
-    """Preconditioned conjugate gradients: docs/theory/newton.md, "Many asperities"."""
+    """The step by preconditioned conjugate gradients: docs/theory/newton.md, "Many asperities"."""
     single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT

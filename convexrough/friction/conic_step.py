@@ -57,7 +57,7 @@ class StepProgram:
     which  : (n,) indices of the asperities in the scene
     loads, own : (n,) loads N_i and indentations after the step
     parts  : (n,) p_i, the fraction of the step during which the asperity touches
-    shells : (n,) diagonal; the coupling plus this diagonal is positive semidefinite
+    shells : (n,) a diagonal; the coupling plus this diagonal is positive semidefinite
     pieces : pairs of an asperity (its index among the n) and a piece of its energy
     """
 
@@ -103,7 +103,7 @@ class StepProgram:
 
     @property
     def energies(self) -> Array:
-        """(n,) the unit of W_i / p_i."""
+        """(n,) the factors that turn the scaled energies W of the pieces into W_i / p_i."""
         return np.asarray(self.loads * self.own / self.parts)
 
     @property

@@ -3,8 +3,9 @@
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
 after any path of (P, T) is a polygon: heights Th(s) over load levels 0 <= s <= P, from (0, 0) to
 the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes it by one
-of the three rules of docs/theory/paths.md, "The rules". The rules do not depend on elasticity. All
-numbers are rational, as float64 numbers are, and every rule is exact.
+of the three rules of docs/theory/paths.md, "The rules". The slip front is the level above which the
+segment has changed the polygon. The rules do not depend on elasticity. All numbers are rational, as
+float64 numbers are, and every rule is exact.
 """
 
 from __future__ import annotations
@@ -188,7 +189,7 @@ class MemoryCurve(Table, Plottable):
         return replace(curve, front=front), pieces
 
     def _cut(self, vertex: int) -> MemoryCurve:
-        """The curve from the origin to a vertex."""
+        """The curve from the origin to the vertex with this index."""
         part = slice(vertex + 1)
         return MemoryCurve(self.levels[part], self.heights[part], self.slopes[:vertex])
 

@@ -437,7 +437,7 @@ def _cycles(
 ) -> list[Cycle]:
     """The steady cycles of several closed paths that begin from the same memory curve.
 
-    asked : points, loads and forces of each path
+    asked : for each path the points (P, T), the loads P and the shear forces Q
     """
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
@@ -457,7 +457,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """The result for a path, from the losses of two cycles and the displacements of its points."""
+    """The result, from the losses of cycles 1 and 2, and the displacements of the points."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5

@@ -75,7 +75,7 @@ class Bundle:
 
     @property
     def deflections(self) -> Array:
-        """(n,) own deflection over c_t f."""
+        """(n,) the own deflection of each asperity, divided by c_t f."""
         return self.curves.heights[:, -1]
 
 

@@ -86,7 +86,7 @@ class FrictionLevels:
 
     @property
     def top(self) -> Level:
-        """The level of P."""
+        """The level at the load P of the contact."""
         return self._levels.top
 
     @property

@@ -2,8 +2,9 @@
 
 docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2, with the coefficient of
 friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
-level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
-L, c the direction of slip, and B the sum of B_i(P, L) in (2) of that page. By (1) of that page,
+level L (above the front, slip has changed the memory curve), the loss per unit of L is
+(1 - c th) (-dB/dL). Here th is the slope of the memory curve at L, c the direction of slip, and B
+the sum of B_i(P, L) in (2) of that page. By (1) of that page,
 B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. All of this assumes order: no indentation falls as
 the load rises.
 """

@@ -107,7 +107,7 @@ def follow(
 
 
 def levels_needed(curves: Sequence[MemoryCurve], costs: Iterable[Iterable[Piece]]) -> set[Fraction]:
-    """The loads of all levels that the states of these curves and these losses need."""
+    """The loads of all levels needed for the states of these curves and for these losses."""
     return used_by(curves) | {load for pieces in costs for piece in pieces for load in piece[2:]}
 
 

@@ -54,7 +54,8 @@ class LevelWeights(NamedTuple):
         """Add the loss (1 - c th) I on a piece (`friction.loss`), multiplied by a weight.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
-        b = (P0 - P1) / (L0 - L1) and the mean M of D0 from P1 to P0.
+        b = (P0 - P1) / (L0 - L1) and the mean M of D0 from P1 to P0. The load is P and the slip
+        front L; 0 marks the start of the piece and 1 its end.
         """
         weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]

@@ -113,7 +113,7 @@ class Objective(Record):
         return np.concatenate([np.ravel(self._own(name)) for name in self.by]).astype(np.float64)
 
     def __call__(self, parameters: ArrayLike) -> tuple[float, Array]:
-        """The number, and the gradient (m,).
+        """The result as a number, and its gradient (m,).
 
         parameters : (m,) in the order of `by`, in the scene's units
 

@@ -204,7 +204,7 @@ class Derivatives:
 
     @cached_property
     def coupled(self) -> Ball:
-        """The sum of left'A P over levels."""
+        """The sum of left'A P over all levels, with `left` of each level's `Pulled`."""
         return sum((each.left.dot(each.coupled) for each in self.pulled), start=ZERO)
 
     @cached_property
@@ -215,7 +215,7 @@ class Derivatives:
         return self.turning * geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
-        """(n,) the derivative along a change of the geometry, asperity by asperity."""
+        """(n,) for each asperity the derivative along its change `by` of the geometry."""
         found = self.offsets * by.offsets + self.local * by.local
         return found + (self.turning * by.points).sum() if self.geometry.closest else found
 

@@ -58,7 +58,7 @@ class Frictional:
 
     @property
     def by_ratio(self) -> Ball:
-        """d log c_t / d nu."""
+        """The derivative of log c_t (Mindlin's ratio) by nu (Poisson's ratio)."""
         nu = Ball.exact(self.contact.scene.material.poisson_ratio)
         return 1.0 / ((1.0 - nu) * (2.0 - nu))
 
@@ -68,7 +68,7 @@ class Frictional:
         return self.known.units.force
 
     def below(self, what: str, force: float | Fraction, holding: Holding) -> Level:
-        """The level L = P - |Q| / f."""
+        """The level at the load L = P - |Q| / f, for the shear force Q = `force`."""
         height = abs(self.known.height(force))
         if height == self.known.load and holding == "approach":
             expected = "a force below f P: at constant approach f P may fall below the force"
@@ -202,7 +202,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """(n,) weights of gaps: 0 where touching; where undecided, balls of 0 and the weight."""
+    """(n,) weights of gaps: 0 where touching; where undecided, balls with 0 and the weight."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))

@@ -35,7 +35,7 @@ class Melan(NamedTuple):
     factor : lambda for the computed residual forces, shares and loads
     lower, upper : proved bounds; 0 and infinite if shares or loads are not proved
     gross  : lambda at which the path reaches the friction limit of the whole contact
-    rest   : (N, 2) [force] residual forces r_i minus the elastic shares of the mean force
+    rest   : (N, 2) [force] r_i minus the elastic shares of the mean force t0
     slips  : (m, N, 2) slips at each vertex
     """
 

@@ -275,7 +275,7 @@ class _Screened(NamedTuple):
 
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where D_i < 0, False where D0 = d_i = 0
-    coupling: Coupling | None  # maps loads to displacements here; None if all can touch
+    coupling: Coupling | None  # maps loads to their displacements; None if all can touch
     indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
 

@@ -41,7 +41,7 @@ MOST_ELIMINATED = 200_000
 
 
 class Overlaps(NamedTuple):
-    """Pairs of overlapping shells."""
+    """Pairs of overlapping shells, and the entries of S for these pairs."""
 
     first: Indices  # one asperity i of each pair
     second: Indices  # the other asperity j

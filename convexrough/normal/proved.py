@@ -1,9 +1,9 @@
-"""The proof that a solution exists near given loads, and bounds on the distance to it.
+"""The proof that a solution exists near trial loads, and bounds on the distance to it.
 
 The theorem of docs/theory/one-theorem.md is applied twice: on a box of loads on which the energy is
 convex (module `boxes`), and on a smaller box, which by the first result contains the solution
-(docs/theory/certificate.md). P are the loads, D0 the approach, A the compliance operator, H the
-local Hessian; a star marks the solution.
+(docs/theory/certificate.md). P are the trial loads, D0 the approach, A the compliance operator,
+H the local Hessian; a star marks the solution.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ class Trial:
 
     @property
     def numbers(self) -> tuple[Pair | Ball | Array, ...]:
-        """All fields but the problem."""
+        """All fields except the problem, in their order."""
         return self.loads, self.product, self.local, self.gap, self.approach, self.missing
 
 

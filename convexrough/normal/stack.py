@@ -40,12 +40,12 @@ class Stack:
 
     @cached_property
     def coefficients(self) -> Array:
-        """k, rounded to float64."""
+        """The coefficients k, rounded to float64."""
         return self.exact.coefficients.value
 
     @property
     def load(self) -> Array | None:
-        """(m, 1) the prescribed loads, or None."""
+        """(m, 1) the prescribed total loads, or None under approach control."""
         return None if self.exact_load is None else self.exact_load.value
 
     @property

@@ -49,7 +49,7 @@ class Rows(NamedTuple):
     open: NDArray[np.bool_]
 
     def at(self, which: Indices) -> Rows:
-        """The chosen levels."""
+        """The levels with these indices."""
         return Rows._make(each[which] for each in self)
 
 

@@ -38,7 +38,7 @@ class NearState(NamedTuple):
     """Loads near a solution, with any number of digits.
 
     loads    : (n,) [force] in the order of the scene's asperities
-    approach : [length]; None to compute the approach from the loads
+    approach : [length] approach; None to compute it from the loads
     """
 
     loads: Sequence[Fraction]
@@ -184,7 +184,7 @@ def _place(
 
 
 def _cube_root(x: Fraction) -> Fraction:
-    """The cube root with about thirty digits."""
+    """The cube root of x to about thirty digits."""
     near = Fraction(math.cbrt(x))
     return near + (x - near**3) / (3 * near**2) if near else near
 

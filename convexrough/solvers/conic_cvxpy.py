@@ -91,7 +91,7 @@ class ConicCVXPY(ConeSolver):
         return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
-        """Solve a cvxpy.Problem and return it."""
+        """Solve a cvxpy.Problem; return the same object, which then contains the solution."""
         cp = load_library("cvxpy", self.name)
         options: dict[str, float] = {}
         if names := OPTIONS.get(self.solver):

@@ -121,7 +121,7 @@ class Loaded:
 
     @property
     def most(self) -> Array:
-        """(n,) upper bounds on P."""
+        """(n,) upper bounds on the loads P."""
         return (self.loads + self.errors) * (1 + SAFETY)
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
@@ -146,13 +146,13 @@ class Loaded:
         return eta
 
     def slopes(self, deflections: Array) -> Array:
-        """(n,) c = du/deta, 0 where sliding."""
+        """(n,) c = du/deta at these deflections eta; 0 where sliding."""
         c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.thresholds))
         return c
 
     @cached_property
     def stiffest(self) -> Array:
-        """(n,) c at eta = 0: 2 E* a."""
+        """(n,) the slopes c at eta = 0, which are 2 E* a."""
         c: Array = 1.5 * self.loads / self.thresholds
         return c
 

@@ -106,7 +106,7 @@ class VectorProblem(Loaded):
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
     def couple(self, increments: Array) -> Array:
-        """(n, 2) B q."""
+        """(n, 2) the displacements B q for the forces q = `increments`."""
         product: Array = self.kernel @ increments.reshape(-1)
         return product.reshape(-1, 2)
 
