@@ -248,7 +248,7 @@ class Level:
         def excess(others: float) -> tuple[Array, float, float]:
             """Bounds on the residual if j takes the missing load, on this load, and on its effect.
 
-            others : load that asperities carry that may or may not touch
+            others : total load of the asperities that are neither proved to touch nor open
             """
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry

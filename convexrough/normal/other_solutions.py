@@ -11,7 +11,8 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
 #: If contact radii are at most this fraction of the distance to the nearest neighbour, in every
-#: other solution a disc covers a neighbour's summit: the root a of m = pi / 4 for b = 1 in (1).
+#: other solution a disc covers a neighbour's summit. It is the root a of m = pi / 4 for b = 1 in
+#: (1), rounded down.
 ROOMY = 0.52
 
 

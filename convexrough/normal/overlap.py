@@ -36,7 +36,8 @@ MOST_PAIRS = 200
 #: Overlaps of shells wider than this many times the median are searched one by one, for speed only.
 WIDE = 2.0
 
-#: Largest number of asperities for which a proof is tried: an elimination takes 5 s at 100,000.
+#: Largest number of asperities for which a proof is tried: it needs several eliminations, and one
+#: takes 5 s for 100,000 asperities.
 MOST_ELIMINATED = 200_000
 
 

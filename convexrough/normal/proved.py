@@ -156,7 +156,7 @@ class Known(NamedTuple):
 
 @np.errstate(all="ignore")
 def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
-    """Bounds about the trial loads, by the theorem on the box and then on a smaller box."""
+    """The solution near the trial loads, by the theorem on the box and then on a smaller box."""
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
 

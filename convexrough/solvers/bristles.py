@@ -191,7 +191,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The box B, (n,) True where it was cut for convexity, and the definite A + diag(h)."""
+    """The box B; True where it was cut for convexity; and the definite matrix A + diag(h)."""
     approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)

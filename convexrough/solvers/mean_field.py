@@ -29,7 +29,7 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) scaled indentations, negative where open; `smooth_indentation` if rings fail."""
+    """(n,) scaled indentations, negative where open; if this fails, `smooth_indentation`."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
@@ -102,7 +102,7 @@ class _Rings:
 
     def sums(self, values: Array) -> Array:
         """(count,) sums over the rings of values (n,), shared by the two rings of each asperity."""
-        outer = np.clip(self.share, 0.0, 1.0) * values
+        outer = np.clip(self.share, 0.0, 1.0) * values  # beyond its middle an end ring gets all
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]
         return total

@@ -23,7 +23,7 @@ from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: Number of asperities that could touch up to which the iteration includes all. For speed only.
+#: If at most so many asperities could touch, the iteration includes all. It affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.

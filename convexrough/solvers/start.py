@@ -10,7 +10,7 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation, smooth_contact_radius
 
-#: Largest number of asperities that could touch for which a product with A is used. For speed only.
+#: If more asperities could touch, no product with A is used. This number affects speed only.
 FEW = 1000
 
 #: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
