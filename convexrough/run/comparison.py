@@ -1,4 +1,4 @@
-"""The report of `compare`: a summary for programs, and aligned lines."""
+"""The report of `compare`: a summary for other programs, aligned lines, and warnings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate",
 
 
 def comparison_summary(comparison: Comparison, within: float) -> Summary:
-    """The summary of a comparison; `within` is as for `Comparison.disagreeing`."""
+    """The summary of a comparison; `within` is the tolerance of `Comparison.disagreeing`."""
     return headed(
         compare=[_entry(entry) for entry in comparison.entries],
         contradictions=list(comparison.contradictions),
@@ -43,7 +43,7 @@ def _entry(entry: Entry) -> Summary:
 
 
 def steps(comparison: Comparison) -> list[list[Any]]:
-    """A table of the logged iterations: headings, then a row for each iteration."""
+    """A table of the iterations that solvers logged: headings, then a row for each iteration."""
     names = ["step", "objective", "residual"]
     rows = [
         [entry.solver, *(step[name] for name in names)]
@@ -91,7 +91,7 @@ def _cells(row: Summary) -> list[str]:
 
 
 def comparison_warnings(summary: Summary) -> Iterator[str]:
-    """Warnings: contradictions, wrong and missing solutions, and a missing certificate."""
+    """Warnings about contradictions, wrong or missing solutions, and a missing certificate."""
     yield from (f"contradiction: {each}" for each in summary["contradictions"])
     rows, within = summary["compare"], summary["within"]
     for solver, apart in summary["disagreeing"].items():

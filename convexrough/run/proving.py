@@ -9,14 +9,15 @@ from convexrough.proof import Proof
 from convexrough.run.stage import Result, limit
 from convexrough.run.stages.cycle import CycleResult
 
-#: Shear forces above this fraction of the friction limit are left out: all asperities slide there.
+#: Shear forces of at least this fraction of the friction limit are left out of the proof: at the
+#: limit all asperities slide.
 BELOW_LIMIT = 1 - 1e-9
 
 
 def prove_results(results: Sequence[Result]) -> Proof:
-    """The proof of the contact, of each shear force, and of the shear amplitude of each cycle.
+    """The proof of the contact, and of its states at each shear force and each cycle's amplitude.
 
-    Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is proved.
+    Raises InputError for scenes too large for exact arithmetic, ProofError if a proof fails.
     """
     contact = results[0].contact
     found = [each for result in results for each in result.found]

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
 
-#: The file that lists what was written, from which inputs and by which versions.
+#: The file that lists the files written, the files read, and the versions of the packages.
 MANIFEST = "files.json"
 
-#: Packages whose versions results may depend on.
+#: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
 
@@ -104,7 +104,7 @@ def origin(source: SceneFile) -> Summary:
 
 
 def versions() -> dict[str, str]:
-    """The versions of the packages that numbers may depend on."""
+    """The versions of the packages in `NUMERICAL`, by name."""
     return {name: metadata.version(name) for name in NUMERICAL}
 
 
@@ -177,7 +177,7 @@ def write_figures(
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
-    """Write CSV, or .npz for many rows, with numbers that read back unchanged; return the path."""
+    """Write columns as CSV, or as .npz if there are many rows, without loss; return the path."""
     arrays = [np.asarray(values) for values in columns.values()]
     if len(arrays[0]) > MOST_CSV_ROWS:
         path = path.with_suffix(".npz")
@@ -189,7 +189,7 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
 
 
 def write_rows(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
-    """Write CSV with floats in full precision; return the path."""
+    """Write rows as CSV, with floats in full precision; return the path."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     return path

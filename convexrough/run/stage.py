@@ -36,7 +36,7 @@ Summary = dict[str, Any]
 #: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: Names of numbers, by physical dimension; numbers without an entry are dimensionless.
+#: The names of the numbers of results, by physical dimension; all others are dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
@@ -51,17 +51,17 @@ KIND = {name: kind for kind, names in KINDS.items() for name in names}
 #: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
-#: At most this many rows of a table of steps are printed, the last ones.
+#: A table of steps is printed with at most this many rows, its last ones.
 MOST_PRINTED = 20
 
 
 class Stage(FileTable):
-    """A table of the scene file, which requests a result of a pressed contact; it checks its keys.
+    """A table of the scene file with checked keys, which requests a result of a pressed contact.
 
     name       : name of the table
     frictional : True if it needs the table [friction]
     numbers    : names of the numbers in a row of its result
-    labels     : keys that identify a row, where there are several rows
+    labels     : names of the numbers that identify a row, if there are several rows
     """
 
     name: ClassVar[str]
@@ -71,16 +71,16 @@ class Stage(FileTable):
 
     @property
     def highest_load(self) -> float:
-        """[force] the largest load that the table names; 0 if the load is that of [normal]."""
+        """[force] the largest load in the table; 0 if the stage uses the load of [normal]."""
         return 0.0
 
     @property
     def highest_force(self) -> float:
-        """[force] the largest shear force that the table names as a force, not as a fraction."""
+        """[force] the largest shear force that the table gives as a force, not as a fraction."""
         return 0.0
 
     def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about loads and forces that do not fit the pressed contact."""
+        """Warnings about loads and shear forces that are implausible for the pressed contact."""
         load, name, known = self.highest_load, f"[{self.name}]", contact.load
         if not load:
             return
@@ -103,16 +103,16 @@ class Stage(FileTable):
         raise NotImplementedError
 
     def fits(self, count: int) -> None:
-        """Check the stage against the number of asperities. Raises InputError."""
+        """Raise InputError if the stage is not possible with this number of asperities."""
 
 
 def limit(contact: Contact) -> float:
-    """[force] the friction limit: coefficient of friction times load."""
+    """[force] the friction limit: the coefficient of friction times the total load."""
     return checks.friction(contact.scene.friction) * contact.load
 
 
 def number(found: Any, name: str) -> Any:
-    """If `name` is a status, the number of asperities with it; else the attribute `name`.
+    """The number of asperities with the status `name`, or else the attribute `name`.
 
     The attribute is that of `found`, or of `found.certificate` if `found` has no such attribute.
     """
@@ -122,7 +122,7 @@ def number(found: Any, name: str) -> Any:
 
 
 def numbers_of(found: Any, names: Sequence[str]) -> Summary:
-    """Numbers of `found` by these names, as Python numbers and lists."""
+    """What `number` returns for each of these names, as Python numbers and lists, by name."""
     return {name: plain(number(found, name)) for name in names}
 
 
@@ -184,7 +184,7 @@ class Result(Table, Plottable):
 
     @property
     def orders(self) -> set[str]:
-        """The different values of `order` (docs/theory/states.md) in `found`."""
+        """The set of the attributes `order` (docs/theory/states.md) of the objects in `found`."""
         return {each.order for each in self.found if getattr(each, "order", None)}
 
     @property
@@ -193,19 +193,19 @@ class Result(Table, Plottable):
         return not any(self.doubts())
 
     def tables(self) -> dict[str, Columns]:
-        """Tables of columns, by the file name without its ending."""
+        """The tables to write, each as columns by name; keys are file names without their ending."""
         return {self.name: columns_of(self.known)}
 
     def figures(self) -> Mapping[str, Figure]:
-        """Figures, by the file name without its ending."""
+        """The figures to write, by the file name without its ending."""
         return {}
 
     def prepare(self, *, figures: bool) -> None:
-        """Compute all that tables and figures need; while they are written nothing is solved."""
+        """Compute all that tables and figures need, so that writing them solves nothing."""
         self.tables()
 
     def lines(self) -> list[str]:
-        """The printed table, one string per line."""
+        """The lines of the printed table and of what is proved about its order."""
         most = MOST_PRINTED if self.steps else len(self.known)
         said = self.printed_table(self.name, self.known, self.headings(), self.title, most)
         proved = ", ".join(sorted(self.orders))
@@ -242,7 +242,7 @@ class Result(Table, Plottable):
 
 
 class Steps(Result):
-    """The result of a stage with consecutive steps; arrays of `found` have an entry for each."""
+    """The result of a stage with consecutive steps, as one object with arrays along the steps."""
 
     steps = True
 
@@ -289,7 +289,7 @@ class Single(Result):
 
 
 def plain(value: Any) -> Any:
-    """The value with NumPy numbers as Python numbers and arrays as lists."""
+    """The value; a NumPy number as a Python number, an array as a list."""
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
@@ -298,14 +298,14 @@ def columns_of(rows: Sequence[Summary]) -> Columns:
 
 
 def repeated(labels: Columns, tables: Sequence[Columns]) -> Columns:
-    """One table: the given tables one below the other, with labels in every row."""
+    """The tables one below the other, with the columns `labels`, an entry for each table, added."""
     count = len(next(iter(tables[0].values())))
     left = {name: np.repeat(values, count) for name, values in labels.items()}
     return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
 
 def unit_of(name: str, units: UnitNames) -> str:
-    """The unit of the numbers with this name; "" if they have none or the scene names no units."""
+    """The unit of the number with this name; "" if it has none or the scene names no units."""
     length, force = units.length, units.force
     both = length and force
     return {

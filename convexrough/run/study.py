@@ -120,7 +120,7 @@ class UnitsTable(FileTable):
 
     @property
     def names(self) -> UnitNames:
-        """The units; the unit of force is by default that of pressure times length squared."""
+        """The units of length and force; force is by default pressure times length squared."""
         pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
         made = force_of(pressure, length) if pressure and length else ""
         return UnitNames(self.length.strip(), self.force.strip() or made)
@@ -187,7 +187,7 @@ class Study(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: unknown or missing tables, and tables that require others."""
+        """Mistakes: tables that are unknown, missing, or used without another one they require."""
         for name, keys_within in keys.items():
             if name == "sweep":
                 yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"
@@ -223,7 +223,7 @@ class Study(FileTable):
 
 
 def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
-    """A mistake if `within` is missing and the file does not limit the number of asperities."""
+    """A mistake if a lattice lacks `within` and nothing else limits its number of asperities."""
     if not isinstance(lattice, dict) or lattice.get("pattern") == "file" or "within" in lattice:
         return
     missing = "[asperities] within: missing, needed with"
@@ -245,7 +245,7 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The tables of a parsed file, or None and all messages, in the order of the file."""
+    """The checked tables of a parsed file, or None; and the messages, in the order of the file."""
     if "" in contents:
         return None, ['[""]: unknown table, expected a name']
     model = _model(tuple(STAGES.values()))
@@ -263,7 +263,7 @@ T = TypeVar("T", bound=FileTable)
 
 
 def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list[str]]:
-    """One table, or None and the messages of all mistakes in it."""
+    """The checked table, or None if it has mistakes; and the messages of all mistakes in it."""
     try:
         return model.model_validate(keys), []
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""summary.json, which `--json` prints, the printed report, and the warnings."""
+"""The contents of summary.json, which `--json` prints; the printed report; and the warnings."""
 
 from __future__ import annotations
 

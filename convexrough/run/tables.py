@@ -17,10 +17,10 @@ from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
 from convexrough.tabular.text import bare
 from convexrough.tabular.units import parsed
 
-#: Columns of results, which are ignored in a table of asperities.
+#: Names of columns with results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
 
-#: Relative rounding error of means and sums in a table.
+#: Relative rounding error that is allowed for means and sums in the last row of a table.
 ROUNDED = 1e-3
 
 
@@ -41,7 +41,7 @@ def unknown(column: str) -> bool:
 def read_summits(
     path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
 ) -> Asperities:
-    """Asperities from columns x, y and, if the file has them, height (or z) and tip_radius.
+    """Asperities from the columns x and y of a file, and height (or z) and tip_radius if present.
 
     tip_radius : [length] one number or (n,), if the file has no column tip_radius; else None
     """
@@ -83,7 +83,7 @@ def read_summits(
 
 
 def _summary_in_last_row(columns: list[Array]) -> str:
-    """ "means" or "sums" if the last entries of all columns are those of the others; else ""."""
+    """ "means" or "sums" if the last row has those of the rows above in all columns; else ""."""
     if (
         len(columns[0]) < 4
         or any(np.ptp(each[:-1]) == 0 for each in columns[2:])
@@ -97,7 +97,7 @@ def _summary_in_last_row(columns: list[Array]) -> str:
 
 
 def is_permuted(cells: NDArray[Any]) -> bool:
-    """True for the numbers 0, 1, ... or 1, 2, ... in another order."""
+    """True if the cells are the numbers 0, 1, ... or 1, 2, ... in another order."""
     if cells.dtype.kind != "f" or len(cells) < 2:
         return False
     ordered = np.sort(cells)

@@ -27,7 +27,7 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from convexrough import checks
 from convexrough.checks import SIZED, is_sized, nearest
 
-#: Keys that a user may have written, and the keys to suggest.
+#: Keys that a user may have written, each with the key that the message suggests.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
@@ -38,14 +38,14 @@ Mistake = tuple[str, str]
 
 
 def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
-    """A validator whose messages say "expected", with this phrase; it also requires `holds`."""
+    """A validator that also requires `holds`; its messages say "expected", and then the phrase."""
 
     def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
         try:
             if holds(result := validated(value)):
                 return result
         except ValidationError as error:
-            if error.errors()[0]["type"] == "expected":  # an inner validator has a message
+            if error.errors()[0]["type"] == "expected":  # the message of an inner validator is better
                 raise
         raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
 
@@ -96,18 +96,18 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table of a file: numbers are finite, not text or truth values; other keys are mistakes."""
+    """A table of a file: numbers are finite, text is no number, and unknown keys are mistakes."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
     alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
-    needs: ClassVar[Mapping[str, str]] = {}  # a key, and the other key without which it is no use
-    elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # keys not used with this
+    needs: ClassVar[Mapping[str, str]] = {}  # for a key, the key that must be given with it
+    elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # name, keys not used there
 
     @model_validator(mode="wrap")
     @classmethod
     def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
-        """All mistakes: in single values, in which keys are given, and between values."""
+        """The table. Raises ValidationError with all mistakes: in values, keys and their relations."""
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
         found: list[InitErrorDetails] = []
@@ -124,7 +124,7 @@ class FileTable(BaseModel):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes in which keys are given, whatever their values."""
+        """Mistakes in the set of given keys, whatever their values: unknown or missing ones."""
         stage, others = cls.elsewhere
         for key in keys:
             if key in cls.model_fields:
@@ -143,7 +143,7 @@ class FileTable(BaseModel):
                 yield needed, f"missing, needed with {key}"
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        """Mistakes in values that are only wrong together."""
+        """Mistakes between values, each of which is valid alone."""
         yield from ()
 
 
@@ -153,7 +153,7 @@ def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
 
 
 def _again(error: ErrorDetails) -> InitErrorDetails:
-    """The same mistake, in the form in which pydantic collects it with others."""
+    """The same mistake as pydantic needs it to raise several mistakes at once."""
     kind = error["type"] if error["type"] in ("told", "missing") else "expected"
     expects = "a table" if error["type"] == "model_type" else error["msg"]
     again = PydanticCustomError(kind, "{said}", {"said": expects})

@@ -20,8 +20,8 @@ Columns = dict[str, list[Any]]
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: Errors besides OSError that mean that a file is corrupted, or not in the format of its extension.
-#: `foreign` converts errors of other packages to one of them.
+#: Errors from a file that is corrupted, or not in the format of its extension, besides OSError.
+#: `foreign` converts errors of other packages to ValueError.
 SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
@@ -44,7 +44,7 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """Raise a ValueError for any error that another package raises on a corrupted file.
+    """Turn any error that another package raises on a corrupted file into a ValueError.
 
     numpy, scipy, pyarrow and openpyxl raise errors of many kinds that they do not document. The
     body should only call readers.
@@ -58,7 +58,7 @@ def foreign() -> Iterator[None]:
 
 
 def needed(path: Path, package: str) -> Any:
-    """A package that the file needs. Raises FileError if it is not installed."""
+    """The imported package that reads such a file. Raises FileError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -86,12 +86,12 @@ def named_arrays(path: Path) -> dict[str, Any]:
 
 
 def read_arrays(path: Path, known: Sequence[str]) -> Columns:
-    """Columns of a file by name; without names by number, from "1".
+    """Columns of a file by name; columns without names are numbered from "1".
 
-    known : names to read, in lower case; other columns are kept only if of the same length
+    known : names to read, in lower case; other columns are kept only if they have the same length
 
-    Raises FileError where the package for such files is missing, OSError, and errors of corrupted
-    files.
+    Raises FileError if the package for such files is missing or no columns are found, OSError, and
+    the errors `SPOILED` of corrupted files.
     """
     named = named_arrays(path)
     (first, values), *others = named.items() or [("", np.zeros(0))]
@@ -116,7 +116,7 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
 
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
-    """The vectors; if known arrays have two dimensions and one shape, all arrays of this shape."""
+    """All vectors; but if the arrays `known` share a shape of two dimensions, all of this shape."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
@@ -128,7 +128,7 @@ def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[s
 
 
 def _table(values: NDArray[Any]) -> Columns:
-    """Columns of a record array or a matrix, or a vector as one column."""
+    """The columns of a record array or a matrix, by name or number; a vector is one column."""
     if values.dtype.names:
         return {name: np.atleast_1d(values[name]).tolist() for name in values.dtype.names}
     if values.ndim > 2:

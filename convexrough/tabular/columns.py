@@ -11,7 +11,7 @@ PrintedTable = Sequence[Sequence[Any]]
 
 
 def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
-    """Lines with a name and a text; all texts begin in the same column."""
+    """One line for each pair of a name and a text; all texts begin in the same column."""
     return [f"{name:<{width}}{text}" for name, text in lines]
 
 
@@ -29,7 +29,7 @@ def markdown(table: PrintedTable, *, left: int) -> list[str]:
 
 
 def bound(value: float) -> str:
-    """The value rounded up to two digits, or "unknown"."""
+    """A bound as text, never smaller than the value, with two digits; "unknown" if infinite."""
     return f"{float(f'{1.05 * value:.2g}'):g}" if math.isfinite(value) else "unknown"
 
 

@@ -33,20 +33,21 @@ LONGEST_NUMBER, LONGEST_NAME = 400, 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: Number of lines that decide on separator and decimal mark.
+#: The separator and the decimal mark are chosen from at most this many lines.
 SAMPLE = 200
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
-#: The sign before a comment: not that of #N/A or -1.#IND.
+#: The sign # that starts a comment, but not the # in #N/A or -1.#IND.
 _SIGN = r"#(?![A-Z]+[/!?])"
 
-#: The beginning of a line that is a comment, and of one behind cells.
+#: The beginning of a line that is a comment, and of a comment that follows cells on their line.
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
-#: A number whose digits are certainly in groups of three; and one that could have three decimals.
+#: `_GROUPED`: a number whose digits are certainly in groups of three, as 1,234,567.
+#: `_PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
@@ -55,7 +56,7 @@ _PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
-#: A line of dashes between parts of a listing.
+#: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.
 _RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
 _BINARY = {
     b"PK\x03\x04": "an archive or an Excel workbook; name it .xlsx",
@@ -71,7 +72,7 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells and the decimal mark; the sheet of a workbook, in quotes."""
+    """The separator of cells, the decimal mark, and for a workbook the name of the sheet."""
 
     separator: str
     decimal: str
@@ -106,7 +107,7 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[str]) -> Array | None:
-        """The numbers in cells, converted at once if all are plain; None if some are no numbers."""
+        """The numbers in cells; None if any cell is not a number. Plain numbers are faster."""
         joined = "\n".join(cells)
         if "_" not in joined and (self.decimal == "." or "." not in joined):
             with suppress(ValueError):
@@ -126,7 +127,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 class TextRow(NamedTuple):
-    """A line of a file, with number, text and cells; `wrong` is the error if it cannot be split."""
+    """A line of a file: its number, text and cells; `wrong` is the error if it cannot be split."""
 
     number: int
     text: str
@@ -135,7 +136,7 @@ class TextRow(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """The header of a file with its names as cells, or None, the rows below it, and comments."""
+    """The header of a file, whose cells are names, or None; the rows, the style, and comments."""
 
     header: TextRow | None
     rows: list[TextRow]
@@ -164,7 +165,7 @@ def read_text_table(
 ) -> TextTable:
     """The cells of a text file or workbook. Raises FileError if it is empty or of another kind.
 
-    known : names of columns that distinguish the header from titles and comments
+    known : names of columns, in lower case; the line with most of them is the header
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
@@ -195,7 +196,7 @@ def read_text_table(
     if not rows:
         raise FileError(f"{path}: empty")
     header, rows = _headed(rows, title, style, known)
-    if header is None and len(rows[0].cells) > 3:  # a matrix, in which rows can be holes
+    if header is None and len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
 
@@ -203,7 +204,7 @@ def read_text_table(
 def _headed(
     rows: list[TextRow], title: str, style: Style, known: Sequence[str]
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The names of columns, with units if the line below them has these, and the rows below."""
+    """The header, or None, and the rows below; units in the line below join the names."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -234,7 +235,7 @@ def _headed(
 def _listed(
     header: list[str], line: TextRow, rows: list[TextRow], style: Style
 ) -> tuple[list[str], list[TextRow]]:
-    """The header and rows of a finite-element listing that repeats `line`, and has titles."""
+    """Names and rows of a finite-element listing, without titles and repetitions of `line`."""
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
     width = len(rows[first].cells) if rows else 0
     apart = re.split(r"\s{2,}", line.text.strip())
@@ -256,7 +257,7 @@ def _listed(
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Numbered lines of a file, unzipped. Bytes that are not UTF-8 are read as Latin-1."""
+    """The numbered lines of a file, gzipped or not; bytes that are not UTF-8 are Latin-1."""
     with path.open("rb") as packed:
         is_packed = packed.peek(2)[:2] == b"\x1f\x8b"
         raw: Any = BufferedReader(GzipFile(fileobj=packed)) if is_packed else packed
@@ -277,7 +278,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
     """The name and the numbered rows of the first sheet with a known column, or of the first sheet.
 
-    Tabs separate cells. The name is in quotes; names of other sheets with known columns follow it.
+    Tabs separate cells. A known column is one of `known`. The name is in quotes, and followed by
+    the names of other sheets with known columns.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -298,7 +300,7 @@ def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[
 
 
 def _plain(cell: Any) -> str:
-    """The text of a cell on one line, without quotes; numbers typed as text get decimal points."""
+    """The text of a cell on one line, without quotes; a decimal comma becomes a point."""
     text = " ".join(str(cell).replace('"', "").split())
     return text if Style("\t", ",").number(text) is None else text.replace(",", ".")
 
@@ -341,7 +343,7 @@ def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style)
     """Raise FileError for numbers with thousands separators.
 
     Numbers such as 3,134 could have three decimals. They are refused if a column contains at least
-    ten of them, and apart from them only whole numbers below 1000.
+    ten of them, also whole numbers below 1000, and at most one cell of another form.
     """
     columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
     for number, line in lines:
@@ -376,7 +378,7 @@ def _row(number: int, text: str, style: Style) -> TextRow:
 
 
 def _header(text: str, style: Style) -> list[str]:
-    """Names of columns, each with the unit that follows it."""
+    """The cells of a header line: names of columns, each with the unit in brackets after it."""
     row = _row(0, _UNIT_APART.sub("", text) if style.separator == " " else text, style)
     return row.cells or [text]
 
@@ -398,7 +400,7 @@ def _stripped(cells: list[str]) -> list[str]:
 def _trimmed(
     header: TextRow | None, rows: list[TextRow], style: Style
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """Header and rows without trailing empty cells. Row names of R get an empty name."""
+    """Header and rows without trailing empty cells; a column of row numbers of R is named ""."""
     if header is None:
         width = max((len(_stripped(row.cells)) for row in rows), default=0)
     else:

@@ -14,7 +14,7 @@ MOST_SHOWN = 60
 _KEY = "[A-Za-z0-9_.-]+"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
-#: What follows the key in a wrong line, the correction of it, and the reason.
+#: For each mistake: the pattern of what follows the key, its correction, and what was expected.
 _SLIPS = [
     (
         r"=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)",
@@ -53,7 +53,7 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A line for each mistake: place, text and correction, if it is known."""
+    """A message for a file with TOML mistakes: a line for each, with place, text and correction."""
     lines = text.split("\n")
     found: list[str] = []
     while len(found) < MOST_SLIPS:
@@ -79,7 +79,7 @@ def explained(path: object, text: str, error: Exception) -> str:
 
 
 def _corrected(line: str) -> tuple[str, str] | None:
-    """The correction of a line and the reason; None if it is not known."""
+    """The corrected line, and what was expected; None if no correction is known."""
     for pattern, meant, why in _SLIPS:
         if found := re.fullmatch(rf"\s*(?P<key>{_KEY})\s*{pattern}\s*(?:#.*)?", line):
             parts = {name: part.strip() for name, part in found.groupdict().items()}
@@ -95,6 +95,6 @@ def _corrected(line: str) -> tuple[str, str] | None:
 
 
 def _number(text: str) -> str:
-    """The number as TOML, with digits on both sides of the point."""
+    """The number as TOML requires it, with digits on both sides of the point."""
     text = re.sub(r"(?<!\d)\.(?=\d)", "0.", text)
     return re.sub(r"(?<=\d)\.(?!\d)", ".0", text)

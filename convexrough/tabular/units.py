@@ -20,7 +20,7 @@ class Unit(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The quantity that the unit measures, or "" if no column has it."""
+        """The quantity that the unit measures, as "length"; "" if it is not in `KINDS`."""
         return KINDS.get((self.length, self.force), "")
 
     def __mul__(self, other: Unit) -> Unit:  # type: ignore[override]
@@ -30,7 +30,7 @@ class Unit(NamedTuple):
         return Unit(self.size**power, power * self.length, power * self.force)
 
     def into(self, other: Unit) -> float:
-        """The factor from this unit to the other, rounded once."""
+        """This unit in units of the other, as 0.001 from µm into mm, rounded once."""
         return float(self.size / other.size)
 
 
@@ -53,7 +53,7 @@ UNITS = {
     )
 }
 
-#: Other names of units; u is also read as µ.
+#: Other names of units. In addition, a leading u is read as µ.
 _ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "kgf"}
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
@@ -79,7 +79,7 @@ def parsed(name: str) -> Unit | None:
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit of a quantity by any of its names; None for an empty name. Raises InputError."""
+    """The unit `name` of the quantity `what`; None for "". Raises InputError if of another kind."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -93,7 +93,7 @@ def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> U
 
 
 def one_unit(what: str, given: str | None, found: str) -> Unit | None:
-    """The unit of length from the caller or the file. Raises InputError if they differ."""
+    """The unit of length that the caller or the file names. Raises InputError if they differ."""
     said, there = known_unit(what, given or ""), known_unit(what, found)
     if said and there and said.size != there.size:
         expected = f"{there.name}, as the file says, or none given"
@@ -109,7 +109,7 @@ class UnitNames(NamedTuple):
 
     @classmethod
     def of(cls, names: object) -> UnitNames:
-        """The given names, checked. Raises InputError."""
+        """`UnitNames` of a pair of names. Raises InputError for anything else."""
         if not isinstance(names, tuple) or len(names) != 2:
             raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
         for kind, name in zip(cls._fields, names, strict=True):
@@ -122,7 +122,7 @@ class UnitNames(NamedTuple):
         return ", ".join(filter(None, self))
 
     def unit(self, kind: str) -> Unit | None:
-        """The scene's unit of a quantity; None if it is not named."""
+        """The scene's unit of "length", "force", "area" or "pressure"; None if it is not named."""
         length, force = (parsed(name) if name else None for name in self)
         if kind == "area" and length:
             return (length**2)._replace(name=f"{self.length}²")
@@ -145,7 +145,7 @@ NAMELESS = UnitNames()
 
 
 def force_of(pressure: Unit, length: Unit) -> str:
-    """The unit of force that is pressure times length^2, as mN for GPa and µm; "" if unnamed."""
+    """The name of the unit pressure times length^2, as mN for GPa and µm; "" if it has none."""
     made = pressure * length**2
     names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
     return names[0] if names else ""

@@ -17,7 +17,8 @@ from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_f
 from convexrough.verdict.report import Verified
 from convexrough.verdict.verdict import verify_on
 
-#: Statuses in a file of shear forces. For "undecided" the force itself decides what is claimed.
+#: The statuses accepted in a file of shear forces. An asperity with "undecided" is claimed to slide
+#: or to stick according to its force.
 STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
@@ -30,10 +31,10 @@ def verify_files(
     shear: Path | None = None,
     force: float | None = None,
 ) -> Verified:
-    """The verdicts on the claims of files. Errors name the file.
+    """The verdicts on loads, and on shear forces, that files claim. Errors name the file.
 
     within : largest error allowed, as a fraction of the largest load or shear force
-    shear, force : a file of shear forces and their total [force]; both or neither
+    shear, force : a file of shear forces, and the prescribed total [force]; both or neither
     """
     tolerance("--within", within)
     given = read_loads(loads, problem.scene, how)

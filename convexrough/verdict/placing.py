@@ -22,16 +22,16 @@ from convexrough.tabular.table import INDEX, ReadTable, in_sheet
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import rounded_up
 
-#: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given.
+#: Default of the largest error of a position in a file, as a fraction of the smallest spacing.
 POSITION_TOLERANCE = 1e-2
 
-#: Number of steps in which a shift of all nodes is estimated.
+#: Number of iterations of the estimate of a shift of all nodes.
 REFINEMENTS = 5
 
-#: Largest number of shifts that are tried if rows are missing.
+#: If rows are missing, at most this many shifts are tried, each to another asperity.
 MOST_TRIED = 1000
 
-#: Relative difference up to which the last row is the sum of the others.
+#: The last row counts as the sum of the others up to this relative difference.
 TOTAL = 1e-4
 
 #: If at most this part of the loaded nodes is far from all asperities, only their positions may be
@@ -45,14 +45,14 @@ REACH = 0.9
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
-#: Largest accepted median distance of loaded nodes from the nearest asperities, over the spacing.
-#: At random points the median is about 0.4.
+#: Largest accepted median of the distances of loaded nodes from their nearest asperities, each as a
+#: fraction of that asperity's distance from its neighbour. At random points it is about 0.4.
 BY_CHANCE = 0.25
 
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
-#: True if points are where they should be.
+#: A function that returns True if points (m, 2) are where asperities are.
 Fits = Callable[[Array], bool]
 
 
@@ -60,7 +60,8 @@ Fits = Callable[[Array], bool]
 class Placing:
     """The assignment of the rows of a table to asperities.
 
-    how, mistakes : how this was done, in words; sentences on what is wrong with the rows
+    how : how rows were assigned, in words
+    mistakes : sentences on what is wrong with the rows
     column : the name of the column of loads, pressures or forces
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : True if asperities without a row are open
@@ -81,12 +82,12 @@ class Placing:
 
     @cached_property
     def points(self) -> Array | None:
-        """(m, 2) [length] x and y of the rows, None without these columns."""
+        """(m, 2) [length] x and y of the rows; None if the table lacks these columns."""
         columns = self.table.columns
         return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self) -> Indices:
-        """The asperity of each row."""
+        """(m,) the index of the asperity of each row; `mistakes` gets what is wrong."""
         if self.points is not None:
             found, by = self._matched(self.points), True
         else:
@@ -108,7 +109,7 @@ class Placing:
         return found
 
     def nearest(self, values: Array) -> Indices:
-        """The nearest asperity of each node or pixel; `mistakes` gets loaded ones that are far."""
+        """(m,) the asperity nearest to each node or pixel; far ones with a load are `mistakes`."""
         assert self.points is not None
         places, loaded = self.scene.contact_points, values != 0
         distances, owners = _nearest(places, self.points)
@@ -118,7 +119,7 @@ class Placing:
         far = loaded & (distances > REACH * apart[owners])
 
         def fits(points: Array) -> bool:
-            """True if all are near asperities, not all near one, and nearer than random points."""
+            """True if all points are near asperities, several of them, and not just by chance."""
             near, their = _nearest(places, points)
             parts = near / apart[their]
             return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
@@ -149,7 +150,7 @@ class Placing:
     # By an index, or in order
 
     def _numbered_or_in_order(self) -> tuple[Indices, bool]:
-        """(asperities, True) by a column that numbers them; else (asperities in order, False)."""
+        """The asperity of each row, and True if a column gives its index, False if the order."""
         headers = self.table.others
         places = {it[0].lower(): it for it in headers if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
         if len(places) == 2:
@@ -165,7 +166,7 @@ class Placing:
         return np.arange(rows), False
 
     def _indices(self) -> dict[str, Indices]:
-        """Unused columns that can be indices, by header: first those that are called so."""
+        """Unused columns of possible indices, by header; first those with the name of an index."""
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
@@ -185,12 +186,13 @@ class Placing:
         return named | others
 
     def _numbered(self, name: str, index: Indices) -> Indices | None:
-        """The indices of asperities in a column that counts from 0 or 1; else None."""
+        """(m,) indices of asperities from a column that counts from 0 or 1; None if it is wrong."""
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
-        # Distinct increasing numbers may be numbers of nodes: mistakes in them are ignored. Numbers
-        # in another order, or repeated ones that fit and mostly differ, are surely indices.
+        # Distinct increasing numbers may be numbers of nodes, so mistakes in them are ignored.
+        # Numbers are surely indices if they decrease somewhere, or if all are in the range of
+        # indices and some, but less than half of them, are repetitions.
         if times.max() == 1:
             sure |= bool(name) and bool((np.diff(index) < 0).any())
         else:
@@ -212,7 +214,7 @@ class Placing:
         return None
 
     def _unread_positions(self) -> Iterator[str]:
-        """A message if two unread columns are positions of the asperities in another order."""
+        """A message if two unread columns hold the asperities' positions in another order."""
         numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
             for what, points in {
@@ -230,7 +232,7 @@ class Placing:
                 return
 
     def _total(self) -> str:
-        """A message if the last row has the sum of the others; else ""."""
+        """A message if the last row holds the sum of all other rows; else ""."""
         *others, last = self.table.columns[self.column].tolist()
         if math.isclose(math.fsum(others), last, rel_tol=TOTAL):
             found = "found the sum of the others"
@@ -241,14 +243,14 @@ class Placing:
 
     @cached_property
     def _spacing(self) -> float:
-        """[length] the smallest distance of two asperities; the tip radius of a single one."""
+        """[length] the smallest distance of two asperities; the tip radius if there is only one."""
         if len(self.positions) == 1:
             return float(self.scene.asperities.tip_radii[0])
         return float(nearest_distances(self.positions).min())
 
     @cached_property
     def _allowed(self) -> float:
-        """[length] largest distance of a position from its asperity."""
+        """[length] largest accepted distance of a position in the file from its asperity."""
         given, half = self.tolerance, self._spacing / 2
         if given is not None and given > half and len(self.scene) > 1:
             expected = f"at most {half:.3g}, half the smallest distance of two asperities"
@@ -256,12 +258,12 @@ class Placing:
         return POSITION_TOLERANCE * self._spacing if given is None else given
 
     def _fits(self, points: Array) -> bool:
-        """True if each point is at an asperity of its own."""
+        """True if each point is at an asperity, and no two points are at the same one."""
         distances, owners = _nearest(self.positions, points)
         return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
 
     def _matched(self, points: Array) -> Indices:
-        """The asperity at each point; no asperity may occur twice."""
+        """(m,) the asperity at each point; `mistakes` gets points at none or at the same one."""
         allowed = self._allowed
         distances, owners = _nearest(self.positions, points)
         far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
@@ -285,11 +287,11 @@ class Placing:
         return owners
 
     def _misread(self, rows: NDArray[np.bool_], fits: Fits) -> str:
-        """A sentence on other columns, signs or units of x and y if the rows fit then; else ""."""
+        """A message that names the columns, signs or units with which the rows fit; else ""."""
         return next((said for said, points in self._readings(rows) if fits(points)), "")
 
     def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
-        """Other ways to interpret x and y: the message, and the points that each gives."""
+        """Other ways to interpret x and y: for each the message, and the points (m, 2)."""
         held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
         called = {name: quote(bare(self.table.called[name])) for name in held}
         headed = not all(map(str.isdecimal, called.values()))
@@ -316,7 +318,7 @@ class Placing:
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
     def _shifted(self, points: Array) -> str:
-        """A sentence on the shift that makes all points fit; else ""."""
+        """A message with the shift after which all points fit; "" if there is none."""
         tried: Sequence[Any] = self.positions[:MOST_TRIED] - points[0]
         if len(points) == len(self.positions):
             tried = [self.positions.mean(axis=0) - points.mean(axis=0)]
@@ -329,11 +331,11 @@ class Placing:
         return ""
 
     def _about_shifted(self, rows: NDArray[np.bool_], values: Array, fits: Fits) -> str:
-        """A sentence on the approximate shift of loaded nodes, if it makes them fit; else ""."""
+        """A message with the approximate shift after which loaded nodes fit; "" without one."""
         assert self.points is not None
         points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
         shift = np.average(points, axis=0, weights=weights)
-        for _ in range(REFINEMENTS):  # the mean distance from the nearest asperities
+        for _ in range(REFINEMENTS):  # the weighted mean vector from the nearest asperities
             near = places[_nearest(places, points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
         expected = "expected x, y relative to the sphere's axis"
@@ -354,7 +356,7 @@ class Placing:
 
 
 def unused(table: ReadTable) -> str:
-    """The end of a message: the names of at most `MOST_UNREAD` columns that are not used."""
+    """The end of a message, which names unused columns, at most `MOST_UNREAD` of them."""
     names = [*filter(None, table.others)]
     more = f" and {len(names) - MOST_UNREAD} more" if len(names) > MOST_UNREAD else ""
     return f"; not used: {', '.join(names[:MOST_UNREAD])}{more}" if names else ""

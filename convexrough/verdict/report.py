@@ -21,17 +21,17 @@ from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
 from convexrough.verdict.verdict import Verdict
 
-#: Relative error from which errors are printed in per cent.
+#: Relative errors above this are printed in per cent.
 PERCENT = 1e-4
 
-#: Largest number of asperities in a list on the terminal; it counts the others.
+#: A list on the terminal shows at most this many asperities, and the number of the others.
 MOST_LISTED = 10
 
 
 class Verified(NamedTuple):
     """The verdicts on the claims of files; `notes` say how the files were read.
 
-    sheared : verdict on shear forces, or None
+    sheared : the verdict on shear forces; None if no file claims any
     """
 
     verdict: Verdict
@@ -49,7 +49,7 @@ class Verified(NamedTuple):
 
 
 def verdict_summary(found: Verified) -> dict[str, Any]:
-    """The data of the claims that `--json` prints, in the scene's units."""
+    """The verdicts and a row for each asperity, as `--json` prints them, in the scene's units."""
     summary: dict[str, Any] = {"verdict": _claim_summary(found.verdict)}
     if found.sheared is not None:
         summary["shear_verdict"] = _claim_summary(found.sheared)
@@ -84,7 +84,7 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
 
 
 def describe_verdict(found: Verified) -> list[str]:
-    """Aligned lines on each claim: what is wrong, undecided, or inaccurate, and the total."""
+    """The printed report: for each claim, what is wrong, undecided or inaccurate, and the total."""
     lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
         others = ": --json and --out list all"
@@ -116,7 +116,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
-    """Aligned lines on one claim; `others` says where to find the rows that a table leaves out."""
+    """Aligned lines on one claim; `others` is printed after the number of rows left out."""
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, scene, which[:MOST_LISTED])
@@ -153,7 +153,7 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Verified | ConvexroughError) -> bytes:
-    """A JUnit test suite with a case for each check, or with only the error."""
+    """JUnit XML: a test case for each check of each claim, or one case with the error."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     if isinstance(found, Verified):
         kind, cases = "failure", list(_cases(found))

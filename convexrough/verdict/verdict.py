@@ -1,6 +1,6 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-Where the loads are too inaccurate to prove every status, Newton's method continues from them to a
+If the loads are too inaccurate to prove every status, Newton's method starts from them and finds a
 solution, and the certificate of that solution shows which loads are wrong. `friction.verdict`
 does the same for shear forces.
 """
@@ -28,7 +28,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: Loads up to this fraction of the largest are called noise in hints.
+#: A hint calls loads up to this fraction of the largest load noise.
 NOISE = 1e-6
 
 
@@ -95,12 +95,12 @@ class Verdict(Claim, Table, Plottable):
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] error bounds of the certificate, plus the sizes of loads that count as 0."""
+        """(n,) [force] error bounds of `certificate`, plus the sizes of loads that count as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         return frozen(self.certificate.load_errors + ignored)
 
     def nearby(self) -> tuple[Array, Array] | None:
-        """Loads and error bounds of `solution`; None without a solution."""
+        """(n,), (n,) [force] loads of `solution` and their error bounds; None without a solution."""
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
@@ -117,7 +117,7 @@ class Verdict(Claim, Table, Plottable):
 
 
 def rounded_up(value: float) -> str:
-    """The value as text, rounded up to one digit."""
+    """A positive value as text, rounded up to one significant digit."""
     power = 10.0 ** math.floor(math.log10(value))
     return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
 
@@ -162,7 +162,7 @@ def verify_on(
     within: float = WITHIN,
     floor: float = 0.0,
 ) -> Verdict:
-    """The verdict of `verify`, for an assembled problem."""
+    """The verdict of `verify`, for a problem that is already assembled."""
     floor = checks.non_negative("floor", floor)
     within = tolerance("within", within)
     checks.in_order("loads", loads)
@@ -184,4 +184,4 @@ def verify_on(
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:
             continue
-    return verdict  # statuses then follow only from the certificate of the loads
+    return verdict  # without a solution, only the certificate of the loads proves statuses
