@@ -1,4 +1,4 @@
-"""Elastic coupling between asperities: operators with bounds on their rounding errors."""
+"""Elastic coupling of asperities: operators with bounds on the rounding errors of products."""
 
 from convexrough.influence.choice import KINDS, couple
 from convexrough.influence.coupling import Influence, Kind

@@ -17,8 +17,8 @@ from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: Largest number of asperities for which a matrix is cheapest, on a lattice and elsewhere. Timed on
-#: two cores; the numbers affect speed only.
+#: A matrix is cheapest for at most FEW_ASPERITIES asperities on a lattice, and for at most
+#: FEW_SCATTERED that are not on one. Timed on two cores; the numbers affect speed only.
 FEW_ASPERITIES = 512
 FEW_SCATTERED = 3000
 
@@ -27,8 +27,8 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     """The compliance operator of the asperities `which` of a scene.
 
     scale : 1 / (pi E*), with the contact modulus E*, in the units of the loads
-    kind  : None for the cheapest: a matrix for few asperities, else Fourier transforms, on a
-        lattice if the asperities lie on one, else on a mesh
+    kind  : None for the cheapest. That is a matrix for few asperities. For more it is Fourier
+        transforms, on the lattice if the asperities lie on one, and on a mesh if they do not
 
     Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
     than fit in memory.
@@ -57,12 +57,12 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
 
 
 def _inverse(layout: Layout) -> Array:
-    """1 / r_ij (n, n) of a small layout; all scenes with this layout share it."""
+    """1 / r_ij (n, n) between the points of a small layout, shared by all scenes with it."""
     return frozen(inverse_distances(layout.points, layout.points))
 
 
 def _sums(layout: Layout) -> MatrixSums:
-    """Sums over all points of a layout; each scene restricts them to its asperities."""
+    """The sums of P_j / r_ij over all points of a layout, which a scene restricts to asperities."""
     return MatrixSums(Pair.exact(layout.points))
 
 

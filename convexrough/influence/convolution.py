@@ -14,24 +14,24 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices
 
-#: Error of one pass of a transform in roundoffs, relative to the 2-norm, by its radix:
-#: docs/theory/operators-lattice.md, "Rounding". Radices 4 and 8 have smaller errors than two and
-#: three passes of radix 2.
+#: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
+#: docs/theory/operators-lattice.md, "Rounding". A pass of radix 4 has a smaller error than two
+#: passes of radix 2, and one of radix 8 a smaller error than three.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed in groups: this many bytes of each row, so that they fit in the cache.
+#: Columns are transformed in groups that take this many bytes of each row, and so fit in the cache.
 ROW = 512
 
 #: Rows of a kernel are computed in groups of about this many numbers, which fit in the cache.
 LAID_OUT = 2**17
 
 
-#: A function of differences of rows i and of columns j of sites, and of their squared distances
-#: [spacing^2]; it returns the values of some kernels there, arrays (len(i), len(j)).
+#: A function of differences of sites in rows, i, and in columns, j, and of the squared distances
+#: [spacing^2] for all (i, j). It returns for each kernel an array of values (len(i), len(j)).
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
-#: A function of the transforms of some fields, in a slice of columns; it returns the transforms of
-#: equally many fields, and may change its arguments.
+#: A function of the transforms of some fields in a slice of columns, and of this slice. It returns
+#: the transforms of equally many fields, and may change its arguments.
 Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 
@@ -39,7 +39,7 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 class SiteBox:
     """A rectangle of lattice sites i b1 + j b2, with convolutions on it.
 
-    shape  : (rows, columns) of sites
+    shape  : numbers of rows and of columns of sites
     basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
     extent : [spacing] upper bound on the distance of two occupied sites
     """
@@ -55,7 +55,7 @@ class SiteBox:
         Twice the box always suffices. A smaller size suffices if every vector between two periodic
         images of a site is longer than twice the extent.
         """
-        from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
+        from scipy.fft import next_fast_len  # takes 0.1 s to import, so only if transforms are used
 
         (rows, columns), longest = self.shape, 2.0 * self.extent
         (across, along), twice = np.hypot(*self.basis.T), (2 * rows - 1, 2 * columns - 1)
@@ -96,7 +96,7 @@ class SiteBox:
         return self.kernels(values, dtype)[0]
 
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
-        """Kernels with K(-d) = K(d), or -K(d) if odd, from their values at differences of sites."""
+        """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
         from scipy import fft
 
         rows, columns = self.padded
@@ -109,7 +109,7 @@ class SiteBox:
 
         def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
-            weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
+            weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # row i stands for row -i, too
             sums[taken.start] = []
             for k, each in enumerate(self._laid_out(values, taken)):
                 if k == len(halves):
@@ -127,7 +127,7 @@ class SiteBox:
         return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box, each for the shortest difference at its place."""
+        """Values in some rows of the padded box; where several differences meet, the shortest's."""
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []
@@ -167,7 +167,7 @@ class SiteBox:
         return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Rows and columns of the padded box, and the differences i, j that map to them."""
+        """Slices of rows and columns of the padded box, each with the differences i, j there."""
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
@@ -180,7 +180,7 @@ class SiteBox:
             yield within, slice(width + 1 - columns, width), i[within], left
 
     def _lengths(self, i: Indices, j: Indices) -> Array:
-        """|i b1 + j b2|^2."""
+        """(len(i), len(j)) [spacing^2] the squared lengths |i b1 + j b2|^2."""
         x: Array = np.add.outer(i * self.basis[0, 0], j * self.basis[1, 0])
         y: Array = np.add.outer(i * self.basis[0, 1], j * self.basis[1, 1])
         x *= x
@@ -225,10 +225,10 @@ class Kernel:
 def through_waves(
     fields: Iterable[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
 ) -> list[NDArray[Any]]:
-    """The fields (rows, padded columns) whose transforms `mix` computes.
+    """The fields (rows, padded columns) whose transforms are what `mix` returns.
 
-    fields : (rows, columns) each, needed one by one; `mix` gets their transforms, after padding
-        with zeros
+    fields : the fields (rows, columns) whose transforms `mix` gets, after padding with zeros; they
+        are read one by one
     """
     from scipy import fft
 
@@ -250,14 +250,14 @@ def through_waves(
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
-    """Slices of the columns that are transformed together."""
+    """Slices of columns, each of columns that are transformed together."""
     width, step = half.shape[1], max(1, ROW // half.itemsize)
     for start in range(0, width, step):
         yield slice(start, min(start + step, width))
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """A number of padded sites above `length` and at least `sites`; `twice` is always enough."""
+    """A padded number of sites: above `length`, at least `sites`; never more than `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -272,7 +272,7 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Distances and differences (i, j) of sites, nearest first; of (i, j) and (-i, -j) only one."""
+    """Each distance with its difference (i, j) of sites, nearest first; not (-i, -j) as well."""
     rows, columns = box.shape
     reach = 1
     done = 0.0

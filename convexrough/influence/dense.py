@@ -24,17 +24,17 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: Largest number of entries 1 / r to other points that are cached; for more, caching saves no time.
+#: A matrix of 1 / r to other points is cached up to this many entries; beyond, it saves no time.
 KEPT = 2**16
 
 
 def fits_densely(count: int) -> None:
-    """Raise InputError if the matrix of all pairs, with a solver's copies, exceeds the memory."""
+    """Raise InputError if the matrix of `count` asperities and a solver's copies exceed memory."""
     checks.fits_in_memory("asperities that could touch", count, 5 * 8, power=2)
 
 
 def dense_matrix(points: Array, scale: float) -> Array:
-    """The matrix (n, n) with A_ij = scale / r_ij, zero on the diagonal."""
+    """The matrix (n, n) of A_ij = scale / r_ij, with zeros on the diagonal."""
     fits_densely(len(points))
     matrix = inverse_distances(points, points)
     matrix *= scale
@@ -42,7 +42,10 @@ def dense_matrix(points: Array, scale: float) -> Array:
 
 
 def entry_error(point_error: float, nearest: float) -> float:
-    """Bound on the relative error of a computed scale / r, for r of at least `nearest`."""
+    """Bound on the relative error of a computed scale / r, if r is at least `nearest` [length].
+
+    point_error : [length] bound on the error of each coordinate of the points
+    """
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
     return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
@@ -96,7 +99,7 @@ class DenseInfluence:
         sums: MatrixSums,
         point_error: float = 0.0,
     ) -> DenseInfluence:
-        """The operator whose matrix (n, n) is known."""
+        """The operator from its matrix (n, n), which the caller has computed."""
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
         return cls(points, scale, matrix, point_error, entry_error(point_error, nearest), sums)
@@ -115,12 +118,12 @@ class DenseInfluence:
         return total
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bounds for sums in blocks: Higham, Accuracy and Stability, section 4.2."""
+        """Bounds for `apply`, which sums in blocks: Higham, Accuracy and Stability, section 4.2."""
         terms = self._block + -(-len(self) // self._block) + 1
         return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        inverse = self.matrix / self.scale  # 1 / r: powers of the scale may underflow
+        inverse = self.matrix / self.scale  # 1 / r, because powers of the scale may underflow
         raised = inverse * inverse
         for _ in range(power - 2):
             raised *= inverse
@@ -166,7 +169,7 @@ class DenseInfluence:
         return max(64, int(np.ceil(np.sqrt(len(self)))))
 
     def _loss(self, power: int) -> float:
-        """Bound on the relative error of a sum of powers of 1 / r."""
+        """Bound on the relative error of a sum over j of strengths_j / r_ij^power."""
         return 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
 
 
@@ -201,7 +204,7 @@ class DenseCoupling:
         return inverse_distances(self.targets, self.points)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
-        """1 / r in blocks of rows; a small matrix is one block, which is cached."""
+        """Blocks of rows of the matrix 1 / r, each with its slice; a small matrix is one block."""
         if len(self.points) * len(self.targets) <= KEPT:
             yield slice(None), self._whole
             return

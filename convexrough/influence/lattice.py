@@ -54,11 +54,11 @@ CHUNK = 2**14
 #: (docs/theory/convexity.md).
 FILLED = 0.2
 
-#: Number of asperities above which rarely needed spectra are not cached.
+#: For more asperities than this, rarely needed spectra (transforms of kernels) are not cached.
 MOST_KEPT = 2**21
 
-#: 2 log 2, rounded down. The minimum of the symbol is -2 log 2 for a row of points, and at most
-#: -2 log 2 for every lattice. The constant affects speed only.
+#: 2 log 2, rounded down. The minimum of the symbol (`lattice_symbol`) is -2 log 2 for a row of
+#: points, and at most -2 log 2 for every lattice. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -66,12 +66,12 @@ LEAST_NEGATIVE = 1.386
 class LatticeInfluence:
     """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
-    array       : (N, 2) [length] points, with errors of at most `point_error`
+    array       : (N, 2) [length] points; each coordinate has an error of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
     layout      : the exact positions of the summits; `array` contains them times `lattice.shrink`,
-        rounded. The factor is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
+        rounded. `shrink` is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
     lattice     : the lattice of the points
-    scale       : A_ij r_ij, which is 1 / (pi E*)
+    scale       : 1 / (pi E*), which is A_ij r_ij
     """
 
     array: Array
@@ -96,7 +96,7 @@ class LatticeInfluence:
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) flat indices of sites in an array with rows of the padded length."""
+        """The box, and (n,) flat indices of the sites in an array with rows of padded length."""
         basis, places = self.lattice.basis / self.spacing, self.places
         if len(places) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
@@ -134,7 +134,7 @@ class LatticeInfluence:
 
     def rounding(self, loads: Array) -> Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
-        # row sum of this bounds the effect on a component.
+        # sum of site_error / r^2 in a row bounds the change of a component.
         each = self.box.bound(self._kernel, ROUNDOFF) * float(np.linalg.norm(loads))
         each += self._displaced * float(np.abs(loads).max(initial=0.0))
         return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
@@ -151,7 +151,7 @@ class LatticeInfluence:
 
     @property
     def _unit(self) -> float:
-        """The entry A_ij of nearest neighbours."""
+        """The entry A_ij for two sites at the distance `spacing`."""
         return self.scale / self.spacing
 
     @property
@@ -161,7 +161,7 @@ class LatticeInfluence:
 
     @property
     def _displaced(self) -> float:
-        """[1 / spacing] norm bound on the change of the matrix 1/r by deviations from the sites."""
+        """[1 / spacing] bound on the norm of the change of 1/r_ij by deviations from the sites."""
         return self.site_error / self._least * self._kernel.norm**2
 
     @cached_property
@@ -179,7 +179,7 @@ class LatticeInfluence:
         return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._boxed[1]]
 
     def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The values at the sites, zeros elsewhere, in rows as long as the transforms."""
+        """(rows, padded columns) the values (n,) at their sites, and zeros at all other sites."""
         field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
         field.ravel()[self._boxed[1]] = values  # where points coincide, the last value remains
         return field
@@ -204,7 +204,7 @@ class LatticeInfluence:
 
     @property
     def places(self) -> Sites:
-        """(n, 2) site (i, j) of each asperity."""
+        """(n, 2) the site (i, j) of each asperity."""
         assert self.layout.sites is not None
         return self.layout.sites[self.members]
 
@@ -228,7 +228,7 @@ class LatticeInfluence:
 
     @property
     def _filled(self) -> bool:
-        """True if the fill ratio of the box is above `FILLED`."""
+        """True if asperities occupy more than the fraction `FILLED` of the sites of the box."""
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
 
     def slopes(self, loads: Array) -> Array:
@@ -237,7 +237,7 @@ class LatticeInfluence:
 
     @property
     def _pulls(self) -> list[Kernel]:
-        """Kernels d_x / |d|^3 and d_y / |d|^3 of the distance vector d, in units of the spacing."""
+        """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
         return self._cached("pulls", lambda: pulls(self.box, cubed))
 
     def separations(self) -> Array:
@@ -249,7 +249,7 @@ class LatticeInfluence:
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
 
-        Pairs are searched up to the distance beyond which none can exceed the largest so far."""
+        Pairs are searched, nearest first, until no farther one can exceed the largest so far."""
         if not self._filled:
             return crowding(self.points, radii)
         (rows, columns), places = self.box.shape, self._boxed[1]
@@ -264,14 +264,15 @@ class LatticeInfluence:
         return worst
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """Differences (i, j) of sites, nearest first, with lower bounds on distances of points."""
+        """`neighbours` of the box, with lower bounds [length] on the distances of their points."""
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
         """True if A + (scale / radius) I is proved positive semidefinite.
 
-        The least value of the symbol proves it (docs/theory/operators-lattice.md).
+        A lower bound on the symbol, and so on the eigenvalues of A, proves it
+        (docs/theory/operators-lattice.md, "The symbol").
         """
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
@@ -290,7 +291,7 @@ class LatticeInfluence:
         return sliced.sums(loads, self._boxed[1], *off_sites)
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
-        """The object of this name, cached unless it is too large."""
+        """The object that `make` returns, cached under `name` unless there are many asperities."""
         found: Made = self._spectra[name] if name in self._spectra else make()
         if len(self) <= MOST_KEPT:
             self._spectra[name] = found
@@ -308,7 +309,7 @@ class LatticeInfluence:
         return Sliced.of(self.box, distances, norm, unit, count)
 
     def _off_sites(self, loads: Array) -> tuple[Array, float]:
-        """Change of sum_j P_j / r_ij by deviations from the sites, and a bound on its error.
+        """(n,) changes of sum_j P_j / r_ij by deviations from the sites, and their error bound.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
@@ -347,7 +348,7 @@ class LatticeInfluence:
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:
-    """The largest sum of the values at two sites that are i rows and j columns apart, or 0."""
+    """The largest sum of `field` at two sites i rows and j columns apart; 0 if none is larger."""
     here, there = field[i:], field[: len(field) - i]
     if j >= 0:
         here, there = here[:, j:], there[:, : there.shape[1] - j]

@@ -16,7 +16,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Largest difference between the least value found and the bound. A smaller one takes more time.
+#: Largest difference of the lower bound from the least value found. A smaller one takes longer.
 TOLERANCE = 1e-3
 
 #: Ratio of the longer to the shorter basis vector above which the sums have too many terms.
@@ -28,7 +28,8 @@ REACH = 6.0
 #: Bound on the omitted terms and on the rounding of some hundred terms below 10.
 LOST = 1e-9
 
-#: First number of cells along each direction of the dual lattice, and largest number of halvings.
+#: First number of cells along each direction of a cell of the dual lattice, and largest number of
+#: times that these cells are halved.
 FIRST, MOST_HALVINGS = 8, 12
 
 #: Vectors from the middle of a cell to the middles of its quarters, in units of a quarter's size.
@@ -71,7 +72,7 @@ class _Symbol:
 
     @classmethod
     def of(cls, basis: Array) -> _Symbol:
-        """The terms, with an alpha for which both sums have about equally many."""
+        """The terms for an alpha with which the two sums have about equally many terms."""
         area = abs(float(np.linalg.det(basis)))
         alpha = float(np.sqrt(np.pi / area))
         dual = np.asarray(2.0 * np.pi * np.linalg.inv(basis).T, dtype=np.float64)
@@ -112,7 +113,7 @@ class _Symbol:
         return values, np.fmax(taylor, falling)
 
     def _image(self, q: Array) -> tuple[Array, Array]:
-        """(2 pi / V) E(q), and minus its derivative."""
+        """(2 pi / V) E(q), and minus the derivative of this with respect to q."""
         from scipy.special import erfc
 
         share, x = 2.0 * np.pi / self.area, q / (2.0 * self.alpha)

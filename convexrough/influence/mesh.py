@@ -16,7 +16,7 @@ from convexrough.influence.near_pairs import Order
 from convexrough.influence.softened import twofold_lagrange
 from convexrough.influence.splitting import Splitting
 
-#: Largest number of points in a block: sums stay short, and a matrix product fits in the cache.
+#: Largest number of points in a patch: sums stay short, and a matrix product fits in the cache.
 BLOCK = 256
 
 #: Number of points whose weights are computed together: they fit in the cache.
@@ -25,9 +25,11 @@ PLACES = 2**12
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """The interpolation W from nodes to points, with one factor (n, width) for x and one for y.
+    """The interpolation W from nodes to points.
 
-    patches : for each block, its first point, the point after its last, and its first node (i, j)
+    x, y    : (n, width) weights in each direction; a weight of W is the product of two of them
+    patches : for groups of points of one block of mesh cells: the first point, the point after the
+        last, and the first node (i, j) of the block
     """
 
     x: NDArray[Any]
@@ -53,7 +55,7 @@ class Interpolation:
         return cls(x, y, patches, shape)
 
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P on the mesh, or |W|^T P if `absolute`."""
+        """W^T P at the nodes of the mesh for loads P (n,), or |W|^T P if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
         width = x.shape[1]
@@ -64,7 +66,7 @@ class Interpolation:
         return field
 
     def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
-        """(n,) W times a field on the mesh."""
+        """(n,) W times a field of values at the nodes of the mesh."""
         result = np.empty(len(self.x), dtype=field.dtype)
         width = self.x.shape[1]
         for start, stop, i, j in self.patches:
@@ -75,7 +77,7 @@ class Interpolation:
 
 
 def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
-    """The weights (n, width) of some points in x and y, 0 outside the stencil of each point."""
+    """The double-double weights (m, width) in x and y of some points, 0 outside their stencils."""
     stencil = np.arange(splitting.kernel.order)
     factors = []
     for k in (0, 1):

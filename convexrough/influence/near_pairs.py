@@ -1,4 +1,4 @@
-"""The part S of 1 / r^q that is not smooth, as a sparse matrix over near pairs of points."""
+"""The part S = 1 / r^q - L that is not smooth, as a sparse matrix over near pairs of points."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.influence.splitting import Splitting
 
-#: Memory [bytes] for half a near pair while the matrix is assembled, and the number of points from
-#: which the number of pairs is estimated first.
+#: Memory [bytes] per near neighbour of a point while the matrix is assembled; and the number of
+#: points from whose near neighbours the number of all near pairs is estimated first.
 BYTES, SAMPLE = 24, 1000
 
 
@@ -27,9 +27,9 @@ class Order:
     tails  : (n, 2) [length] low parts of the sorted points, or None
     cells  : (n, 2) mesh cell of each point
     shares : (n, 2) position of each point in its cell, from 0 to 1
-    keys   : numbers of the blocks with points, sorted
-    starts : (blocks + 1,) first point of each block
-    shape  : rows and columns of blocks
+    keys   : (b,) numbers of the blocks that contain points, sorted
+    starts : (b + 1,) first point of each of these blocks, and the number of all points
+    shape  : numbers of rows and of columns of blocks
     """
 
     places: Indices
@@ -64,7 +64,7 @@ class Order:
         )
 
     def squares(self, i: Indices, j: Indices) -> Array:
-        """(m,) [length^2] squared distances of pairs of the sorted points."""
+        """(m,) [length^2] squared distances of the sorted points i (m,) from sorted points j."""
         apart = self.points[i] - self.points[j]
         if self.tails is not None:
             apart += self.tails[i] - self.tails[j]
@@ -75,7 +75,7 @@ class Order:
 def _placed(
     points: Array, low: Array, spacing: float, tails: Array | None
 ) -> tuple[Indices, Array]:
-    """The cell of each point, and the position of the point in the cell, rounded once."""
+    """(n, 2) the cell of each point, and (n, 2) its position in the cell, rounded once."""
     away = Pair(*two_sum(points, -low))
     if tails is not None:
         away += Pair.exact(tails)
@@ -88,12 +88,12 @@ def _placed(
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """The matrix S of docs/theory/operators-mesh.md: 1 / r^q minus L, for pairs within the cut.
+    """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
 
-    upper   : (n, n) sparse, pairs i < j
-    own     : the diagonal, -L(0)
-    terms   : largest number of terms in a sum
-    nearest : [length] least distance that is not 0
+    upper   : (n, n) sparse, the entries for pairs of sorted points i < j
+    own     : the entries on the diagonal, -L(0)
+    terms   : largest number of near neighbours of a point
+    nearest : [length] least distance of a near pair that is not 0
     """
 
     upper: Any

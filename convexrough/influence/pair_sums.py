@@ -1,8 +1,9 @@
 """Sums over pairs of arbitrary points: distant pairs by a mesh, near pairs one by one.
 
-1 / r^q is the sum of a smooth part L (`softened`) and a rest S that is 0 beyond a distance, the
-reach. L is interpolated from a square mesh, on which Fourier transforms compute the convolution; S
-is a sparse matrix. docs/theory/operators-mesh.md derives the method and the error bounds.
+1 / r^q is the sum of a smooth part L (`softened`) and a rest S, which is 0 for distances above the
+"reach". The part L is W G W^T: W interpolates from the nodes of a square mesh, and Fourier
+transforms multiply by G, which has the values of L between nodes. S is a sparse matrix.
+docs/theory/operators-mesh.md derives the method and the error bounds.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from convexrough.roundoff import ROUNDOFF
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """The map from P to sum_j P_j / r_ij^q, with bounds on its errors."""
+    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors."""
 
     splitting: Splitting
     order: Order
@@ -55,7 +56,7 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """(n,) the sums. A second thread computes the sparse part; both parts release the GIL."""
+        """(n,) the sums; a second thread computes the sparse part, as both release the GIL."""
         ordered = loads[self.order.places]
         if self.weights is None:
             total = self.near.apply(ordered)
@@ -69,13 +70,13 @@ class Product:
         return result
 
     def smooth(self, ordered: NDArray[Any]) -> NDArray[Any]:
-        """The part computed on the mesh: W G W^T P."""
+        """(n,) the part of the sums that is computed on the mesh, W G W^T P, for sorted loads P."""
         assert self.weights is not None
         field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
         return self.weights.from_nodes(field)
 
     def interpolation(self, strengths: Array) -> Array:
-        """(n,) bounds on the interpolation error of near pairs, for strengths of at least 0.
+        """(n,) bounds on the interpolation error of near pairs in sums of `strengths` (n,) >= 0.
 
         Pairs within the reach plus the `sway` of the stencils count as near. The relative error of
         other pairs is part of `rounding`.
@@ -90,7 +91,7 @@ class Product:
         return bounds
 
     def above(self, strengths: Array) -> Array:
-        """(n,) upper bounds on the sums, for strengths of at least 0."""
+        """(n,) upper bounds on the sums over j of strengths_j / r_ij^q, for `strengths` >= 0."""
         total = self.apply(strengths)
         rounding = self.rounding(strengths)
         total += rounding.of(total) + self.interpolation(strengths)
@@ -98,7 +99,7 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Rounding errors outside the transforms: relative to the sums, and to the largest load."""
+        """Bounds on errors outside the mesh: relative to the sums, and to the largest load."""
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
@@ -128,7 +129,7 @@ class Product:
 
     @property
     def _weighing(self) -> tuple[float, float]:
-        """Relative rounding errors of products with W^T and with W."""
+        """Bounds on the relative rounding errors of products with W^T, and with W."""
         order, width = self.splitting.kernel.order, self.splitting.width
         weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
         overlaps = (-(-width // self.splitting.block)) ** 2
@@ -138,7 +139,7 @@ class Product:
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:
-    """(n,) upper bounds on the sum of all strengths within a distance of each point."""
+    """(n,) upper bounds on the sum of the strengths at points within a distance of each point."""
     parts = 4
     side = distance * (1.0 + 1e-9) / parts
     cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)

@@ -33,13 +33,14 @@ from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
-#: Largest relative error of a product by interpolation: most of the error of `sums`, about 1e-16.
+#: Largest relative error of a product that is due to interpolation. It is most of the error of
+#: `sums`, which is about 1e-16.
 TOLERANCE = 5e-17
 
-#: Largest relative error by interpolation for loads in single precision, and for `falloff`.
+#: Largest relative errors due to interpolation: for loads in single precision, and for `falloff`.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
-#: Largest number of asperities for which `sums` uses a matrix, with 27 digits; for speed only.
+#: Up to this number of asperities `sums` uses a matrix, which has 27 digits; for speed only.
 FEW = 1500
 
 #: Largest number of pairs (asperity, other point) that `onto` computes one by one; for speed only.
@@ -52,7 +53,7 @@ class ScatteredInfluence:
 
     point_error : [length] bound on the error of each coordinate of the points
     tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
-    tolerance   : largest relative error of a product by interpolation
+    tolerance   : largest relative error of a product that is due to interpolation
     """
 
     points: Array
@@ -130,7 +131,7 @@ class ScatteredInfluence:
         found = self._sums(loads)
         if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
             return found
-        # Distances have at most this error, and 1 / r this error over r^2.
+        # If distances have an error of at most `moved`, 1 / r has one of about `moved` / r^2.
         moved = 2.0 * math.sqrt(2.0) * self._unknown
         off = 1.01 * moved * self.falloff(np.abs(loads.high), 2)
         return Ball.around(found.mid, found.radius + off)
@@ -145,7 +146,7 @@ class ScatteredInfluence:
         return smoother_of_points(self.points, self.scale, root)
 
     def _stretched(self, power: int) -> float:
-        """The factor by which errors of the points can increase 1 / r^power."""
+        """A bound on the factor by which errors of the points can increase 1 / r^power."""
         moved = entry_error(self._unknown, self._double.near.nearest)
         return float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
@@ -170,5 +171,5 @@ class ScatteredInfluence:
 
     @property
     def _unknown(self) -> float:
-        """[length] bound on the error of each coordinate of the points with their tails."""
+        """[length] bound on the error of each coordinate of the sum of `points` and `tails`."""
         return known(self.points, self.tails, self.point_error)[1]

@@ -21,7 +21,7 @@ from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.roundoff import ROUNDOFF
 
-#: Binary places of the integers with which L is computed within the reach.
+#: Number of binary places of the whole numbers, in units of 2^-FIXED, with which L is computed.
 FIXED = 160
 
 #: Least number of nodes of the table of L, and number of terms of Taylor's series at each node.
@@ -29,9 +29,9 @@ NODES, TERMS = 1024, 8
 
 
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
-    """Terms of Taylor's series of reach times L in (r / reach)^2, at nodes, in units of 2^-FIXED.
+    """`count` terms of Taylor's series of reach times L in (r / reach)^2, each (nodes,).
 
-    The nodes are r^2 = 0, step, 2 step, ...
+    The nodes are r^2 = 0, step, 2 step, ... The terms are whole numbers, in units of 2^-FIXED.
     """
     one, apart = 1 << FIXED, step / Fraction(kernel.reach) ** 2
     t = one - np.arange(nodes, dtype=object) * one * apart.numerator // apart.denominator
@@ -44,7 +44,7 @@ def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list
 
 
 def soft_values(values: Any, scale: Fraction) -> Pair:
-    """Whole numbers in units of 2^-FIXED, multiplied by `scale`, as pairs."""
+    """Whole numbers in units of 2^-FIXED, multiplied by `scale`, as double-double numbers."""
     unit = scale / (1 << FIXED)
     return Pair(*np.array([Pair.nearest(value * unit) for value in values]).T)
 
@@ -81,7 +81,7 @@ class SoftTable:
         return cls(step, soft_values(values, 1 / Fraction(kernel.reach)), slopes, error)
 
     def at(self, squares: Pair) -> Pair:
-        """L at squared distances, as pairs; low parts are at most a hundredth of the high parts."""
+        """L at squared distances [length^2]; low parts are at most a hundredth of high parts."""
         node = np.rint(squares.high / self.step).astype(np.intp)
         away = ((squares.high - node * self.step) + squares.low) / self.step
         value = self.terms[-1][node]
@@ -93,14 +93,14 @@ class SoftTable:
 
 @dataclass(frozen=True, eq=False)
 class SharpPairs:
-    """S in two parts. First parts are multiples of a unit, so that sums of them are exact.
+    """S = first + second. Entries of `first` are multiples of a unit, so that their sums are exact.
 
-    first, second : (n, n) sparse, pairs i < j
-    unit   : unit of the first parts, a power of two
-    loads  : unit of the first parts of loads up to 1, a power of two
+    first, second : (n, n) sparse, the entries for pairs of sorted points i < j
+    unit   : unit of the entries of `first`, a power of two
+    loads  : unit of the first parts of loads of at most 1, a power of two
     sums   : (n,) bounds on the row sums of |S|
     centre : L(0)
-    error  : bound on the error of an entry that is not due to 1 / r
+    error  : bound on the part of the error of an entry that is not due to 1 / r
     """
 
     product: Product
@@ -119,7 +119,7 @@ class SharpPairs:
         upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
         ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
         sums = _sizes(product, ones)
-        # Sums up to 16 times the median must be exact.
+        # Sums of first parts up to 16 times the median of `sums` must be exact.
         bits = (49 - terms.bit_length()) // 2
         unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
         table = SoftTable.of(kernel)
@@ -151,7 +151,7 @@ class SharpPairs:
         return cls(product, high, low, unit, 2.0**-bits, sums, centre, error)
 
     def __call__(self, ordered: Pair) -> tuple[Pair, Array]:
-        """(n,) sums for loads up to 1, and bounds on the errors of the sums."""
+        """(n,) the products of S with sorted loads of at most 1, and bounds on their errors."""
         product, kernel = self.product, self.product.splitting.kernel
         first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
         second = np.asarray((ordered.high - first) + ordered.low)
@@ -176,7 +176,7 @@ def _applied(upper: Any, loads: Array) -> Array:
 
 
 def _sizes(product: Product, strengths: Array) -> Array:
-    """(n,) bounds on the sums of |S| over near pairs, weighted with the strengths."""
+    """(n,) bounds on the sums over near pairs of |S_ij| times the strength of j."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)

@@ -1,8 +1,9 @@
 """The sums of `pair_sums` with more digits than float64 has, for the products of a certificate.
 
-The products from points to the mesh, on the mesh and back to the points are computed in slices.
-First slices have so few bits that their products are exact, and the rests are small. The remaining
-error is mostly that of interpolation (docs/theory/operators-mesh.md).
+The product W G W^T P goes from points to the mesh, on the mesh, and back to the points. Each step
+is computed with slices of numbers. First slices have so few bits that their products are exact, and
+the rests are small. The remaining error is mostly due to interpolation
+(docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, lebesgue
 from convexrough.roundoff import ROUNDOFF
 
-#: Bits of a float64 number, and bits of a first slice.
+#: Numbers of bits of a float64 number and of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches processed together, which fit in the cache.
+#: Number of patches (`mesh.Interpolation`) that are processed together and fit in the cache.
 PATCHES = 64
 
 LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -55,7 +56,7 @@ class Slices(NamedTuple):
 def in_slices(
     product: Callable[[Array, Array], Array], a: Slices, b: Slices
 ) -> tuple[Array, Array]:
-    """A bilinear product in two parts: the exact product of the first slices, and the rest."""
+    """A bilinear product as two parts: the exact product of the first slices, and all the rest."""
     left = product(a.first, b.second)
     left += product(a.second, b.first + b.second)
     return product(a.first, b.first), left
@@ -63,10 +64,10 @@ def in_slices(
 
 @dataclass(frozen=True)
 class SoftValues:
-    """The softened kernel L between nodes of a mesh, multiplied by a unit.
+    """The softened kernel L between nodes of a mesh, multiplied by the unit of length.
 
-    near      : values within the reach, by i^2 + j^2
-    distances : values 1 / r beyond the reach
+    near      : the values within the reach; index i^2 + j^2 for nodes that differ by (i, j)
+    distances : the values 1 / r beyond the reach
     """
 
     near: Pair
@@ -92,7 +93,7 @@ class SoftValues:
 
 
 def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
-    """unit L(r) at the distances r = spacing sqrt(s) within the reach, for s = 0, 1, ..."""
+    """`unit` times L at the distances spacing sqrt(s) within the reach, for s = 0, 1, ..."""
     step = Fraction(spacing) ** 2
     nodes = math.ceil(Fraction(kernel.reach) ** 2 / step)
     return soft_values(
@@ -101,7 +102,7 @@ def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
 
 
 class MeshSums:
-    """The sums over j of P_j / r_ij for exact points, by the mesh of a product."""
+    """The sums over j of P_j / r_ij for exact points, on the mesh and near pairs of a product."""
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
@@ -138,7 +139,7 @@ class MeshSums:
 
 
 def _low_weights(product: Product) -> LowWeights:
-    """The low parts of the weights in x and y, in single precision."""
+    """(n, width) the low parts of the interpolation weights in x and in y, in single precision."""
     shape = len(product.order.places), product.splitting.width
     x, y = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
     for start in range(0, len(x), PLACES):
@@ -149,7 +150,7 @@ def _low_weights(product: Product) -> LowWeights:
 
 
 def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, float]:
-    """W^T P for loads of at most 1, and a bound on the error at each node."""
+    """W^T P for sorted loads P of at most 1, and a bound on the error at every node."""
     assert product.weights is not None
     met = _met(product)
     bits = (DIGITS - met.bit_length()) // 2
@@ -171,7 +172,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W times values on the mesh: whole numbers, rests, the unit of both, and an error bound."""
+    """W times values on the mesh: whole numbers (n,), rests (n,), their unit, an error bound."""
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
@@ -195,7 +196,7 @@ def _from_nodes(
 def _weighed(
     product: Product, lows: LowWeights
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
-    """For groups of patches: points, rows and nodes of each patch, and the weights in x and y."""
+    """Groups of patches: the points of each group, slices for each patch, and the weights."""
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):
@@ -210,7 +211,7 @@ def _weighed(
 
 
 def _met(product: Product) -> int:
-    """The largest number of points that have the same node in their stencils."""
+    """The largest number of points whose stencils contain the same node."""
     assert product.weights is not None
     order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
     np.add.at(counts, tuple(product.order.cells.T), 1)
@@ -221,6 +222,6 @@ def _met(product: Product) -> int:
 
 
 def _relative(product: Product) -> float:
-    """Relative error of distant pairs by interpolation and by rounding of positions in cells."""
+    """Relative error of distant pairs due to interpolation and to rounded positions in cells."""
     kernel, spacing = product.splitting.kernel, product.splitting.spacing
     return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)

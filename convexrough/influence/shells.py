@@ -13,7 +13,7 @@ from convexrough.roundoff import SAFETY
 
 
 def shells(influence: Influence) -> Array:
-    """(n,) 1 / (pi E* s_i), with s_i half the distance to the nearest neighbour.
+    """(n,) 1 / (pi E* s_i), where the shell radius s_i is half the distance to the next neighbour.
 
     A + diag(shells) is positive semidefinite. A value is 0 for a single asperity, and infinite for
     points that may coincide.
@@ -27,10 +27,12 @@ def shells(influence: Influence) -> Array:
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """(n,) 1 / (pi E* s_i) for shells adapted to contact radii a_i that differ: `radii` [length].
+    """(n,) 1 / (pi E* s_i), where the shell radii s_i are adapted to contact radii a_i that differ.
 
-    With the largest (a_i + a_j) / r_ij as c, and distances d_i to the nearest neighbours, the radii
-    are s_i = share a_i / c + (1 - share) d_i / 2: docs/theory/certificate.md, "Which box", 3.
+    Let c be the largest (a_i + a_j) / r_ij, and d_i the distance to the nearest neighbour. Then
+    s_i = share a_i / c + (1 - share) d_i / 2: docs/theory/certificate.md, "Which box", 3.
+
+    radii : (n,) [length] the contact radii a_i
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

@@ -1,8 +1,8 @@
 """Products on a box of sites with any number of digits, by exact convolutions.
 
-Loads and kernel are divided into slices of whole numbers and a small rest; the unit shrinks by the
-same power of two from one slice to the next. All products of slices that have the same unit are
-summed as a *level*. Fourier transforms compute a level with an error below one half, so rounding to
+Loads and kernel are divided into slices of whole numbers and a small rest. The unit shrinks by the
+same power of two from one slice to the next. The sum of all products of slices that have the same
+unit is a *level*. Fourier transforms compute a level with an error below one half, so rounding to
 whole numbers makes it exact (docs/theory/operators-lattice.md, "Slices").
 """
 
@@ -22,10 +22,10 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.roundoff import ROUNDOFF
 
-#: The error of a level may be at most this, so that rounding makes it exact.
+#: Largest error allowed in a computed level; below 1/2, rounding to whole numbers removes it.
 SURE = 0.45
 
-#: Number of slices, and the number of sites of a box above which there is one more. On 6.6 million
+#: Number of slices; and the number of sites of a box above which one more is used. On 6.6 million
 #: sites, three slices prove loads to 7e-13 of the largest load, four slices to 3e-15.
 SLICES, LARGE = 3, 2**22
 
@@ -34,7 +34,7 @@ MOST_BITS = 48
 
 
 class Values(Protocol):
-    """An even kernel of values up to 1, as a function of differences of sites.
+    """An even kernel, with values of at most 1, as a function of differences of sites.
 
     error : bound on the relative error of each value
     """
@@ -94,9 +94,10 @@ class Distances:
 
 
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
-    """Slices v_1, v_2, ... of whole numbers, and a rest: values = sum 2^-(bits + s more) v_{s+1}.
+    """`count` arrays v_1, v_2, ... with values = sum_s 2^-(bits + s more) v_{s+1}, s = 0, 1, ...
 
-    |v_1| is at most about 2^bits max |values|, the other slices are at most 2^(more - 1) in size.
+    All but the last one, the rest, have whole numbers. |v_1| is at most about 2^bits max |values|.
+    The other slices are at most 2^(more - 1) in size.
     """
     high, low = values.high * 2.0**bits, values.low * 2.0**bits
     slices = []
@@ -110,7 +111,7 @@ def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A kernel on a box in slices, for products with any loads.
+    """A kernel on a box of sites, divided into slices for products with any loads.
 
     unit    : [length] the unit of distances, a power of two
     kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more)
@@ -128,12 +129,12 @@ class Sliced:
 
     @classmethod
     def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
-        """The kernel in `count` slices; norm : approximate 2-norm of the kernel."""
+        """The kernel divided into `count` slices; `norm` is its approximate 2-norm."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
         budget = SURE / ((count - 1) * each_loss(box, count))
-        # All slices of the kernel should have about equal norms, and all slices of the loads, too.
+        # Slices of the kernel should have about equal norms, and so should slices of the loads.
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
         more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)
@@ -150,9 +151,10 @@ class Sliced:
             more -= 1
 
     def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """(n,) sums over j of g_ij P_j / unit with the kernel g, plus a `change` with an `error`.
+        """(n,) sums over j of g_ij P_j / unit with the kernel g, plus `change`.
 
-        at : (n,) sites of the loads, in a box with as many columns as the transforms
+        at     : (n,) flat indices of the loads' sites, in a box with as many columns as transforms
+        change : (n,) values to add; each has an error of at most `error`
         """
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
@@ -200,7 +202,7 @@ class Sliced:
         return 2.0**-self.bits * sum(norms)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads for which all levels are exact, and number of bits of the first slice."""
+        """Slices of loads with which all levels are exact; and the number of bits of the first."""
         count = len(self.kernels)
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))

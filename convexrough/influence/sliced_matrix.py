@@ -1,9 +1,9 @@
 """Sums over j of P_j / r_ij by a matrix, to about 27 digits, with products by BLAS.
 
-Entries and loads are divided into slices. First slices are multiples of one unit for each row and
-block of columns. They have so few bits that sums of their products stay below 2^53 units and are
-exact in any order; so are sums of products of first with second slices. The rest is about 2^-48 of
-the sum, and its rounding error about 2^-101.
+Each entry and each load is divided into a first slice, a second slice and a rest. First slices are
+multiples of one unit for each row and block of columns. They have so few bits that sums of their
+products stay below 2^53 units and are exact in any order; so are sums of products of first with
+second slices. All other products are about 2^-48 of the sum, and their rounding error about 2^-101.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, rounded, two_squar
 from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
 
-#: Number of columns with the same unit; bits of the first and of the second slice of an entry.
+#: Number of columns in a block; numbers of bits of the first and of the second slice of an entry.
 BLOCK, FIRST, SECOND = 128, 24, 23
 
 #: Largest number of bits of a first slice of loads; more would not reduce the error.
 MOST_BITS = 30
 
-#: Largest number of rows of a cached matrix, whose slices take 0.4 GB.
+#: Largest number of rows of a cached matrix. Its slices then take 0.4 GB.
 KEPT = 4096
 
-#: The whole matrix is computed instead of a part if it has at most this many rows, or at most twice
-#: as many rows as the part, because other parts may be needed later.
+#: For a part of the asperities, the matrix of all is computed if it has at most this many rows, or
+#: at most twice as many as the part, because other parts may be needed later.
 SMALL = 128
 
-#: Number of entries computed together, which fit in the cache.
+#: Number of entries that are computed together and fit in the cache.
 PIECE = 2**15
 
 #: Bound on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
@@ -44,9 +44,10 @@ LARGEST = 2.0**300
 
 @dataclass(frozen=True, eq=False)
 class SlicedMatrix:
-    """Rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
+    """Some rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
 
-    blocks : the columns of each block, and the number of bits for a slice of the loads there
+    slices : (m, n) the three parts
+    blocks : the columns of each block, and the number of bits of a first slice of their loads
     losses : (3 blocks, m) three factors for each block. They multiply the largest load in it, the
         largest rest of a load after two slices, and the largest rest after one slice. The sum of
         these products over the blocks bounds the error of a product with loads
@@ -58,7 +59,7 @@ class SlicedMatrix:
 
     @classmethod
     def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
-        """Some rows for points (n, 2) with an extent of about 1 and errors up to `point_error`."""
+        """The rows `rows` for points (n, 2) of extent about 1, with errors up to `point_error`."""
         here, n = points.at(rows), len(points.high)
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
@@ -87,7 +88,7 @@ class SlicedMatrix:
         moved = 2.0 * point_error * nearest * UP
         with np.errstate(divide="ignore"):
             moved = np.where((moved < 1) & (nearest < LARGEST), moved / (1.0 - moved), np.inf)
-        few = 4 * len(bits) + 12  # operations that are not sums of a block
+        few = 4 * len(bits) + 12  # number of operations besides the sums in a block
         ordinary = (min(BLOCK, n) + few) * ROUNDOFF * sizes
         whole = ((few * ROUNDOFF) ** 2 + PAIR_ROUNDOFF + moved) * sizes.sum(axis=0)
         losses = np.stack((ordinary[2] + whole, ordinary[0], ordinary[1]), axis=1)
@@ -95,7 +96,7 @@ class SlicedMatrix:
         return cls(slices, blocks, losses.reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
-        """The matrix of some of the points, in increasing order; its errors are no larger."""
+        """The matrix among some of the points, with increasing indices; errors are no larger."""
         first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
         columns = (slice(*edges) for edges in pairwise([0, *stops]))
@@ -103,7 +104,7 @@ class SlicedMatrix:
         return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
 
     def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
-        """(..., m) high and low parts of products with loads (..., n) up to 1, and error bounds."""
+        """(..., m) high and low parts of products with loads (..., n) <= 1, and error bounds."""
         sums, rests, left_over = [], [], []
         for columns, bits in self.blocks:
             a, b, c = (part[:, columns].T for part in self.slices)
@@ -128,7 +129,7 @@ class SlicedMatrix:
 class MatrixSums:
     """The sums over j of P_j / r_ij among points (n, 2) with errors up to `point_error`.
 
-    Slices of up to `KEPT` rows are cached. Larger matrices are computed again for each product.
+    A matrix of up to `KEPT` rows is cached. A larger one is computed again for each product.
     """
 
     def __init__(self, points: Pair, point_error: float = 0.0) -> None:
@@ -137,7 +138,7 @@ class MatrixSums:
         self.which: Indices | None = None
 
     def restricted(self, which: Indices) -> MatrixSums:
-        """The sums among some of the points."""
+        """The same sums among some of the points."""
         if len(which) == len(self.points.high) and (which[1:] > which[:-1]).all():
             return self
         part = MatrixSums(self.points.at(which), self.point_error)
@@ -178,14 +179,14 @@ class MatrixSums:
 
     @cached_property
     def _of_whole(self) -> bool:
-        """True if the matrix is cut out of a larger one, which is cached or small enough."""
+        """True if the matrix is taken from that of `whole`, which is cached or small enough."""
         if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
             return False
         return "_matrix" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
 
     @cached_property
     def _scale(self) -> int:
-        """k such that the points divided by 2^k have an extent of about 1."""
+        """The exponent k for which the points divided by 2^k have an extent of about 1."""
         if self._of_whole:
             assert self.whole is not None
             return self.whole._scale
@@ -197,12 +198,12 @@ class MatrixSums:
 
 
 def _unit(largest: Array) -> Array:
-    """The unit of first slices of entries up to `largest`."""
+    """The unit of the first slices of entries of at most `largest`."""
     return np.asarray(np.ldexp(2.0**-FIRST, np.frexp(largest)[1]))
 
 
 def _most(values: Array) -> Array:
-    """The largest absolute values (..., 1) along the last axis."""
+    """(..., 1) the largest absolute value along the last axis."""
     return np.asarray(np.abs(values).max(axis=-1, initial=0.0, keepdims=True))
 
 
@@ -212,14 +213,14 @@ def inverse_distances(points: Pair, others: Pair) -> Pair:
 
 
 def squared_distances(points: Pair, others: Pair) -> Pair:
-    """Squared distances r^2; the last axis of the points is x, y."""
+    """Squared distances of points from others; the last axis of both arrays is x, y."""
     x, y = (_square(points.at(np.s_[..., k]), others.at(np.s_[..., k])) for k in (0, 1))
     square, rest = two_sum(x.high, y.high)
     return Pair(square, rest + (x.low + y.low))
 
 
 def _square(here: Pair, there: Pair) -> Pair:
-    """Squared differences of one coordinate; differences of float64 numbers take fewer terms."""
+    """Squared differences of one coordinate, with fewer terms if all low parts are 0."""
     if here.low.any() or there.low.any():
         apart = here - there
     else:

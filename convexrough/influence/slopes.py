@@ -1,12 +1,12 @@
-"""The slope of the surface at each asperity: the derivative of displacements by the points.
+"""The slope of the surface at each asperity: the derivative of its displacement by its point.
 
-If the point c_i of asperity i is moved, its displacement changes with the derivative
+If the point c_i of asperity i is moved, the displacement there changes with the derivative
 
     d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3.
 
-These are two sums with odd kernels, on the boxes and meshes of the compliance operator, without
-error bounds. On a mesh the smooth part is -grad L, the distance vector times the softened 1 / r^3
-of one order less.
+Its two components are sums with odd kernels. They are computed on the boxes and meshes of the
+compliance operator, without error bounds. On a mesh the smooth part is -grad L, which is the
+distance vector times the softened 1 / r^3 whose order is one less.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ BLOCK = 2**22
 
 
 def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
-    """The odd kernels x / r^3 and y / r^3 for every difference of two sites of a box.
+    """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two sites of a box.
 
-    over_cube : 1 / r^3, or the softened one, as a function of squared distances
+    over_cube : 1 / r^3, or the softened 1 / r^3, as a function of squared distances
     """
 
     def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
@@ -40,7 +40,7 @@ def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
 
 
 def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
-    """(n, 2) the two sums, without the factor -scale, for arbitrary points."""
+    """(n, 2) the sums over j of (c_i - c_j) v_j / r_ij^3 for arbitrary points c and `values` v."""
     ordered = values[product.order.places]
     total = _nearby(product, ordered)
     if product.weights is not None:
@@ -54,7 +54,7 @@ def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
 
 
 def mesh_pulls(product: Product) -> list[Kernel]:
-    """The odd kernels of the smooth part of a product; empty if there is no smooth part."""
+    """The two odd kernels of the smooth part of a product; empty if it has no smooth part."""
     return [] if product.weights is None else pulls(product.mesh, _softer(product).smooth)
 
 
@@ -64,7 +64,7 @@ def _softer(product: Product) -> Softened:
 
 
 def _nearby(product: Product, ordered: Array) -> Array:
-    """(n, 2) sums over near pairs, with 1 / r^3 minus its smooth part."""
+    """(n, 2) the sums over near pairs, with 1 / r^3 minus its smooth part, for sorted points."""
     upper, points, kernel = product.near.upper, product.order.points, _softer(product)
     total, n = np.zeros_like(points), len(points)
     edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + BLOCK, BLOCK))

@@ -1,10 +1,10 @@
 """An approximate inverse of I + W A W, to precondition conjugate gradients.
 
 It is the preconditioner M of docs/theory/newton.md, "Many asperities", for the compliance operator
-A and a diagonal W. Asperities are counted in the cells of a lattice, their own or a square one. The
-code computes M on blocks of m x m cells that are smaller than the Gaussian, with the mean of A over
-pairs of blocks. The constants are heuristics: they change the number of steps of conjugate
-gradients, not the answer.
+A and a diagonal W. M averages with a Gaussian that is as wide as a window of cells. The cells are
+those of the asperities' lattice, or of a square lattice. The code computes M on blocks of m x m
+cells, smaller than a window, with the mean of A over pairs of blocks. The constants are heuristics:
+they change the number of steps of conjugate gradients, not the answer.
 """
 
 from __future__ import annotations
@@ -21,32 +21,33 @@ from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
 
-#: Windows are so large that the relative variance of the mean of W^2 over a window is about this.
+#: Windows are chosen so large that the mean of W^2 over a window has about this relative variance.
 SCATTER = 0.04
 
-#: Width of a Gaussian that averages over as many cells as a window, divided by the window's side.
+#: Width of the Gaussian that averages over as many cells as a window, divided by the window's side.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
-#: Side of a window over the side of a block. Blocks resolve the waves that the Gaussian passes.
+#: Side of a window divided by the side of a block. Blocks resolve the waves that the Gaussian
+#: passes.
 FINE = 3.5
 
-#: Side of windows for smooth W. Blocks then have 2 x 2 cells, which cost a third of 1 x 1 cells.
+#: Least side of a window. Blocks then have 2 x 2 cells, which cost a third of blocks of one cell.
 LEAST_WINDOW = 2 * FINE
 
-#: Side of the windows on which the scatter of W^2 is measured.
+#: Side, in cells, of the windows on which the scatter of W^2 is measured.
 WINDOW = 8
 
-#: Cells are made smaller while the mean number of points in the cell of a point exceeds the first
-#: number and there are fewer cells per point than the second. The third is the largest distance, in
-#: cells, of neighbouring rows or columns that contain points; larger distances are shortened.
+#: Cells are made smaller while the mean number of points that share the cell of a point exceeds
+#: MOST_SHARING and there are fewer than MOST_CELLS cells per point. Neighbouring rows or columns
+#: with points are at most WIDEST_GAP cells apart; larger distances are shortened to this.
 MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
-#: Lower limit of 1 + d A, as the spectrum of A is negative at short waves.
+#: Lower limit of 1 + d A in the code, because the spectrum of A is negative for short waves.
 LEAST = 0.2
 
 
 def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
-    """M for asperities anywhere, on square cells that hold about one asperity on average.
+    """M for asperities at arbitrary points, on square cells with about one asperity on average.
 
     Where points are in clusters, cells are smaller, and wide empty strips are left out.
     """
@@ -63,7 +64,7 @@ def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
 
 
 def _packed_cells(places: Array) -> Indices:
-    """(2, n) cells of places (n, 2) [cell], without most of the empty rows and columns."""
+    """(2, n) row and column of the cell of each place (n, 2) [cell]; wide gaps are shortened."""
     cells = []
     for axis in places.T:
         used, which = np.unique(axis.astype(np.int64), return_inverse=True)
@@ -72,7 +73,7 @@ def _packed_cells(places: Array) -> Indices:
 
 
 def _mean_sharing(cells: Indices) -> float:
-    """The mean number of points in the cell of a point."""
+    """The mean over all points of the number of points in the cell of the point."""
     counts = np.bincount(cells[0] * (cells[1].max() + 1) + cells[1])
     return float(counts @ counts / cells.shape[1])
 
@@ -94,11 +95,11 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
         """The sum of values (n,) over each block."""
         return np.bincount(block, values, rows * columns).astype(np.float32).reshape(shape)
 
-    total = sums(root * root)  # D^2
+    total = sums(root * root)  # W^2 summed over each block
     touching = total > 0
     counts = sums(root > 0)[touching].astype(np.float64)
     count, sharing = float(counts.mean()), float(counts @ counts / counts.sum())
-    # Where blocks hold many asperities: A W r within a block, for r with random signs.
+    # If blocks hold many asperities, this estimates A W r within a block, for r of random signs.
     rough = scale / m * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / (m * m), 1.0)))
     size, spectrum = _block_spectrum(shape, basis, m, count, workers)
     w = root.astype(np.float32)
@@ -108,7 +109,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     q = np.divide(w, np.sqrt(mean).ravel()[block], out=np.zeros_like(w), where=w > 0)
 
     middle = np.float32(np.sqrt(np.median(mean[touching])))
-    displacement = np.float32(scale) * middle * spectrum  # of A_b D
+    displacement = np.float32(scale) * middle * spectrum  # A_b D, for each wave
     removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
     removed *= passed
     energies = displacement * displacement
@@ -137,7 +138,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
 
 
 def _window(squares: NDArray[Any]) -> float:
-    """The smallest m for which the means of W^2 over windows of m x m sites vary little."""
+    """The side of windows over which the mean of W^2 has the relative variance `SCATTER`."""
     m = WINDOW
     rows, columns = (max(1, length // m) for length in squares.shape)
     inside = squares[: rows * m, : columns * m]
@@ -152,12 +153,12 @@ def _window(squares: NDArray[Any]) -> float:
 
 
 def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
-    """The factor by which G^2 multiplies each wave, for a Gaussian of this width [spacing]."""
+    """The factor by which two Gaussian averages G of this width [spacing] multiply each wave."""
     dual = 2.0 * np.pi * np.linalg.inv(basis).T
     i, j = (np.fft.fftfreq(n) for n in size)
     i, j = i[:, None], np.abs(j[: size[1] // 2 + 1])
     squares = np.full(np.broadcast(i, j).shape, np.inf)
-    for a in (-1, 0, 1):  # the longest of the waves that look alike on the sites
+    for a in (-1, 0, 1):  # waves with equal values at all sites count as the longest of them
         for b in (-1, 0, 1):
             x, y = ((i + a) * dual[0, k] + (j + b) * dual[1, k] for k in (0, 1))
             np.minimum(squares, x * x + y * y, out=squares)
@@ -168,14 +169,14 @@ def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
 def _local_mean(
     sums: Single, touching: NDArray[np.bool_], size: tuple[int, int], passed: Single, workers: int
 ) -> Single:
-    """d, such that the local mean of sums / d is about 1 wherever asperities touch."""
+    """The field d for which the local mean of sums / d is about 1 wherever asperities touch."""
 
     def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
         waves[0] *= passed[:, each]
         return waves
 
     mean = np.ones_like(sums)
-    for power in (1.0, 0.5, 0.5, 0.5):  # as a symmetric matrix is scaled to row sums of 1
+    for power in (1.0, 0.5, 0.5, 0.5):  # like scaling a symmetric matrix to row sums of 1
         parts = np.where(touching, sums / mean, np.float32(0))
         local = through_waves([parts], size, workers, average)[0][:, : sums.shape[1]]
         mean *= np.maximum(local, np.float32(1e-3) * local.max()) ** np.float32(power)
@@ -185,7 +186,7 @@ def _local_mean(
 def _block_spectrum(
     blocks: tuple[int, int], basis: Array, m: int, count: float, workers: int
 ) -> tuple[tuple[int, int], Single]:
-    """Size and spectrum of the mean of 1 / r over pairs of blocks of a periodic box.
+    """The size of a periodic box, and the spectrum of the mean of 1 / r over pairs of its blocks.
 
     count : mean number of touching asperities in a block
     """
@@ -210,6 +211,6 @@ def _block_spectrum(
 
 
 def differences(length: int) -> NDArray[np.int64]:
-    """0, 1, ..., -2, -1: the whole numbers nearest to 0, modulo the length."""
+    """The array 0, 1, ..., -2, -1 of the differences nearest to 0 in a period of `length`."""
     i = np.arange(length)
     return np.where(i <= (length - 1) // 2, i, i - length)

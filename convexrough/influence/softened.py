@@ -2,8 +2,8 @@
 
 Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial: the series of 1 / r^q in
 t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives at r = a. All terms of
-the series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds: "The
-smooth part", "Derivatives of L", "Interpolation".
+the series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds, in
+"The smooth part", "Derivatives of L" and "Interpolation".
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CUT_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Softened:
-    """The kernel of power q, even order p and reach a [length]; without L if a is infinite."""
+    """The kernel L of power q, even order p and reach a [length]; L is 0 if a is infinite."""
 
     power: int
     order: int
@@ -43,7 +43,7 @@ class Softened:
         return values
 
     def local(self, squares: Array) -> Array:
-        """1 / r^q - L within the reach; -L(0) where two points coincide."""
+        """1 / r^q - L at squared distances within the reach; -L(0) where two points coincide."""
         with np.errstate(divide="ignore"):
             values: Array = 1.0 / np.sqrt(squares)
         values[squares == 0.0] = 0.0
@@ -57,14 +57,14 @@ class Softened:
 
     @cached_property
     def centre(self) -> float:
-        """L(0)."""
+        """The value L(0)."""
         if not np.isfinite(self.reach):
             return 0.0
         return float(_series(self.order, self.power).sum()) / self.reach**self.power
 
     @property
     def roundoffs(self) -> float:
-        """Relative error of one computed L, in roundoffs.
+        """Bound on the relative error of one computed value of L, in roundoffs.
 
         docs/theory/operators-mesh.md, "Rounding errors of L".
         """
@@ -73,11 +73,11 @@ class Softened:
 
     @property
     def beyond_roundoffs(self) -> float:
-        """Relative error of one computed 1 / r^q, in roundoffs."""
+        """Bound on the relative error of one computed 1 / r^q beyond the reach, in roundoffs."""
         return 8.0 * self.power + 2.0
 
     def moved(self, shift: float) -> float:
-        """Bound on the error of L, divided by 1 / r^q, for distances with the error `shift`.
+        """Bound on (error of L) / (1 / r^q) for distances with errors of at most `shift` [length].
 
         docs/theory/operators-mesh.md, "Rounding", for any q.
         """
@@ -87,7 +87,7 @@ class Softened:
         return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
 
     def pair_error(self, spacing: float) -> float:
-        """Bound on the error for any pair, by interpolation of L and by omitting 1 / r^q - L."""
+        """Bound on the error for any pair due to interpolation of L and omission of 1 / r^q - L."""
         return (1.0 + CUT_SHARE) * self._interpolation_error(spacing)
 
     def cut(self, spacing: float) -> float:
@@ -111,7 +111,7 @@ class Softened:
         return _interpolated(self.order) * worst * ratio / self.reach**self.power
 
     def far_error(self, spacing: float) -> float:
-        """Bound on the relative error by interpolation for pairs beyond the reach plus the sway."""
+        """Bound on the relative interpolation error for pairs beyond the reach plus the `sway`."""
         if not np.isfinite(self.reach):
             return 0.0
         worst = float(math.comb(self.order + self.power - 1, self.order))
@@ -120,7 +120,7 @@ class Softened:
         return float(_interpolated(self.order) * worst * ratio * nearer**self.power)
 
     def sway(self, spacing: float) -> float:
-        """[length] the most by which the distance of two nodes of stencils differs from r."""
+        """[length] bound on |d - r| for the distance d of nodes in the stencils of two points."""
         return math.sqrt(2.0) * self.order * spacing if np.isfinite(self.reach) else 0.0
 
     @property
@@ -138,7 +138,7 @@ class Softened:
 
 
 def lebesgue(order: int) -> float:
-    """The Lebesgue constant: the largest sum of |Lagrange's polynomials| in the middle interval.
+    """The largest sum of the sizes of Lagrange's polynomials in the middle interval of the nodes.
 
     In this interval the sum is an even polynomial, and all its roots lie outside. So it is largest
     in the middle.
@@ -153,7 +153,7 @@ def lagrange(places: Array, order: int) -> Array:
 
 
 def twofold_lagrange(places: Array, order: int) -> Pair:
-    """Lagrange's polynomials as in `lagrange`, in pairs of float64 numbers."""
+    """Lagrange's polynomials as in `lagrange`, in double-double numbers."""
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Pair(*two_sum(places, -float(node))) for node in nodes]
     left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]
@@ -168,15 +168,15 @@ def twofold_lagrange(places: Array, order: int) -> Pair:
     return weights
 
 
-#: Bounds on the relative error of a weight: of pairs (at most 60 operations, and a low part in
-#: single precision); and of float64 numbers alone, in roundoffs.
+#: Bounds on the relative error of a weight: of a double-double one (at most 60 operations, and a
+#: low part in single precision); and of one in float64, in roundoffs.
 TWOFOLD_WEIGHT = 2.0**-76
 WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40
 
 
 @cache
 def _series(order: int, power: int) -> Array:
-    """c_k of (1 - t)^(-q/2) = sum c_k t^k, up to k = p, each rounded once."""
+    """(p + 1,) coefficients c_k of (1 - t)^(-q/2) = sum c_k t^k, each rounded once."""
     return np.array([float(term) for term in exact_series(order, power)])
 
 
@@ -190,7 +190,7 @@ def exact_series(order: int, power: int) -> list[Fraction]:
 
 @cache
 def _interpolated(order: int) -> float:
-    """c with |error| <= c h^p max |d^p L| / p!, for successive interpolation in four variables."""
+    """The factor c in |error| <= c h^p max |d^p L| / p! of interpolation in four variables."""
     growth = lebesgue(order)
     remainder = math.prod(range(1, order, 2)) ** 2 / 2.0**order
     return 1.01 * remainder * (1.0 + growth + growth**2 + growth**3)

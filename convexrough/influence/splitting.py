@@ -1,4 +1,4 @@
-"""The choice of the splitting of 1 / r^q, and of the mesh for the smooth part.
+"""The choice of the splitting of 1 / r^q into L + S, and of the mesh for the smooth part L.
 
 docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: they affect
 the cost, and how near the error is to the tolerance. The bounds on the error hold for any choice.
@@ -15,26 +15,26 @@ from convexrough.arrays import Array
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.softened import Softened
 
-#: Candidates for p, the number of nodes for interpolation in each direction.
+#: The orders p that are tried: numbers of nodes for interpolation in each direction.
 ORDERS = range(4, 30, 2)
 
-#: Sums at SAMPLE points over MORE points are used to estimate the sums at all points.
+#: The sums over all points are estimated from sums at SAMPLE points over at most MORE points.
 SAMPLE, MORE = 32, 2**15
 
 #: Number of nearest points that are left out of the estimate of a sum.
 NEAREST = 8
 
-#: Estimated times [ns] on two cores: transforms, per node; near pairs, per pair; interpolation, per
-#: point and squared width of the stencil.
+#: Estimated times [ns] on two cores: of transforms for each node, of a product for each near pair,
+#: and of interpolation for each point, divided by the squared width of a block's nodes.
 NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """A splitting of 1 / r^q, and a mesh.
+    """A splitting of 1 / r^q into L + S, and a mesh for L.
 
     kernel  : the softened kernel, with q, p and a
-    spacing : h [length] of the mesh
+    spacing : [length] spacing h of the mesh
     block   : side of the blocks that are interpolated together, in mesh cells
     """
 
@@ -44,7 +44,7 @@ class Splitting:
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting:
-        """The cheapest splitting whose error in a product is likely to be within the tolerance."""
+        """The cheapest splitting whose relative error in a product is probably within tolerance."""
         n = len(points)
         extent = np.ptp(points, axis=0) if n else np.zeros(2)
         best, least = cls(Softened(power, 2, np.inf), 1.0, 1), PAIR_COST * n * n / 2
@@ -75,17 +75,17 @@ class Splitting:
 
     @property
     def cut(self) -> float:
-        """[length] the distance beyond which no pair is summed individually."""
+        """[length] the distance within which pairs are near pairs, with an entry in S."""
         return self.kernel.cut(self.spacing)
 
     @property
     def width(self) -> int:
-        """Number of nodes, in each direction, that the points of one block need."""
+        """The number of nodes in each direction from which the points of one block interpolate."""
         return self.block + self.kernel.order - 1
 
 
 class _Sums(NamedTuple):
-    """Estimates of sums over all points, from a sample."""
+    """Data of a sample of pairs of points, from which sums over all points are estimated."""
 
     distances: Array  # of the pairs in the sample, sorted
     share: float  # number of pairs in the sample per point
@@ -97,13 +97,13 @@ class _Sums(NamedTuple):
         some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
         distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
-        # Without the few nearest pairs: one close pair must not decide the estimate.
+        # The few nearest pairs are left out: one close pair must not decide the estimate.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
         sums = (np.maximum(distances, nearest) ** -power).sum(axis=1)
         return cls(ordered, SAMPLE * share, float(np.median(sums)) / share)
 
     def around(self, distance: float) -> float:
-        """The mean number of points within a distance of a point."""
+        """The estimated mean number of points within a distance of a point."""
         return float(np.searchsorted(self.distances, distance)) / self.share
 
 

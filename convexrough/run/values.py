@@ -45,7 +45,7 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
             if holds(result := validated(value)):
                 return result
         except ValidationError as error:
-            if error.errors()[0]["type"] == "expected":  # the message of an inner validator is better
+            if error.errors()[0]["type"] == "expected":  # keep an inner message
                 raise
         raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
 
@@ -102,12 +102,12 @@ class FileTable(BaseModel):
 
     alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
     needs: ClassVar[Mapping[str, str]] = {}  # for a key, the key that must be given with it
-    elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # name, keys not used there
+    elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # name, keys unused with it
 
     @model_validator(mode="wrap")
     @classmethod
     def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
-        """The table. Raises ValidationError with all mistakes: in values, keys and their relations."""
+        """The checked table. Raises ValidationError with all mistakes in values and in keys."""
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
         found: list[InitErrorDetails] = []

@@ -4,9 +4,9 @@ Each pixel is a rectangle of uniform pressure p on an elastic half-space. The co
 
     p >= 0,    g = K p - h >= 0,    p g = 0
 
-for each pixel, with the gap g, the overlap h of the undeformed bodies at the approach, and the
-compliance operator K of the half-space. Pixels with h <= 0 are open, as pressures only increase
-gaps.
+for each pixel. Here g is the gap, h the overlap of the undeformed bodies at the approach, and K the
+compliance operator of the half-space. Pixels with h <= 0 are open, because pressures can only
+increase gaps.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from convexrough.influence.convolution import SiteBox
 from convexrough.record import Along, Table
 from convexrough.surface.surface import Surface
 
-#: Largest number of steps of conjugate gradients, and accepted error of gaps over the overlap.
+#: Largest number of steps of conjugate gradients; accepted error of gaps over the largest overlap.
 STEPS, ACCURACY = 2000, 1e-4
 
 
@@ -39,17 +39,17 @@ HalfSpace = Callable[[Array], Array]
 def half_space(
     shape: tuple[int, int], pixel: tuple[float, float], contact_modulus: float
 ) -> HalfSpace:
-    """The operator of both bodies.
+    """The operator from pressures to the sum of the displacements of both bodies.
 
-    A pixel of unit pressure displaces a point by (1 / (pi E*)) times the integral over the pixel of
-    1/r, with the distance r from this point: the closed form of Love (1929).
+    A pixel of unit pressure displaces a point by (1 / (pi E*)) times the integral of 1/r over the
+    pixel, where r is the distance from this point. Love (1929) gives it in closed form.
     """
 
     def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
         sides = zip((i, j), pixel[::-1], strict=True)
         y, x = ((np.append(each, each[-1:] + 1) - 0.5) * size for each, size in sides)
         y = y[:, None]
-        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # its d2/dxdy is 1/r
+        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # d2/dxdy of this: 1/r
         return [np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)]
 
     box = SiteBox(shape, np.diag(pixel[::-1]))
@@ -62,10 +62,10 @@ def touch(
 ) -> Array:
     """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
-    The method of Polonsky and Keer (Wear 231, 1999) at a given approach: each step sets negative
-    pressures to 0 and adds pixels on which the bodies overlap; after an addition the directions
-    restart. It ends if |g| <= accuracy * max h where p > 0 and g >= -accuracy * max h where
-    p = 0 < h.
+    This is the method of Polonsky and Keer (Wear 231, 1999) at a given approach. Each step sets
+    negative pressures to 0 and adds pixels on which the bodies overlap. After an addition the
+    search directions restart. The method ends if |g| <= accuracy * max h on pixels with p > 0, and
+    g >= -accuracy * max h on pixels with p = 0 < h.
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
@@ -121,7 +121,7 @@ class Whole(Table):
     resolution: float
 
     def compared(self) -> list[tuple[str, float, float]]:
-        """Names of quantities, with the values of the asperities and of the whole map."""
+        """Rows of three: a quantity, its value for the asperities, its value for the whole map."""
         model = self.contact
         area = float((np.pi * model.contact_radii**2).sum())
         touching = int(np.count_nonzero(model.loads))
@@ -142,7 +142,8 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits; its approach and sphere (centred on the map) are used
+    contact : contact of the map's summits, whose approach and sphere are used; the sphere is centred
+        on the map
 
     Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
 
@@ -184,14 +185,14 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
 
 
 def _places(surface: Surface, every: int) -> tuple[Array, Array]:
-    """The coordinates x of columns and y of rows, every `every`-th of them."""
+    """[length] x of every `every`-th column, and y of every `every`-th row."""
     (rows, columns), (dx, dy) = surface.heights.shape, surface.pixel
     x, y = (np.arange(columns) - (columns - 1) / 2) * dx, (np.arange(rows) - (rows - 1) / 2) * dy
     return x[::every], y[::every]
 
 
 def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, float]:
-    """The pressures on every `every`-th pixel along each side, and the total load."""
+    """The pressures on pixels `every` times as wide, and the total load [force]."""
     x, y = _places(surface, every)
     overlap = contact.approach + surface.heights[::every, ::every]
     for radius, axes in contact.scene.curved:

@@ -13,7 +13,7 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and the relative size of the last one.
+#: Largest number of Gauss-Newton steps to the best sphere, and relative size of a last step.
 STEPS, ENOUGH = 50, 1e-12
 
 
@@ -25,7 +25,8 @@ class Removed:
     height, slopes : [length] height, and slopes along x and y, at the middle of the map
     curvature : [1/length] curvature of a sphere, positive for a hill; mean curvature of a
         paraboloid; 0 for a plane
-    curvatures : [1/length] of a paraboloid along its two axes, the larger first; else 0
+    curvatures : [1/length] curvatures of a paraboloid along its two axes, the larger first; zeros
+        for other forms
     """
 
     kind: Trend
@@ -40,7 +41,7 @@ class Removed:
         return 1.0 / self.curvature if self.curvature else float("inf")
 
     def scaled(self, scale: float) -> Removed:
-        """The same form with all lengths multiplied."""
+        """The same form with all lengths multiplied by `scale`."""
         first, second = self.curvatures
         return Removed(self.kind, self.height * scale, self.slopes, self.curvature / scale,
                        (first / scale, second / scale))  # fmt: skip
@@ -56,9 +57,9 @@ class Removed:
 
 
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
-    """The best least-squares form of this kind, and its height at each pixel.
+    """The form of this kind that fits best by least squares, and (ny, nx) its heights.
 
-    docs/theory/surfaces.md, "Removing the form". Lengths are divided by half the map's size.
+    docs/theory/surfaces.md, "Removing the form". The code divides lengths by half the map's size.
 
     Raises InputError if no sphere fits.
     """

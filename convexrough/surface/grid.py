@@ -26,7 +26,8 @@ OFF_GRID = 0.05
 class HeightGrid(NamedTuple):
     """The heights in a file, with nan for holes, and the pixel and units that the file states.
 
-    pixel : size along x and y, None if not stated;  unit, height_unit : "" if not stated
+    pixel : size along x and y; None if not stated
+    unit, height_unit : units of the pixel and of the heights; "" if not stated
     """
 
     heights: Array
@@ -65,13 +66,13 @@ def read_grid(path: Path) -> HeightGrid:
 
 
 def _refuse_numbers(path: Path, place: str, line: Array, second: Array) -> None:
-    """Raise InputError if `line` has coordinates or numbers of rows or columns, not heights."""
+    """Raise InputError if the row or column `line` holds coordinates or numbers, not heights."""
     if _even(line) and not _even(second):
         raise _not_heights(path, place, line.tolist())
 
 
 def _not_heights(path: Path, place: str, line: Sequence[Any]) -> InputError:
-    """The error for a row or column of coordinates or numbers beside the heights."""
+    """The error for a row or column `line` with coordinates or numbers in place of heights."""
     said = ", ".join(f"{each:g}" for each in line[:3])
     expected = (
         "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
@@ -89,7 +90,7 @@ def _even(line: Array) -> bool:
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix, with the size and units that comments state."""
+    """The matrix `heights`, with the pixel and the units that comments state."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
         said[found[1].lower().rstrip("s")] = found[2]
@@ -130,7 +131,7 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
 
 
 def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
-    """The number of the grid line of each value, and the spacing of the lines."""
+    """For coordinates in a list: the number of the grid line of each, and the lines' spacing."""
     levels = np.unique(values)
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:

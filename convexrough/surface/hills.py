@@ -1,6 +1,7 @@
-"""The hills of a map, with positions and prominences of the maxima.
+"""The hills of a map, with positions and prominences of their maxima.
 
-docs/theory/surfaces.md, "Pruning".
+docs/theory/surfaces.md, "Pruning", explains the method. The rank of a pixel is its place in the
+order of heights, from the lowest.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to half of its eight neighbours, so each pair is found once.
+#: Steps (row, column) from a pixel to four of its eight neighbours, so that each pair of
+#: neighbouring pixels is found once.
 PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
@@ -49,7 +51,10 @@ def hills(heights: Array) -> Hills:
 
 
 def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]:
-    """The maxima, the tallest first, and for each pixel the maximum that ascent leads to."""
+    """The maxima, the tallest first, and for each pixel the number of the maximum above it.
+
+    This is the maximum that steps to the highest neighbour lead to.
+    """
     highest = ndimage.maximum_filter(ranks, size=3, mode="nearest")
     above = order[highest.ravel()]
     while (further := above[above]).size and (further != above).any():
@@ -63,19 +68,20 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    A spanning tree of the graph of hills with the highest crossing of each pair (Kruskal) has them.
+    A crossing is a pair of neighbouring pixels of two hills. The passes are the edges of the
+    spanning tree with the highest crossings in the graph of hills (Kruskal).
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
     highest_first = np.lexsort((-rank, second, first))
     first, second, rank = first[highest_first], second[highest_first], rank[highest_first]
     new = np.append(True, (np.diff(first) != 0) | (np.diff(second) != 0))[: len(first)]
-    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, as 0 means no edge
+    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, because 0 means no edge
     graph = coo_array((weights, (first[new], second[new])), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
     passes = np.zeros(count, dtype=np.intp)
-    leader = list(range(count))  # leads to the tallest hill of each joined group
+    leader = list(range(count))  # for each hill, a taller one of its joined group, or itself
 
     def tallest(hill: int) -> int:
         while leader[hill] != hill:
@@ -95,7 +101,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """Neighbouring pixels of different hills: smaller and larger hill number, and lower rank."""
+    """For pairs of neighbouring pixels of two hills: smaller and larger hill, and lower rank."""
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]
     there = np.s_[down:, max(0, right) : columns - max(0, -right)]

@@ -8,17 +8,18 @@ from scipy.sparse.linalg import spsolve
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to its neighbours along the sides.
+#: Steps (row, column) from a pixel to the four neighbours with which it shares a side.
 SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
-#: In a map of numbers of holes: a pixel with a height, and a place outside of the map.
+#: Entries of a map in which holes are numbered: for a pixel with a height, and outside of the map.
 KNOWN, OUTSIDE = -1, -2
 
-#: Least distance of a spike from the median, over the standard deviation that quartiles suggest.
+#: Least distance of a spike's height from the median, divided by the standard deviation that the
+#: quartiles of the heights suggest.
 OUTLYING = 6.0
 
 
-#: Number of pixels in which frequent heights are looked for.
+#: About this many pixels are a sample, in which frequent heights are looked for.
 SAMPLE = 2**17
 
 
@@ -34,12 +35,12 @@ def spikes(heights: Array) -> Indices:
     alike = np.zeros(len(found), dtype=int)
     for step in np.ndindex(3, 3):
         apart = np.abs(padded[tuple((found + step).T)] - heights[tuple(found.T)])
-        alike += apart < away[tuple(found.T)] / 2  # also the pixel itself
+        alike += apart < away[tuple(found.T)] / 2  # this also counts the pixel itself
     return found[alike <= 2]
 
 
 def clipped(heights: Array) -> int:
-    """The number of pixels with the largest height if they are surprisingly many, else 0.
+    """The number of pixels with the largest height if these are surprisingly many, else 0.
 
     Many means at least ten, and more than all other pixels whose heights are at most 1 % of the
     range below the largest height, or equal the second largest height.
@@ -52,10 +53,10 @@ def clipped(heights: Array) -> int:
 
 
 def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height, below the largest; 0 if not surprising.
+    """The number of pixels with the most frequent height below the largest; 0 if not surprising.
 
-    It is surprising if it is 20 times as frequent in a sample as any other height, and occurs on at
-    least 20 pixels of the sample.
+    The number is surprising if the height is 20 times as frequent in a sample as any other height,
+    and occurs on at least 20 pixels of the sample.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)
@@ -67,9 +68,9 @@ def repeated(heights: Array) -> int:
 
 
 def copied(heights: Array) -> float:
-    """The share of rows that equal the row before, or of columns if it is larger.
+    """The share of rows that equal the row before, or that of columns if this is larger.
 
-    Rows and columns of equal heights do not count.
+    Rows and columns in which all heights are equal do not count.
     """
     return max(
         float(((lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)).mean())
@@ -80,7 +81,7 @@ def copied(heights: Array) -> float:
 
 
 def filled(heights: Array) -> Array:
-    """The map with each hole (nan) filled by the mean of its neighbours.
+    """The map with each hole (nan) filled, so that it is the mean of its neighbours.
 
     No filled pixel becomes a summit. At least one pixel must not be a hole.
     """

@@ -15,7 +15,7 @@ from convexrough.surface.grid import HeightGrid
 def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
     """The default channel of heights in a file that SurfaceTopography can read.
 
-    pixel : used if the file does not state its size
+    pixel : size of a pixel, for files that do not state the size of the map
 
     Raises FileError if SurfaceTopography cannot read the file or is not installed.
     """

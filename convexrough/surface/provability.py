@@ -1,8 +1,9 @@
 """The choice of the pruning: proofs of the contact, and errors of its model, against pruning.
 
-With weak pruning many summits are close to others. If the contacts of two summits overlap they are
-really one contact, which the model of point forces does not describe. Crowded summits also make
-the energy nonconvex, so that the solution cannot be proved.
+Pruning removes hills of small prominence. With weak pruning many summits are close to others. If
+the contacts of two summits overlap they are really one contact, which the model of point forces
+does not describe. Crowded summits also make the energy nonconvex, so that the solution cannot be
+proved.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from convexrough.surface.summits import Summits
 #: Default prunings, as fractions of the height Sz of the map.
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: Crowding above which contact discs overlap, and the largest trusted model error.
+#: Contact discs overlap if the crowding is above OVERLAP. TOO_FAR is the largest trusted model error.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
 #: A function that presses a sphere on asperities.
@@ -39,10 +40,10 @@ class Provability(Table, Plottable):
     """Contacts with increasing pruning. Arrays are (m,), with a value for each pruning.
 
     prune, heights : least prominence of a hill, as a fraction of Sz and as a [length]
-    summits, contacts, undecided : number of summits, of those that touch, and of undecided ones
+    summits, contacts, undecided : numbers of summits, of summits that touch, and of undecided ones
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found
-    approaches, loads : [length] and [force]
+    approaches, loads : [length] approach and [force] load of each contact
 
     >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
     >>> def press(asperities):
@@ -79,7 +80,7 @@ class Provability(Table, Plottable):
 
     @property
     def trusted_from(self) -> float:
-        """The smallest pruning such that this and all larger ones are trusted; nan if none is."""
+        """The smallest pruning from which on all prunings are trusted; nan if there is none."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
@@ -91,7 +92,7 @@ def provability(
     *,
     levels: Sequence[float] = LEVELS,
 ) -> Provability:
-    """Contacts of the remaining summits at each pruning, with their proofs and model errors.
+    """The contact of the remaining summits at each pruning, with its scope and model error.
 
     summits : summits found with a pruning of at most the smallest level, such as 0
     press   : function that returns the Contact of asperities
@@ -117,9 +118,11 @@ def provability(
 
 
 def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
-    """Pairs (m, 2) of asperities with a crowding above a value, and the crowdings (m,).
+    """(m, 2) the pairs of asperities with a crowding above a value, and (m,) their crowdings.
 
-    The crowding is (a_i + a_j) / r_ij, with contact radii a and distance r. The largest are first.
+    The crowding of a pair is (a_i + a_j) / r_ij, with contact radii a and the distance r. Pairs with
+    the largest crowding come first.
+
 
     >>> pairs, values = cr.surface.crowded(contact, above=0.5)
     >>> print(len(pairs), f"{values.max() / contact.crowding:.6g}")
@@ -143,10 +146,10 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
 def model_errors(contact: Contact) -> Array:
     """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
 
-    The Hertz pressure of a neighbour with contact radius a_j and load P_j displaces the surface by
-    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij) more than a point force does, at the distance r_ij.
-    The sum over neighbours is divided by the asperity's prescribed approach D0 + d_i (d_i: the
-    scene's `offsets`).
+    At the distance r_ij, the Hertz pressure of a neighbour with contact radius a_j and load P_j
+    displaces the surface by a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij) more than a point force.
+    The sum over neighbours is divided by the asperity's approach D0 + d_i, where D0 is the approach
+    of the contact and d_i an entry of the scene's `offsets`.
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

@@ -21,20 +21,21 @@ from convexrough.tabular.units import one_unit
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
-#: Names of the heights in an .npz with several arrays.
+#: Names that the array of heights may have in an .npz file with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
-#: Rms slopes outside this range suggest different units of heights and pixels.
+#: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
 
-#: MARKS, numbers of at least the size HUGE, and the largest and smallest number mark holes if they
-#: differ from the median of the other heights by more than FAR times the range of these.
+#: Possible marks of holes are MARKS, numbers of at least the size HUGE, and the largest and smallest
+#: number. They mark holes if they differ from the median of the other heights by more than FAR times
+#: the range of these.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
-#: Relative difference up to which two pixel sizes count as equal.
+#: Two pixel sizes count as equal up to this relative difference.
 SAME = 1e-6
 
-#: The same for the steps of x and y, which may be rounded.
+#: Steps of x and y, which may be rounded, count as equal up to this relative difference.
 ROUNDED = 1e-3
 
 
@@ -172,7 +173,7 @@ def _arrays(path: Path) -> HeightGrid:
 
 
 def _placed(path: Path, heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """Heights in the order of x and y, and the pixel; x and y are two vectors or two matrices."""
+    """Heights sorted by x and y, which are two vectors or two matrices, and the pixel (dx, dy)."""
     vectors = x.ndim == y.ndim == 1
     shape = (len(y), len(x)) if vectors else x.shape
     if heights.shape != shape or not (vectors or y.shape == shape):

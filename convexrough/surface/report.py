@@ -29,17 +29,18 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: Units of columns, from the unit of length.
+#: The unit of each column with a unit; {} stands for the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
 
-#: Largest number of crowded pairs that are printed one by one.
+#: At most this many crowded pairs of summits are printed.
 MOST_LISTED = 10
 
-#: Fraction of a map's half width beyond which contact causes a warning.
+#: A contact farther from the middle than this fraction of the map's half width causes a warning.
 NEAR_EDGE = 0.9
 
-#: Largest relative difference of a statistic from its value by moments that causes no warning.
+#: A statistic of the summits causes a warning if it differs more than this, relative to its value
+#: for a Gaussian surface with the same moments.
 UNLIKE = 0.2
 
 
@@ -47,8 +48,9 @@ UNLIKE = 0.2
 class Scanned:
     """A surface, all summits, those left by pruning, and the result of pressing these.
 
-    curve, contact : None if nothing was pressed; `contact` is None also if no solution was found
-    whole : the whole map by boundary elements, or None
+    curve   : contacts against pruning; None if nothing was pressed
+    contact : contact of `summits`; None if nothing was pressed or no solution was found
+    whole   : the contact of the whole map by boundary elements, or None
     """
 
     surface: Surface
@@ -62,7 +64,7 @@ class Scanned:
     def of(
         cls, surface: Surface, prune: float, fit: int, press: Press | None, *, whole: bool = False
     ) -> Scanned:
-        """The summits of a surface, pressed by `press` if given, and the whole map if `whole`."""
+        """The summits of a surface; `press` presses them, and `whole` asks for the whole map."""
         LOGGER.info("finding summits")
         maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
         if press is None:
@@ -77,12 +79,12 @@ class Scanned:
 
     @property
     def certified(self) -> bool:
-        """True if nothing was pressed, or if the contact is proved."""
+        """True if nothing was pressed, or if the contact is certified."""
         return self.curve is None or (self.contact is not None and self.contact.certificate.holds)
 
 
 def surface_summary(scanned: Scanned) -> dict[str, Any]:
-    """The contents of `--json`, in the unit of the map."""
+    """The contents of the output of `--json`, with lengths in the unit of the map."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     moments, statistics = surface.moments, scanned.maxima.statistics
     summary: dict[str, Any] = {
@@ -127,7 +129,7 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
-    """The columns of summits.csv, with units in its header; a scene file can read them."""
+    """The columns of summits.csv, named with their units, which a scene file can read."""
     unit, columns = summits.origin.unit, summits.columns(*Summits._along["asperity",])
     named = {
         f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
@@ -137,12 +139,12 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def curve_columns(curve: Provability) -> dict[str, NDArray[Any]]:
-    """The columns of contacts against pruning, with a row for each pruning."""
+    """The columns of `Provability`, with a row for each pruning."""
     return curve.columns(*Provability._along["level",])
 
 
 def describe_surface(scanned: Scanned) -> list[str]:
-    """The printed lines."""
+    """The printed report of `summits`, in aligned lines."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     unit = f" {surface.unit}" if surface.unit else ""
     rows, columns = origin.shape

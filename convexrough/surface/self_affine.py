@@ -13,14 +13,14 @@ from convexrough.scene.patterns import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
-#: Default length of the shortest wave in pixels, which resolves tips.
+#: Default length of the shortest wave, in pixels; at this length pixels resolve tips.
 RESOLVED = 8.0
 
 
 class Waves(NamedTuple):
     """The waves of a periodic map, one for each pair of opposite wave vectors.
 
-    numbers   : (n, 2) numbers of waves across the map, along x and y
+    numbers   : (n, 2) numbers of wavelengths across the map, along x and y
     vectors   : (n, 2) [1/length] wave vectors, 2 pi times the numbers over the map's size
     variances : (n,) [length^2] variance of each wave
     """
@@ -46,7 +46,7 @@ def self_affine(
     hurst     : Hurst exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst)) with the wave
         number q
     rms_slope : root mean square of the slope |grad z|
-    rolloff   : [length] wavelength; the spectrum of longer waves is constant
+    rolloff   : [length] wavelength above which the spectrum is constant
     seed      : seed of the random phases. Amplitudes are not random: all maps have equal moments
     pixels    : number of pixels per side;  pixel : [length] size of a pixel
     cutoff    : [length] shortest wave; default 8 pixels
@@ -63,7 +63,7 @@ def self_affine(
     phases = np.random.default_rng(checked_seed(seed)).uniform(0.0, 2 * np.pi, len(waves.variances))
     spectrum = np.zeros((pixels, pixels), dtype=np.complex128)
     column, row = waves.numbers.T
-    amplitudes = np.sqrt(2 * waves.variances)  # of cosines
+    amplitudes = np.sqrt(2 * waves.variances)  # a cosine of amplitude a has the variance a^2 / 2
     spectrum[row, column] = amplitudes * np.exp(1j * phases)
     heights = np.fft.ifft2(spectrum).real * pixels**2
     made = f"self-affine: hurst {hurst:g}, rms slope {rms_slope:g}, roll-off {rolloff:g}"

@@ -24,7 +24,8 @@ from convexrough.surface.tips import elliptic_load, fit_tips
 class Origin(Record):
     """The map that contains the summits, and the settings and counts of the search.
 
-    source, shape, pixel, unit, removed, filled : as in `Surface`; shape is that of the heights
+    source, pixel, unit, removed, filled : as in `Surface`
+    shape      : (ny, nx) numbers of pixels
     level      : [length] mean height of the map;  max_height : [length] Sz of the map
     moments    : spectral moments of the map
     prune      : least prominence of a hill, as a fraction of Sz
@@ -56,7 +57,7 @@ class Origin(Record):
 
     @property
     def threshold(self) -> float:
-        """[length] The least prominence of a hill."""
+        """[length] the least prominence of a hill that is not merged into a taller one."""
         return self.prune * self.max_height
 
     @property
@@ -134,17 +135,17 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def eccentricities(self) -> Array:
-        """(n,) sqrt(1 - k2 / k1): 0 for a sphere, towards 1 for a ridge."""
+        """(n,) sqrt(1 - k2 / k1), which is 0 for a sphere and nearly 1 for a ridge."""
         return frozen(np.sqrt(1 - self.smallest_curvatures / self.largest_curvatures))
 
     @property
     def elliptic_loads(self) -> Array:
-        """(n,) load of the elliptic tip divided by that of its sphere at the same indentation."""
+        """(n,) load of the elliptic tip over the load of its sphere at the same indentation."""
         return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
 
     @property
     def statistics(self) -> Statistics:
-        """The density, curvature and heights of the summits, to compare with `origin.moments`."""
+        """Statistics of the summits, which can be compared with those of `origin.moments`."""
         return Statistics(
             density=len(self) / self.origin.area,
             mean_curvature=float(np.mean(self.largest_curvatures + self.smallest_curvatures) / 2),

@@ -24,20 +24,22 @@ from convexrough.tabular.units import known_unit
 #: Largest ratio of the sides of a pixel; longer ones do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: Part of the variance above which a trend causes a warning, and fitted pixels along a side.
+#: A trend causes a warning if it explains more than the part MOST of the variance; for this it is
+#: fitted to at most FITTED pixels along a side.
 MOST, FITTED = 0.5, 256
 
-#: Difference of the two curvatures of a paraboloid, over their mean, below which it is round.
+#: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
 ROUND = 0.1
 
-#: Smallest and largest rms slope without a warning. Lapped steel has about 1e-2, polished wafers
+#: Smallest and largest rms slopes that cause no warning. Lapped steel has about 1e-2, polished wafers
 #: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
-#: Share of rows that equal the one before which causes a warning. At 1 the map is a profile.
+#: Largest share of rows equal to the row before that causes no warning. At 1 the map is a profile.
 MANY_COPIED = 0.25
 
-#: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
+#: After subtraction of a trend, heights below this part of the largest height before are rounding
+#: errors.
 ROUNDING = 64 * np.finfo(float).eps
 
 
@@ -54,8 +56,8 @@ class Surface(Record, Plottable):
         by default determined from `heights`
     repeated : number of pixels with the most frequent height below the largest, if these are
         surprisingly many, else 0; by default determined from `heights`
-    copied  : share of rows that equal the row before, or of columns if it is larger; by default
-        determined from `heights`
+    copied  : share of rows that equal the row before, or that of columns if this is larger; by
+        default determined from `heights`
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, and for pixels with one side more
@@ -153,7 +155,7 @@ class Surface(Record, Plottable):
             except InputError:  # no sphere spans the map
                 continue
             if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
-                continue  # a sphere is simpler
+                continue  # a sphere, which is simpler, was tried already
             if (least := float(np.var(few - there))) < (1.0 - MOST) * left:
                 name = f"a {trend!r}".partition(" in the")[0]
                 part = f"{100 * (1.0 - least / np.var(few)):.3g} %"
@@ -196,7 +198,7 @@ class Surface(Record, Plottable):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes this.
+        """The surface minus its best-fitting plane, sphere or paraboloid, which `removed` describes.
 
         Raises InputError if nothing is left.
 
@@ -270,7 +272,7 @@ class Surface(Record, Plottable):
 
 
 def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
-    """The sizes (dx, dy) of a pixel, checked."""
+    """The sizes (dx, dy) of a pixel. Raises InputError if they are not valid."""
     both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
     if len(both) != 2:
         raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")

@@ -19,7 +19,8 @@ class Tips(NamedTuple):
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first
     deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
-    whole      : (n,) True if curved downwards in every direction, with the top among the pixels
+    whole      : (n,) True if the paraboloid curves downwards in every direction and its top is
+        within the fitted pixels
     """
 
     offsets: Array
@@ -37,7 +38,7 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so all are about 1
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
     terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
     around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
     z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
@@ -63,9 +64,9 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
 
 
 def elliptic_load(ratio: Array) -> Array:
-    """(n,) load of an elliptic tip over that of the sphere of radius 1 / sqrt(k1 k2).
+    """(n,) load of an elliptic tip over the load of the sphere of radius 1 / sqrt(k1 k2).
 
-    Both are Hertz contacts on a flat with the same indentation: docs/theory/surfaces.md, "Tips",
+    The two are Hertz contacts on a flat with the same indentation: docs/theory/surfaces.md, "Tips",
     and Johnson (1985), eqs 4.26 to 4.28.
 
     ratio : (n,) k1 / k2, at least 1

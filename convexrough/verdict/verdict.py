@@ -100,7 +100,7 @@ class Verdict(Claim, Table, Plottable):
         return frozen(self.certificate.load_errors + ignored)
 
     def nearby(self) -> tuple[Array, Array] | None:
-        """(n,), (n,) [force] loads of `solution` and their error bounds; None without a solution."""
+        """(n,), (n,) [force] the loads of `solution` and their error bounds; None without one."""
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
