@@ -29,10 +29,8 @@ def shells(influence: Influence) -> Array:
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     """(n,) 1 / (pi E* s_i), where the shell radii s_i are adapted to contact radii a_i that differ.
 
-    Let c be the largest (a_i + a_j) / r_ij, and d_i the distance to the nearest neighbour. Then
-    s_i = share a_i / c + (1 - share) d_i / 2: docs/theory/certificate.md, "Which box", 3.
-
-    radii : (n,) [length] the contact radii a_i
+    With a_i = `radii` [length], the largest (a_i + a_j) / r_ij as c, and d_i the distance to the
+    next neighbour, s_i = share a_i / c + (1 - share) d_i / 2: certificate.md, "Which box", 3.
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

@@ -9,8 +9,7 @@ from convexrough.proof import Proof
 from convexrough.run.stage import Result, limit
 from convexrough.run.stages.cycle import CycleResult
 
-#: Shear forces of at least this fraction of the friction limit are left out of the proof: at the
-#: limit all asperities slide.
+#: The proof leaves out shear forces of at least this fraction of the limit, where all slide.
 BELOW_LIMIT = 1 - 1e-9
 
 

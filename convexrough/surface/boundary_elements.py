@@ -142,8 +142,7 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits, whose approach and sphere are used; the sphere is centred
-        on the map
+    contact : contact of the map's summits; its approach, and its sphere centred on the map, are used
 
     Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
 

@@ -1,7 +1,6 @@
 """The hills of a map, with positions and prominences of their maxima.
 
-docs/theory/surfaces.md, "Pruning", explains the method. The rank of a pixel is its place in the
-order of heights, from the lowest.
+docs/theory/surfaces.md, "Pruning". The rank of a pixel is its place in ascending order of heights.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to four of its eight neighbours, so that each pair of
-#: neighbouring pixels is found once.
+#: Steps (row, column) from a pixel to four of its eight neighbours, so that no pair is found twice.
 PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
@@ -51,10 +49,9 @@ def hills(heights: Array) -> Hills:
 
 
 def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]:
-    """The maxima, the tallest first, and for each pixel the number of the maximum above it.
+    """The maxima, the tallest first; and for each pixel the number of the one above it.
 
-    This is the maximum that steps to the highest neighbour lead to.
-    """
+    Steps to the highest neighbour lead from the pixel to this maximum."""
     highest = ndimage.maximum_filter(ranks, size=3, mode="nearest")
     above = order[highest.ravel()]
     while (further := above[above]).size and (further != above).any():
@@ -68,8 +65,7 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    A crossing is a pair of neighbouring pixels of two hills. The passes are the edges of the
-    spanning tree with the highest crossings in the graph of hills (Kruskal).
+    They are edges of the spanning tree (Kruskal) with the highest crossings between hills.
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))

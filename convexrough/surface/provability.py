@@ -28,7 +28,7 @@ from convexrough.surface.summits import Summits
 #: Default prunings, as fractions of the height Sz of the map.
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: Contact discs overlap if the crowding is above OVERLAP. TOO_FAR is the largest trusted model error.
+#: OVERLAP: crowding above which contact discs overlap. TOO_FAR: largest trusted model error.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
 #: A function that presses a sphere on asperities.
@@ -120,8 +120,8 @@ def provability(
 def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     """(m, 2) the pairs of asperities with a crowding above a value, and (m,) their crowdings.
 
-    The crowding of a pair is (a_i + a_j) / r_ij, with contact radii a and the distance r. Pairs with
-    the largest crowding come first.
+    The crowding of a pair is (a_i + a_j) / r_ij, with contact radii a and the distance r. The most
+    crowded pairs are first.
 
 
     >>> pairs, values = cr.surface.crowded(contact, above=0.5)

@@ -27,9 +27,9 @@ HEIGHTS = ("heights", "height", "z")
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
 
-#: Possible marks of holes are MARKS, numbers of at least the size HUGE, and the largest and smallest
-#: number. They mark holes if they differ from the median of the other heights by more than FAR times
-#: the range of these.
+#: Possible marks of holes are MARKS, numbers of at least the size HUGE, and the largest and the
+#: smallest number. They mark holes if they differ from the median of the other heights by more than
+#: FAR times the range of the other heights.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Two pixel sizes count as equal up to this relative difference.

@@ -62,7 +62,7 @@ class Origin(Record):
 
     @property
     def area(self) -> float:
-        """[length^2] area of the map without its margin, in which no paraboloid can be fitted."""
+        """[length^2] area of the map without the margin in which no paraboloid can be fitted."""
         rows, columns = self.shape
         margin = 2 * (self.fit // 2)
         return (rows - margin) * self.pixel[1] * (columns - margin) * self.pixel[0]

@@ -31,15 +31,14 @@ MOST, FITTED = 0.5, 256
 #: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
 ROUND = 0.1
 
-#: Smallest and largest rms slopes that cause no warning. Lapped steel has about 1e-2, polished wafers
-#: have 1e-3 to 1e-4.
+#: Smallest and largest rms slopes that cause no warning. Lapped steel has about 1e-2, polished
+#: wafers have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
 #: Largest share of rows equal to the row before that causes no warning. At 1 the map is a profile.
 MANY_COPIED = 0.25
 
-#: After subtraction of a trend, heights below this part of the largest height before are rounding
-#: errors.
+#: Differences of heights below this part of the largest height are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
 
 
@@ -198,7 +197,7 @@ class Surface(Record, Plottable):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """The surface minus its best-fitting plane, sphere or paraboloid, which `removed` describes.
+        """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes it.
 
         Raises InputError if nothing is left.
 

@@ -1,4 +1,4 @@
-"""Batches: consecutive scenes that a worker computes together, and their rows of the table."""
+"""Batches: consecutive scenes that one worker computes, and their rows of the sweep's table."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 
-#: Versions of the packages that decide the last bits of rows.
+#: Versions of the packages on which the last bits of rows depend.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
 Columns = dict[str, NDArray[Any]]
 
-#: Status, message, and measured numbers.
+#: A row of the table: status, message, and measured numbers.
 Row = tuple[str, str, list[float]]
 
 
@@ -46,14 +46,14 @@ class BatchRows(NamedTuple):
 
 
 def different(versions: Mapping[str, str]) -> str:
-    """The versions that differ from those of this process, as text; "" if none."""
+    """The versions that differ from those of this process, as text; "" if none differs."""
     said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
             if versions.get(name) != here)  # fmt: skip
     return ", ".join(said)
 
 
 def compute(batch: Batch) -> BatchRows:
-    """The rows of a batch, each from its scene alone; the row of a failed scene has the error."""
+    """The rows of a batch. A row depends on its scene alone; that of a failed scene has the error."""
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
         for number in batch.numbers:
@@ -68,14 +68,14 @@ def compute(batch: Batch) -> BatchRows:
 
 
 def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Row:
-    """The row of one scene; `known` has its numbers if it was measured together with others."""
+    """The row of one scene; `known` has its numbers if the scene was computed with others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
         return _failed(error, columns)
-    except KeyError as error:  # a swept list may be shorter than the first
+    except KeyError as error:  # the first scene had the number: its list was longer, perhaps
         return "failed", f"the results have no {error}", [np.nan] * len(columns)
     said = "; ".join(filter(None, (unsure, warned)))
     return ("undecided" if unsure else "certified"), said, values
@@ -87,7 +87,7 @@ def _failed(error: Exception, columns: tuple[Column, ...]) -> Row:
 
 
 def table(batch: Batch, rows: list[Row]) -> Columns:
-    """The columns of the rows of a batch."""
+    """The columns of the table, by name, from the rows of a batch."""
     values = np.array([values for _, _, values in rows], dtype=np.float64)
     values = values.reshape(len(rows), len(batch.columns))
     found: Columns = {"scene": np.array(batch.numbers, dtype=np.int64)}

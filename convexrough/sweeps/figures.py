@@ -14,10 +14,11 @@ from convexrough.plots.notebook import Figure
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
-#: Quantiles that bound the two bands, and that of the line.
+#: Quantiles: the ends of the two bands, and in the middle that of the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Largest number of combinations of other swept keys that have their own bands; more are merged.
+#: Combinations of other swept keys have bands of their own if there are at most this many;
+#: otherwise all rows share one pair of bands.
 MOST_BANDS = 4
 
 #: Number of bins for random keys, which have many values.
@@ -30,7 +31,7 @@ LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f",
 def draw_quantiles(
     columns: Columns, measured: str, over: str, others: Sequence[str], axes: Axes | None = None
 ) -> Axes:
-    """Axes with the median and bands from 5 to 95 % and 25 to 75 %, of all rows that did not fail.
+    """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail.
 
     columns : the columns `measured` and `over`, `status`, and the `others`
     others  : other swept keys that are not random; each combination of their values has bands of
@@ -82,7 +83,7 @@ def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, st
 
 
 def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
-    """The values x with all y at each; for many x, the median of each bin with all y in it."""
+    """The values of x, and all y at each; if x has many values, the medians of bins instead."""
     different, back = np.unique(x, return_inverse=True)
     if len(different) <= max(BINS, len(y) // 4):
         return different, [y[back == i] for i in range(len(different))]

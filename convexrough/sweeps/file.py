@@ -18,7 +18,7 @@ from convexrough.sweeps.grid import Axis, Draw, Grid, Law
 from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.scenes import Tables
 
-#: Tables that cannot be swept: their fractions name columns, so they are the same in every scene.
+#: Tables whose keys cannot be swept, because columns are named after the fractions in them.
 FIXED = ("shear", "cycle", "history")
 
 WHERE = ("together", "over", "draw")
@@ -73,7 +73,7 @@ class Keys(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: keys that cannot be swept or are swept twice, and lists of unequal lengths."""
+        """Mistakes: keys that cannot be swept, or are swept twice, and unequal lengths of lists."""
         yield from super().mistakes_between(keys)
         if "measure" not in keys:
             yield "measure", f"missing, expected {_NAMES}"
@@ -108,9 +108,9 @@ class Keys(FileTable):
 
 
 def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file, checked.
+    """The plan of a sweep file, whose contents are checked.
 
-    measure : replaces the list in the file
+    measure : names of numbers, which replace the list in the file
 
     Raises FileError if the file cannot be read or is not TOML; SceneFileError with every mistake.
     """
@@ -162,7 +162,7 @@ def _swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterable[str]:
-    """The mistake of seeds if nothing is random, so that all scenes would be the same."""
+    """A mistake if there are seeds but nothing is random, so that scenes would be the same."""
     given = {*_dict(tables.get("asperities"))}
     given |= {key.removeprefix("asperities.") for _, key in _swept(table)}
     rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
@@ -174,7 +174,7 @@ def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iter
 
 
 def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
-    """The tables of the first scene, and the mistakes in all swept values."""
+    """The checked tables of the first scene, or None; and the mistakes in all swept values."""
     first = grid.point(0)
     study, mistakes = validate(grid.with_values(*first))
     for where, axes in (("together", grid.together), ("over", grid.over)):

@@ -34,7 +34,7 @@ class Folder:
         return range(first, min(first + self.manifest["batch"], self.manifest["scenes"]))
 
     def parts(self) -> list[range]:
-        """The scenes of each part in the folder, in order; other files are ignored."""
+        """The range of scenes of each part in the folder, in order; other files are ignored."""
         with file_errors(self.path / PARTS, "be read"):
             names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
         return [self.scenes(int(name)) for name in sorted(names, key=int) if name.isdecimal()]
@@ -43,7 +43,7 @@ class Folder:
         return self.path / PARTS / f"{part.start:012d}.parquet"
 
     def write(self, columns: Columns) -> None:
-        """Write a part; an interruption leaves no incomplete part."""
+        """Write the columns of a part. An interruption leaves no incomplete part."""
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
@@ -77,9 +77,9 @@ class Folder:
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """The parts to compute, and a message about parts found. Damaged parts are removed.
+        """The parts of `wanted` to compute, and a message about the others, which exist already.
 
-        Raises FileError if parts exist and `resume` is false.
+        Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
         """
         known, damaged = {part.start for part in self.parts()}, 0
         there = [part for part in wanted if part.start in known]
@@ -138,13 +138,13 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
             path.mkdir(parents=True, exist_ok=True)
-            # Another process may write a manifest meanwhile, of the same sweep or another.
+            # Meanwhile another process may write the manifest of this sweep or of another one.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
         if not (path / MANIFEST).exists():
-            if orphans:  # a manifest is written before parts
+            if orphans:  # parts without a manifest, which is always written before parts
                 raise FileError(
                     f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they are: "
                     f"restore it or remove {path / PARTS}; --out takes another folder"

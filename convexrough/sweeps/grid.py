@@ -37,7 +37,7 @@ class Draw(NamedTuple):
     second: float
 
     def value(self, seed: int) -> float:
-        """The value for a seed, independent of other random keys."""
+        """The random value for a seed, which is independent of the values of other keys."""
         random = np.random.default_rng([seed, zlib.crc32(self.key.encode())])
         if self.law == "uniform":
             return float(random.uniform(self.first, self.second))
@@ -49,7 +49,7 @@ class Draw(NamedTuple):
 
 
 class Point(NamedTuple):
-    """The values of one scene by key, and the seed or None."""
+    """The values of the swept keys in one scene, by key; and its seed, or None."""
 
     values: dict[str, Any]
     seed: int | None
@@ -57,7 +57,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Grid:
-    """The points of a sweep.
+    """The points of a sweep: the values of the swept keys in each scene.
 
     tables : tables of the scene file, without swept keys
     together : keys with lists of the same length, whose k-th values belong together
@@ -78,7 +78,7 @@ class Grid:
         return (*(key for key, _ in (*self.together, *self.over)), *(it.key for it in self.draws))
 
     def is_number(self, key: str) -> bool:
-        """True if every value of a key is one number."""
+        """True if every listed value of a key is a single number."""
         axes = dict((*self.together, *self.over))
         return all(isinstance(value, (int, float)) for value in axes.get(key, ()))
 

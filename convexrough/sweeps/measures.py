@@ -1,8 +1,8 @@
 """The numbers that a sweep can measure: names in the summary of a run, or their last parts.
 
 `cycle.loss` is the loss of each cycle. `loss` means the same if no earlier stage has a `loss`. A
-column is named after the number and the row: `loss_0.37` is the loss of the cycle between
-+-0.37 f P, with the friction limit f P; `history.loss_2` is the loss at a history's third force.
+column is named after the number and its row: `loss_0.37` is the loss of the cycle between
++-0.37 f P, where f P is the friction limit; `history.loss_2` is that at a history's third force.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from convexrough.tabular.units import UnitNames
 
 Stages = Mapping[str, Stage]
 
-#: Numbers by name and row.
+#: Numbers in a summary, by their name and the label of their row.
 Numbers = dict[tuple[str, str], float]
 
-#: Quantiles of the shear forces at which the loaded asperities start to slide, over f P.
+#: The number ONSET has these QUANTILES of the shear forces at which loaded asperities start to
+#: slide, divided by f P.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
-#: Errors of one scene that do not affect the others.
+#: Errors that mean that one scene failed; the others are still computed.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Keys of a scene file that are lengths.
@@ -48,7 +49,11 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """Numbers of a scene; why they are not certified, or ""; where the model may fail, or ""."""
+    """The numbers of a scene.
+
+    doubts   : why they are not certified, or ""
+    cautions : why the model may not apply to the scene, or ""
+    """
 
     numbers: Numbers
     doubts: str
@@ -90,15 +95,15 @@ def _numbers(
 
 
 def row_label(ends: Sequence[float]) -> str:
-    """The label of a row: a force, or both ends of a cycle; only the maximum if it is symmetric."""
+    """The label of a row: a force, or both ends of a cycle, or the maximum of a symmetric cycle."""
     *first, last = ends
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
-    """The columns for each name in `measures`; a name stands for the first number that has it.
+    """The columns for each name in `measures`, which stands for the first number of that name.
 
-    Raises InputError if there is no such number. Stages after the last needed one are not computed.
+    Raises InputError if no number has the name. Stages after the last needed one are not computed.
     """
     rows: dict[str, list[str]] = {}
 

@@ -15,11 +15,11 @@ from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Largest number of scenes, and about the largest of asperities, in a batch; least number of
-#: batches, if the scenes are enough.
+#: Largest number of scenes in a batch; about the largest number of asperities in one; and least
+#: number of batches, if there are enough scenes.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
-#: Largest number of scenes that are computed to find out which numbers can be measured.
+#: At most this many scenes are computed in order to find out which numbers can be measured.
 TRIED = 5
 
 
@@ -27,7 +27,8 @@ TRIED = 5
 class Plan:
     """The computation of a sweep.
 
-    size     : scenes per batch and part;  manifest : the contents of manifest.json
+    size     : number of scenes in a batch, which becomes a part of the table
+    manifest : the contents of manifest.json
     """
 
     source: Source
@@ -55,10 +56,12 @@ def planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for scenes; the first scene shows which numbers exist and how large batches may be.
+    """The plan for the scenes of `source`.
 
-    said  : entries of the manifest on the origin of the sweep
-    given : all input on which the numbers depend, except measures and version
+    The first scene without an error shows which numbers exist, and how large batches may be.
+
+    said  : entries of the manifest that describe the origin of the sweep
+    given : all input on which the numbers depend, except `measures` and the version
 
     Raises InputError for an unknown measure, and the error of the first five scenes if all fail.
     """
@@ -85,7 +88,7 @@ def planned(
     manifest = {
         "schema": 2,
         "version": __version__,
-        "sweep": hashlib.sha256(text.encode()).hexdigest(),  # all on which the numbers depend
+        "sweep": hashlib.sha256(text.encode()).hexdigest(),  # of all that numbers depend on
         "scenes": source.count,
         "each": 1 if grid is None else grid.each,  # scenes that differ only in the seed
         "batch": size,

@@ -27,10 +27,10 @@ from convexrough.errors import ExtraError, InputError, WorkerError
 from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
 from convexrough.threads import cores
 
-#: Number of batches submitted at once to an executor, and per local process.
+#: Largest number of batches that wait in an executor; and for local processes, that of each process.
 AT_ONCE, EACH = 1000, 2
 
-#: Number of lost batches after which the sweep ends.
+#: The sweep ends after this many lost batches, which are batches whose worker died.
 MOST_LOST = 64
 
 
@@ -52,7 +52,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
 def _together(
     batches: Iterator[Batch], executor: Executor
 ) -> Generator[Columns, None, list[Batch]]:
-    """Yield the rows of batches, in any order; return the batches whose workers died."""
+    """Yield the rows of batches in any order, and return the batches whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[BatchRows], Batch] = {}
     lost: list[Batch] = []
@@ -89,7 +89,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 
 class Processes(Executor):
-    """Processes on this machine, each a new interpreter; those that die are replaced."""
+    """Processes on this machine, each with a new interpreter; after one dies, all are replaced."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()
@@ -117,7 +117,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """End this process when its parent, which has the other end of the pipe, ends."""
+    """End this process when its parent ends, which holds the other end of the pipe."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -156,7 +156,7 @@ def dask(address: str) -> Iterator[Executor]:
         from distributed import Client
     except ImportError as error:
         raise ExtraError("dask") from error
-    own = partial(Client, set_as_default=False)  # one that fails would stay the user's default
+    own = partial(Client, set_as_default=False)  # a failing client would stay the user's default
     try:
         if address == "local":
             client = own(n_workers=cores(), threads_per_worker=1, dashboard_address=None)

@@ -20,12 +20,13 @@ from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: Printed quantiles, and the largest numbers of printed rows, of printed failures and of figures.
+#: The quantiles that are printed; and the largest numbers of rows and failures that are printed, and
+#: of figures that are drawn.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, done: Done | None = None) -> Summary:
-    """The contents of `--json`: the state of the table, and what this call computed."""
+    """The contents of the output of `--json`: the state of the table, and what this call did."""
     said: Summary = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
@@ -40,7 +41,7 @@ def summarise(table: SweepTable, done: Done | None = None) -> Summary:
 
 
 def describe(summary: Summary) -> list[str]:
-    """The printed lines of a summary."""
+    """The printed report of a sweep, from its summary."""
     it = summary["sweep"]
     lines = [("scenes", f"{it['scenes']:,}"), ("rows", f"{it['rows']:,}")]
     lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
@@ -55,7 +56,7 @@ def describe(summary: Summary) -> list[str]:
 
 
 def describe_quantiles(found: Columns) -> list[str]:
-    """The printed table of the first quantiles."""
+    """The printed table of quantiles, with its first `MOST_ROWS` rows."""
     heads = [f"{float(name):.0%}" if name[0] in "01" else name for name in found]
     rows = [list(row.values()) for row in rows_of(found)]
     lines = aligned([heads, *rows[:MOST_ROWS]], left=heads.index("quantity") + 1)
@@ -65,12 +66,12 @@ def describe_quantiles(found: Columns) -> list[str]:
 
 
 def failures(table: SweepTable) -> list[str]:
-    """The messages of the first scenes that failed."""
+    """The messages of the first `MOST_NAMED` scenes that failed."""
     return list(islice(_messages(table, "failed"), MOST_NAMED))
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """A warning with the number of certified scenes that have a message; [] without any."""
+    """A warning with the number of certified scenes that have a message; [] if there are none."""
     said = _messages(table, "certified")
     first, count = next(said, ""), 1 + sum(1 for _ in said)
     warned = f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
@@ -87,7 +88,7 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
 def write_summary(
     folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
 ) -> list[Path]:
-    """The files written: quantiles.csv, and figures of measured quantities over swept keys."""
+    """Write quantiles.csv, and figures of measured numbers over swept keys; return the paths."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
     with results_folder(folder, force=overwrite) as new:
         figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}

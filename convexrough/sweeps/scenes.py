@@ -22,7 +22,7 @@ from convexrough.sweeps.measures import Stages
 if TYPE_CHECKING:
     from convexrough.run.study import Study
 
-#: Number of layouts of asperities in the cache.
+#: Number of layouts (exact positions) of asperities that the cache keeps.
 KEPT = 8
 
 
@@ -35,7 +35,7 @@ NO_SEED = -1
 
 @dataclass(frozen=True)
 class Tables:
-    """Scenes of a grid over the keys of a scene file; `path` is for messages and relative paths."""
+    """Scenes of a grid over keys of a scene file at `path`, to which other paths are relative."""
 
     grid: Grid
     path: Path
@@ -63,7 +63,7 @@ class Tables:
         return self
 
     def opened(self) -> Ask:
-        """A function that makes scenes by number; consecutive scenes share common data."""
+        """A function that makes the scene of a number; consecutive scenes share common data."""
         layouts = Layouts(*map(lru_cache(KEPT), READ))
         last: dict[str, Any] = {}
 
@@ -73,7 +73,7 @@ class Tables:
         return ask
 
     def _study(self, number: int, last: dict[str, Any]) -> Study:
-        """The tables of a scene; those of scenes that differ only in the seed are checked once."""
+        """The checked tables of a scene. Scenes that differ only in the seed are checked once."""
         from convexrough.run.study import LatticeTable, validate
 
         point = self.grid.point(number)

@@ -1,4 +1,4 @@
-"""`sweep`: computes many scenes, with local processes or any executor, and returns a table."""
+"""`sweep`: compute many scenes in local processes or with any executor, and return a table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
 from convexrough.tabular.units import UnitNames
 
-#: A sweep file, the tables of one, or scenes.
+#: What `sweep` computes: a sweep file, the tables of one, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
 #: Largest number of scenes that one call computes; larger sweeps are computed in parts.
@@ -102,7 +102,11 @@ def sweep(
 
 @dataclass(frozen=True)
 class Done:
-    """A table, a message about earlier rows, the number of computed scenes, and the time [s]."""
+    """The result of `run`: a table, and how it was computed.
+
+    found    : a message about rows that existed already, or ""
+    computed : number of scenes that this call computed;  seconds : the time it took
+    """
 
     table: SweepTable
     found: str
@@ -119,7 +123,7 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> Done:
-    """The table of a plan, computed now, with a message and counts; arguments as for `sweep`."""
+    """Compute what is missing in the table of a plan; arguments as for `sweep`."""
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:

@@ -1,4 +1,4 @@
-"""The table of a sweep, in the parts of a folder or in memory."""
+"""The table of a sweep, stored in the parts of a folder or in memory."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-#: The default quantiles.
+#: The quantiles that are computed by default.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: [bytes] memory per number of a table and of a data frame with the same contents.
+#: [bytes] memory for a number of a table and its copy in a data frame.
 CELL = 24
 
 
@@ -48,7 +48,8 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
 class SweepTable(Record):
     """A table with a row for each computed scene, in the order of the sweep.
 
-    manifest : description of the sweep;  folder : folder of the parts, None if in memory
+    manifest  : description of the sweep
+    folder    : folder of the parts; None if the table is `in_memory`
 
     The columns are `scene` (its number), the swept keys, `seed` (-1 if nothing is random), `status`
     ("certified", "undecided" or "failed"), `message` (the reason), and the measured numbers (nan if
@@ -101,7 +102,7 @@ class SweepTable(Record):
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Some columns, by default all, one part at a time, for tables that exceed memory."""
+        """Some columns, by default all, of one part after the other; for large tables."""
         self._refuse_unknown(names or ())
         if self.in_memory is not None:
             yield {name: self.in_memory[name] for name in names or self.columns}
@@ -165,7 +166,7 @@ class SweepTable(Record):
         """Axes with bands of quantiles of a measured number against a swept key.
 
         measured, over : names of columns; default: the first measured number and the first swept
-            key. Each combination of the other swept keys has its own bands, if at most four exist
+            key. If the other swept keys have at most four combinations, each has its own bands
 
         Raises InputError if nothing is swept, and for unknown names.
         """
@@ -188,10 +189,10 @@ class SweepTable(Record):
     ) -> Columns:
         """Quantiles over seeds, with a row for each grid point and each measured number.
 
-        measured : names of columns, by default all;  at : quantiles, from 0 to 1
+        measured : names of measured numbers, by default all;  at : quantiles, from 0 to 1
 
-        The columns are those of `points`, `quantity` (the measured number), `scenes` (how many were
-        computed), `failed` (how many of these failed), and each quantile; nan if all scenes failed.
+        The columns are those of `points`, `quantity` (the name of the number), `scenes` (how many
+        were computed), `failed` (how many of these failed), and the quantiles (nan if all failed).
         """
         names = self.measured if measured is None else list(measured)
         about = self.read([*self.points, "scene", "status"])

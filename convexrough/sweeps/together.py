@@ -1,6 +1,6 @@
-"""Scenes of a batch that are pressed and cycled together, as rows of one stack.
+"""Scenes of a batch that are pressed and cycled together.
 
-This is possible if only numbers of `NORMAL` and `CYCLE` are measured.
+Each scene is then a row of common arrays. Only numbers in `NORMAL` and `CYCLE` can be measured so.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth_reference
 from convexrough.sweeps.measures import FAILURES, Column, Measured, Numbers, row_label
 
-#: Arrays along the rows, by the names of `Contacts` or `Cycles`.
+#: Arrays with an entry or a row for each scene, by their names in `Contacts` or `Cycles`.
 Found = Mapping[str, Array]
 
 
@@ -53,7 +53,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 
 def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
-    """The measured numbers of the scenes that are proved in rows, by the index of the scene."""
+    """The measured numbers of the scenes that are proved together, by the index of the scene."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}
@@ -72,7 +72,7 @@ def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> d
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known
-        except FAILURES:  # one scene failed: each is measured alone
+        except FAILURES:  # one scene failed, so that `compute` measures each alone
             continue
     return found
 
