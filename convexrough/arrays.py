@@ -22,7 +22,7 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def summed(values: NDArray[Any]) -> Any:
-    """The sum along the last axis: a number for a vector, (m, 1) for m rows."""
+    """The sum along the last axis: a number for a vector, an array (m, 1) for m rows."""
     return values.sum(axis=-1, keepdims=values.ndim > 1)
 
 
@@ -44,7 +44,7 @@ def evenly(function: Callable[[Array], Array], values: Array) -> Array:
 
 
 def taken(values: Array, which: Indices) -> Array:
-    """values[which]; from an array made by `even`, again one that stores only one number."""
+    """values[which]; if `values` stores only one number (`even`), so does the result."""
     if values.strides == (0,) and len(values):
         return even(values[0], len(which))
     return np.asarray(values[which])
@@ -53,7 +53,7 @@ def taken(values: Array, which: Indices) -> Array:
 def among_zeros(
     values: NDArray[Any], places: Indices, count: int, *, axis: int = 0
 ) -> NDArray[Any]:
-    """An array of length `count` along an axis: `values` at these places, 0 or False elsewhere."""
+    """An array of length `count` along `axis`: `values` at `places`, 0 or False elsewhere."""
     shape = list(values.shape)
     shape[axis] = count
     full = np.zeros(shape, dtype=values.dtype)

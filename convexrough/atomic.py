@@ -14,12 +14,12 @@ from typing import Any
 
 from convexrough.errors import file_errors
 
-#: Name of an unfinished file, with its final name and the process that writes it.
+#: The name of an unfinished file, which contains its final name and the number of its process.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
 
 
 def unfinished(path: Path) -> Path:
-    """The path next to `path` of the incomplete file that this process writes."""
+    """The path at which this process writes the file `path` until it is complete."""
     return path.with_name(f".{path.name}.{os.getpid()}.unfinished")
 
 
@@ -27,7 +27,7 @@ def unfinished(path: Path) -> Path:
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path; its file replaces `path` if the body succeeds, and is removed otherwise.
 
-    Raises FileError if it cannot be written. A killed process leaves the temporary file behind.
+    Raises FileError if `path` cannot be written. A killed process leaves the temporary file.
     """
     temporary = unfinished(path)
     try:
@@ -35,7 +35,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             os.replace(temporary, path)
     finally:
-        with suppress(OSError):  # an error was raised already
+        with suppress(OSError):  # an earlier error is already being raised
             temporary.unlink(missing_ok=True)
 
 

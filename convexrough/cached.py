@@ -9,7 +9,7 @@ Made = TypeVar("Made")
 
 
 class Cached:
-    """Base class of objects that store results computed from them, and free both together."""
+    """Base class of objects that store what is computed from them for as long as they exist."""
 
     def cached(self, make: Callable[[Self], Made]) -> Made:
         """make(self), computed once. The result must not refer to self, or memory is freed late."""

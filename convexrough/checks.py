@@ -15,12 +15,12 @@ from convexrough.errors import InputError
 #: Smallest and largest size of a number in a scene's units; float64 holds products of such numbers.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: What an error message expects instead of a number outside these limits.
+#: What an error message says is expected, if a number is outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
 class Kind(NamedTuple):
-    """A kind of number: what an error message expects, and a condition on finite numbers."""
+    """A kind of number: the words for it in error messages, and its condition on finite numbers."""
 
     expected: str
     holds: Callable[[float], bool]
@@ -49,7 +49,7 @@ phase = Kind(
 
 
 def is_sized(number: float) -> bool:
-    """True for 0, and for a size whose products and powers float64 can hold."""
+    """True for 0 and for numbers of a size from `SMALLEST` to `LARGEST`."""
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
@@ -92,7 +92,7 @@ def array(
     """A read-only copy of a vector. A number stands for `length` equal values.
 
     sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : noun for what has one value each, for messages
+    one  : the noun, in messages, for the things that have one value each
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
@@ -182,13 +182,13 @@ def instance(what: str, value: object, kind: type) -> None:
 
 
 def _short(value: object) -> str:
-    """One line about a value in an error message."""
+    """A value on one line of an error message: its text, shortened, or its type."""
     text = repr(value)
     return f"type {type(value).__name__}" if "\n" in text else text[:60]
 
 
 def sequence(what: str, values: object, expected: str) -> None:
-    """Raise InputError for text, and for what cannot be iterated over."""
+    """Raise InputError for text, and for values that are not iterable."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise InputError(what, found=_short(values), expected=expected)
 

@@ -38,7 +38,7 @@ from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 
-#: Largest number of asperities that a message names; it counts the others.
+#: A message names at most this many asperities, and counts the others.
 MOST_NAMED = 5
 
 #: Loads above this fraction of the largest count as contact in a comparison of solvers.
@@ -179,7 +179,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers, with and without a last Newton step if they offer it; SCS, QOCO if installed."""
+    """All solvers, with and without a last Newton step if they offer it, and installed extras."""
     return (
         solvers.Newton(),
         solvers.Conic(),
@@ -266,7 +266,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
 
 
 class Answer(NamedTuple):
-    """Loads with their certificate; `name` is their source."""
+    """Loads with their certificate; `name` says in messages where they come from."""
 
     name: str
     loads: Array
@@ -314,7 +314,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
 
 
 def joined(items: Iterator[str]) -> str:
-    """The first few items as text, and the number of the others."""
+    """The first `MOST_NAMED` items as text, and the number of the others."""
     named = list(items)
     more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more

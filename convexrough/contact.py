@@ -318,7 +318,7 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles contain neither of these; for an unpickled contact `levels_of` proves the loads again.
+    # Pickles omit these two. For an unpickled contact `levels_of` therefore proves the loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 
@@ -344,7 +344,7 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
-    """`model_error` and `crowding` of Contact, from the candidates' contact radii (n,) [length]."""
+    """`model_error` and `crowding` of Contact, from contact radii (n,) of the problem [length]."""
     prescribed = solution.approach + problem.offsets
     touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
     if len(touching) < 2:
@@ -371,14 +371,14 @@ def covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """(n,) [force] first-order load changes on a change to the "closest" geometry.
+    """(n,) [force] first-order changes of loads if the geometry changes to "closest".
 
     They are 0 if the scene has this geometry already. In this geometry an asperity of tip radius
     rho at the distance r from the axis touches a sphere of radius R at the distance r R / (R + rho)
     from the axis. Its offset (`Scene.offsets`) is greater by r^2 rho / (2 R (R + rho)) than in the
     geometry "summit". The contact points are closer to each other by a fraction of about rho / R,
-    and the compliances between them are greater by this fraction. At the same approach, the load
-    changes dP satisfy, with the compliance operator A,
+    and the compliances between them are greater by this fraction. At the same approach, the changes
+    of loads dP satisfy, with the compliance operator A,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
@@ -407,7 +407,7 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """(n,) the increase of displacements when points move inwards by the fraction rho / R."""
+    """(n,) [length] the increase of displacements if points move inwards by the part rho / R."""
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

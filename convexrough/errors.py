@@ -49,7 +49,7 @@ class InputError(ConvexroughError, ValueError):
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
     """Put the place `where` (a file, a table) in front of each InputError that the body raises.
 
-    unless_known : True: leave errors that name a place unchanged; a MistakesError always stays so
+    unless_known : True to leave errors that name a place unchanged; a MistakesError never changes
     """
     try:
         yield

@@ -113,7 +113,7 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
 
 
 class _Sheared:
-    """The loaded asperities of a shear state, in the form that `sphere.surface_shear` needs.
+    """The loaded asperities of a shear state, as arrays that `sphere.surface_shear` needs.
 
     centres : (n, 2) [length];  radii : (n,) a [length];  peaks : (n,) f p0 [force / length^2]
     shares  : (n,) Q_i / (f P_i), exactly +-1 where sliding
@@ -177,7 +177,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over discs that contain r; similar discs share a search tree."""
+    """(...) sum_i profile(|r - r_i|, i) over the discs that contain the point r."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
@@ -200,7 +200,7 @@ def _sum_over_discs(
 def _sum_everywhere(
     points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
 ) -> Array:
-    """sum_i field_i(r - r_i), in blocks; `field` takes x and y (m, n) relative to n centres."""
+    """(...) sum_i field_i(r - r_i); `field` takes x and y (m, n) of points relative to centres."""
     places = _places(points)
     flat = places.reshape(-1, 2)
     total = np.zeros(len(flat))

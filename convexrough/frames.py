@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: Arrays by name, each after the names of its dimensions. The first array has the rows of a frame.
+#: By name: the names of an array's dimensions, and the array. The first has the rows of a frame.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
 #: The names of the components of a vector.

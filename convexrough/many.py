@@ -27,14 +27,14 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Table):
-    """The contacts of m scenes with n asperities each. Fields ending in `errors` are proved bounds.
+    """The contacts of m scenes with n asperities each; fields named `..._errors` are proved bounds.
 
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
     controls : (m,) what was prescribed: loads [force] if `by_load` is True, or approaches [length]
     loads, approaches : (m,) total loads [force], and approaches [length]
     load_errors, approach_errors : (m,) bounds on their errors
-    asperity_loads, asperity_load_errors : (m, n) [force]
+    asperity_loads, asperity_load_errors : (m, n) [force] loads, and bounds on their errors
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
     alone    : (k,) indices of the scenes that were pressed one by one
 
@@ -121,7 +121,7 @@ class Contacts(Table):
 
     @property
     def _together(self) -> list[PressedRows]:
-        """The scenes proved together, in stacks; an unpickled copy computes them again."""
+        """The scenes that were proved together; an unpickled object proves them again."""
         if "_pressed" not in self.__dict__:
             self.__dict__["_pressed"] = in_rows(self.scenes, self.controls, self.by_load)
         rows: list[PressedRows] = self.__dict__["_pressed"]
@@ -207,7 +207,7 @@ def press_many(
             what, solver, advice = f"scenes[{k}]: {error.what}", error.solver, error.advice
             raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
-        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the roundoff of the sum
+        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # the last term: of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
         for total, value in zip(TOTALS, own, strict=True):
             fields[total][k] = value

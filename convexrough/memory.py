@@ -15,7 +15,7 @@ class MemoryRise:
 
     def __init__(self) -> None:
         self._before: int | None = None
-        with suppress(AttributeError, OSError, TypeError):  # glibc: release freed memory
+        with suppress(AttributeError, OSError, TypeError):  # only glibc can release freed memory
             ctypes.CDLL(None).malloc_trim(0)
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")

@@ -1,4 +1,4 @@
-"""Measures of the validity of the asperity model for a contact, and warnings where it fails."""
+"""Measures of the validity of the asperity model for a contact, and warnings if it may fail."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from convexrough.tabular.units import UnitNames
 #: Contacts with fewer touching asperities than this cause a warning.
 FEW = 5
 
-#: Least number of asperities that are taken to be a part of a larger array: in general, and on a
-#: lattice.
+#: Least number of asperities that count as a part of a larger array, in general and on a lattice.
 ARRAY, ON_LATTICE = 20, 7
 
 #: An array with a smaller `array_extent` is cut off. At this extent the smooth pressure is 0.7 of
 #: its peak.
 CUT_OFF = 0.7
 
-#: Number of sectors whose farthest asperities are the rim of an array, and the largest share of
-#: these that may touch without a warning: single tall asperities touch at the rim of a wide array.
+#: The rim of an array consists of the farthest asperity in each of DIRECTIONS sectors. At most the
+#: part CUT_RIM of these may touch without a warning, because single tall asperities touch there.
 DIRECTIONS, CUT_RIM = 16, 0.5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
@@ -37,20 +36,20 @@ RUBBER, DIAMOND = 1e6, 1.2e12
 #: Few pairs, such as clean metals in vacuum and soft rubber, have a larger coefficient of friction.
 HIGH_FRICTION = 2.0
 
-#: Contact radius over radius of curvature at which a paraboloid differs from a sphere by 1 %.
+#: At this ratio of contact radius to radius of curvature, paraboloid and sphere differ by 1 %.
 STEEP = 0.2
 
 
 def limits_of(contact: Contact) -> dict[str, Any]:
-    """Measures of the validity of the model, by name; ratios or counts where no unit is given.
+    """Measures of the validity of the model, by name; they are numbers if no unit is given.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities. a and b are the
         half widths of a smooth body's contact at this load. None for a flat or a cylinder, at load
-        0, and where the asperities are too few for an array (`is_array`)
-    rim_touching : the rim consists of the farthest asperity in each of 16 sectors; the share of
-        these asperities that touch
+        0, and if the asperities are too few for an array (`is_array`)
+    rim_touching : share of the asperities at the rim that touch; the rim consists of the farthest
+        asperity in each of 16 sectors
     axis_outside : True if the axis of the sphere is not between asperities of the array
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
@@ -100,7 +99,7 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:
-    """The `cautions` about a contact."""
+    """The warnings of `cautions` for a contact."""
     return cautions(limits_of(contact), contact.scene.units)
 
 
@@ -174,7 +173,7 @@ def cautions_about(scene: Scene, loads: Array) -> list[str]:
 
 
 def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
-    """True if simple bounds show that there are no `cautions`, at a fraction of the cost."""
+    """True if simple bounds, which cost less than `cautions`, show that there are none."""
     tips, a, touching = scene.asperities.tip_radii, float(radii.max()), np.count_nonzero(loads)
     smooth = hertz.contact_radius(loads.sum(), scene.material.contact_modulus, scene.mean_radius)
     far = float(scene.asperities.distances.max())
@@ -219,7 +218,7 @@ def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
     x, y = (positions - (positions.min(axis=0) + positions.max(axis=0)) / 2).T
     sectors = np.rint(np.arctan2(y, x) * (DIRECTIONS / (2.0 * np.pi))).astype(np.intp) % DIRECTIONS
     outwards, farthest = np.argsort(x * x + y * y), np.full(DIRECTIONS, -1)
-    farthest[sectors[outwards]] = outwards  # the last of each sector remains
+    farthest[sectors[outwards]] = outwards  # in each sector the last one, the farthest, remains
     return float(touching[farthest[farthest >= 0]].mean())
 
 

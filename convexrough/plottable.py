@@ -18,7 +18,7 @@ class Plottable:
         return plot(self, axes)
 
     def _picture(self) -> str:
-        """A small map as an HTML image, made without solving anything."""
+        """A small map of the result as an HTML image, for which nothing is solved."""
         from convexrough.plots import thumbnail
 
         return thumbnail(self)

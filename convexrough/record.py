@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 #: Dimension names, and the attributes whose arrays have these dimensions.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
 
-#: Plural names that are kept as they are: counts and times.
+#: Names that `singular` leaves in the plural: counts and times.
 COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
-#: Largest array and longest text that are printed in full.
+#: Arrays of at most FEW numbers and texts of at most LINE characters are printed in full.
 FEW, LINE = 4, 76
 
 
@@ -50,7 +50,7 @@ class Record:
         return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields, without what was computed from them."""
+        """The fields by name, without cached results."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -148,7 +148,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value in one line: size and range of an array, counts of statuses, keys of a mapping."""
+    """A value as text on one line: of an array the size and range, of statuses the counts, ..."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):

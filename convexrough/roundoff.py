@@ -3,9 +3,9 @@
 #: Unit roundoff of float64.
 ROUNDOFF = 2.0**-53
 
-#: Allowance for the relative rounding error of a few float64 operations in a bound, far larger than
-#: this error.
+#: Allowance in a bound for the relative rounding error of a few float64 operations. It is far
+#: larger than this error.
 SAFETY = 1e-12
 
-#: Number of roundoffs allowed for k P^(2/3) in float64 and its addition to A P and D.
+#: Number of roundoffs allowed for computing k P^(2/3) in float64 and adding it to A P and D.
 SUM_ROUNDOFFS = 16

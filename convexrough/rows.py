@@ -1,7 +1,7 @@
-"""Press and cycle scenes with equal numbers of asperities together, as rows of a stack.
+"""Press and cycle scenes with equal numbers of asperities together, as rows of a stack of arrays.
 
-Scenes with the same positions and tip radii are a family, which shares one matrix. Scenes that are
-not proved in this way are left out.
+Scenes that differ only in heights and friction are a family, which shares one matrix. Scenes that
+are not proved in this way are left out.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Scenes with more asperities are solved one by one, as stacks save no time.
+#: Scenes with more asperities are solved one by one, because for these stacks save no time.
 MOST = 512
 
-#: Largest total number of matrix entries of all rows processed at once.
+#: Rows are processed together up to this total number of entries of their matrices.
 MATRICES = 2**20
 
-#: Fields with one number for each contact, and for each cycle.
+#: Fields of `Contacts` (TOTALS) and of `Cycles` (CYCLE) with one number for each scene.
 TOTALS = ("loads", "load_errors", "approaches", "approach_errors")
 CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_errors")
 
@@ -44,8 +44,8 @@ CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_error
 class PressedRows(NamedTuple):
     """Scenes that were proved together: a stack of m rows.
 
-    places  : (m,) indices of the scenes;  problem : the problem with the scaled units of the stack
-    high    : the solutions;  squares : (m, n) squared distances from the axis [length^2]
+    places  : (m,) indices of the scenes;  problem : a problem that has the units of the stack
+    high    : the solutions;  squares : (m, n) [length^2] squared distances of summits from the axis
     """
 
     places: Indices
@@ -84,7 +84,7 @@ class PressedRows(NamedTuple):
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
-        total = where(inside, total, high.load)[:, None]  # rows outside are left out
+        total = where(inside, total, high.load)[:, None]  # the result omits rows not `inside`
         rows = replace(self.stack, exact_load=total, exact_approach=None)
         offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
         found = solved(rows, offsets, self.squares, reach, self.box.closed)
@@ -107,7 +107,7 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """The scenes that can be proved together, pressed; controls: (m,) loads or approaches."""
+    """The pressed scenes that can be proved together; `controls` are (m,) loads or approaches."""
     if not scenes or len(scenes[0]) > MOST:
         return []
     with threads.one_where(MATRICES):
@@ -142,7 +142,7 @@ def _family(scene: Scene) -> tuple[Any, ...]:
 
 
 def _leader(scene: Scene, control: float, by_load: bool) -> NormalProblem | None:
-    """The problem with all asperities as candidates; None where no asperity can touch."""
+    """The problem with all asperities of a scene; None if no asperity can touch."""
     approach, load = (None, control) if by_load else (control, None)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     return problem.widened(np.arange(len(scene))) if len(problem) else None
@@ -154,7 +154,7 @@ def _proved(
     controls: Array,
     by_load: bool,
 ) -> Iterator[PressedRows]:
-    """Press the scenes of one stack, in the units of the first problem; yield those proved."""
+    """Press the scenes of one stack, in the units of the first problem; yield what is proved."""
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
     coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
@@ -193,7 +193,7 @@ def _repeated(values: Array, shape: tuple[int, int]) -> Array:
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
-    """(m, n) enclosed offsets of scenes that differ only in heights, as `NormalProblem.exact`."""
+    """(m, n) the offsets of scenes that differ only in heights, with error bounds."""
     scene, length = problem.scene, problem.units.length
     if len(rows) == 1 and rows[0] is scene:
         return problem.exact.offsets[None, :]

@@ -1,8 +1,8 @@
 """Assertions for the tests of other software: forces are certified, or two results agree.
 
-Each function raises AssertionError with the asperities concerned, their errors and statuses; none
-needs a test framework. Each raises InputError for numbers that are not finite, for negative loads,
-and if their number is wrong.
+Each function raises AssertionError with the asperities concerned, their errors and statuses. No
+function needs a test framework. Each raises InputError for values that are not finite, for negative
+loads, and for a wrong number of values.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def assert_agree(
 
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
-    """The answer of a function; InputErrors show no frames of the package in their traceback."""
+    """What a function returns; the traceback of an InputError shows no frames of the package."""
     __tracebackhide__ = True
     try:
         return question(*arguments, **options)

@@ -1,4 +1,4 @@
-"""Work on parts of large arrays in threads; numpy and Fourier transforms run in parallel."""
+"""Work on parts of large arrays in threads; numpy and Fourier transforms run in parallel there."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def worthwhile(numbers: int) -> int:
 
 
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
-    """Call work(part) for each part, in any order; a part must not write what another reads.
+    """Call work(part) for each part, in any order; no call may write what another one reads.
 
     The threads have ended when this returns, so the process may be forked.
     """
@@ -39,7 +39,7 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
         return
     with ThreadPoolExecutor(threads) as pool:
         for _ in pool.map(work, parts):
-            pass  # an error in a part is raised here
+            pass  # this raises an error of a part
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
@@ -87,7 +87,7 @@ class OneThread(ContextDecorator):
 
 
 def _free() -> None:
-    """Let this thread set limits: threadpoolctl 3.8 obeys only the first thread that sets them."""
+    """Let this thread set limits, because threadpoolctl 3.8 lets only the first thread set them."""
     from threadpoolctl import OpenBLASController
 
     if hasattr(OpenBLASController, "clear_controlling_thread"):
@@ -98,5 +98,5 @@ one_thread = OneThread()
 
 
 def one_where(numbers: int) -> AbstractContextManager[object]:
-    """`one_thread` if `each` uses several threads for arrays of this many numbers."""
+    """The context `one_thread` if `each` uses several threads for this many numbers."""
     return one_thread if worthwhile(numbers) > 1 else nullcontext()

@@ -37,7 +37,7 @@ quietly = np.errstate(all="ignore")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ball:
-    """All numbers within a radius of a midpoint: arrays `mid` and `radius` of the same shape.
+    """Arrays `mid` and `radius` of one shape; an element stands for all numbers within the radius.
 
     >>> third = Ball.exact(1.0) / 3.0
     >>> float(third.mid.high), bool(third.radius < 1e-28)
@@ -70,7 +70,7 @@ class Ball:
     @classmethod
     @quietly
     def between(cls, low: Array, high: Array) -> Ball:
-        """All numbers from `low` to `high`."""
+        """Balls that contain all numbers from `low` to `high`."""
         middle = low / 2.0 + high / 2.0
         return cls.around(middle, np.maximum(high - middle, middle - low) * UP + TINY)
 
@@ -103,21 +103,21 @@ class Ball:
 
     @property
     def error(self) -> Array:
-        """Bounds on the distance of every number of the ball to `value`."""
+        """Bounds on the distance of the numbers of each ball from `value`."""
         error: Array = (self.radius + np.abs(self.mid.low)) * UP
         return error
 
     @property
     @quietly
     def lower(self) -> Array:
-        """Lower bounds on all numbers of the ball."""
+        """Lower bounds on the numbers of each ball."""
         low: Array = self.mid.high - (self.radius - self.mid.low)
         return np.asarray(low - self._margin)
 
     @property
     @quietly
     def upper(self) -> Array:
-        """Upper bounds on all numbers of the ball."""
+        """Upper bounds on the numbers of each ball."""
         high: Array = self.mid.high + (self.radius + self.mid.low)
         return np.asarray(high + self._margin)
 
@@ -128,18 +128,18 @@ class Ball:
 
     @property
     def size(self) -> Array:
-        """Upper bounds on the absolute values."""
+        """Upper bounds on the absolute values of the numbers of each ball."""
         size: Array = np.abs(self.mid.high) * UP + self.radius
         return np.asarray(size * UP)
 
     @property
     def positive(self) -> NDArray[np.bool_]:
-        """Where every number is above 0."""
+        """True for balls in which every number is above 0."""
         return np.asarray(self.lower > 0)
 
     @property
     def negative(self) -> NDArray[np.bool_]:
-        """Where every number is below 0."""
+        """True for balls in which every number is below 0."""
         return np.asarray(self.upper < 0)
 
     def __add__(self, other: Ball | Exact) -> Ball:
@@ -168,11 +168,11 @@ class Ball:
         return as_ball(other) / self
 
     def scaled(self, unit: float) -> Ball:
-        """The numbers times a power of two, which is exact away from underflow and overflow."""
+        """The balls times a power of two, which is exact unless numbers underflow or overflow."""
         return Ball(Pair(self.mid.high * unit, self.mid.low * unit), self.radius * unit)
 
     def positive_part(self) -> Ball:
-        """max(x, 0); the error is at most the radius."""
+        """Balls that contain max(x, 0) for each number x; their radii do not grow."""
         above = self.mid.high > 0
         high, low = (np.where(above, part, 0.0) for part in self.mid)
         return Ball(Pair(high, low), np.where(self.upper <= 0, 0.0, self.radius))
@@ -209,7 +209,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """`function` applied to the arrays of values of one type: arrays, pairs or balls."""
+    """The arrays, pairs or balls that `function`, applied to each array in `values`, gives."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
@@ -260,7 +260,7 @@ def _flat(ball: Ball) -> Ball:
 
 
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
-    """The result, with the midpoint 0 and infinite radius where the midpoint is not finite."""
+    """The midpoint and radius; where the midpoint is not finite, 0 and an infinite radius."""
     high, low, radius = np.asarray(mid.high), np.asarray(mid.low), np.asarray(radius)
     if math.isfinite(np.add.reduce(radius, axis=None)):
         return Pair(high, low), radius
@@ -275,14 +275,14 @@ def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """|x y - X Y| <= (|X| + dx) dy + dx |Y| for numbers x, y within dx, dy of X, Y."""
+    """The product; |x y - X Y| <= (|X| + dx) dy + dx |Y| for x, y within dx, dy of X, Y."""
     product = x * y
     radius = np.fmax((np.abs(x.high) + dx) * dy, 0.0) + np.fmax(dx * np.abs(y.high), 0.0)
     return product, (radius * UP + _lost(product)) * UP
 
 
 def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y for numbers x, y within dx, dy of X, Y."""
+    """The quotient; x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y for x, y within dx, dy of X, Y."""
     quotient = x / y
     least = np.abs(y.high) * (2.0 - UP) - dy
     radius = (dx + np.fmax(np.abs(quotient.high) * UP * dy, 0.0) + TINY) / least
@@ -290,7 +290,7 @@ def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Elementwise:
-    """A concave power f; |f(x) - f(m)| <= min(r f(m) / m, f(r)) where |x - m| <= r."""
+    """A concave power f on balls: |f(x) - f(m)| <= min(r f(m) / m, f(r)) if |x - m| <= r."""
 
     def root(x: Pair, dx: Array) -> tuple[Pair, Array]:
         safe, above = positive(x)
@@ -306,7 +306,7 @@ def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Ele
 
 
 def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
-    """The numbers with 1 in place of those <= 0, and a mask of the positive ones."""
+    """The numbers with 1 in place of each number <= 0, and a mask of the positive numbers."""
     above = x.high > 0
     if above.all():
         return x, above

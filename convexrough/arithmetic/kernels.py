@@ -10,14 +10,14 @@ from convexrough.arrays import Array
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
-    """k P^(2/3) + v - D for each asperity; loads below 0 count as 0."""
+    """k P^(2/3) + v - D for each asperity, with loads P (0 if negative), displacements v, depths D."""
     return elementwise(_residual, k, loads, displacement, depth)
 
 
 def _residual(
     k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array, D: Pair, dD: Array
 ) -> tuple[Pair, Array]:
-    """The residual; the rounding error is below 64 squared roundoffs of `sizes`."""
+    """The residual. Its rounding error is below 64 squared roundoffs times `sizes`."""
     safe, loaded = positive(P)
     power = safe.two_thirds()
     slope = power.high / safe.high

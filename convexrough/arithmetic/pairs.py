@@ -31,7 +31,7 @@ _FIRST_BITS = np.int64(-(1 << 27))
 
 
 class Pair(NamedTuple):
-    """high + low, where |low| is at most a roundoff of high: arrays of one shape, or floats."""
+    """Numbers high + low with |low| <= ROUNDOFF |high|: two arrays of one shape, or two floats."""
 
     high: Number
     low: Number
@@ -104,12 +104,12 @@ class Pair(NamedTuple):
         return Pair(*_settled(root, left / (3.0 * square)))
 
     def two_thirds(self) -> Pair:
-        """x^(2/3) of positive numbers: c^2 + 2 c d, with the cube root c + d and a tiny d."""
+        """x^(2/3) of positive numbers x: c^2 + 2 c d, where c + d is the cube root, d is tiny."""
         root, square, rest, left = self._cube_root()
         return Pair(*_settled(square, rest + left / (1.5 * root)))
 
     def _cube_root(self) -> tuple[Number, Number, Number, Number]:
-        """c near x^(1/3), the high and low parts of c^2, and x - c^3."""
+        """Four numbers: c near x^(1/3), the high and low parts of c^2, and x - c^3."""
         root = np.cbrt(self.high)
         square, rest = two_square(root)
         near, less = two_product(square, root)
@@ -140,7 +140,7 @@ class Pair(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
-    """(length,) read-only numbers; `part` computes slices of the numbers, in several threads."""
+    """(length,) read-only numbers, slices of which `part` computes in several threads."""
     found = Pair(np.empty(length), np.empty(length))
 
     def compute(some: slice) -> None:
@@ -158,7 +158,7 @@ def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
 
 
 def two_product(a: Number, b: Number) -> tuple[Number, Number]:
-    """The rounded product, and the error of it to within one roundoff."""
+    """The rounded product, and its error to within one roundoff of this error."""
     total = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return total, ((a1 * b1 - total) + a1 * b2 + a2 * b1) + a2 * b2
@@ -178,7 +178,7 @@ def rounded(values: Array, unit: Array) -> Array:
 
 
 def square_sum(x: Array, *others: Array) -> Pair:
-    """x^2 + y^2 for two coordinates, x^2 for one."""
+    """x^2 + y^2 for two arrays of coordinates, or x^2 for one."""
     total = Pair(*two_square(x))
     for y in others:
         total = total + Pair(*two_square(y))

@@ -33,7 +33,7 @@ MARKERS: dict[Family, str] = {"lattice": "o", "rough": "^", "scattered": "s"}
 
 COLUMNS = 3
 
-#: Smaller errors, such as 0, are drawn at this value of the logarithmic axis.
+#: Errors below this value, such as 0, are drawn at it, because the axis is logarithmic.
 EXACT = 1e-17
 
 
@@ -47,7 +47,7 @@ def bench_figures(bench: Bench) -> dict[str, Figure]:
 
 
 def work_figure(bench: Bench) -> Figure:
-    """Time against true error, a panel for each scene; lower left is better."""
+    """The figure of time against true error, with a panel for each scene; lower left is better."""
     panels = bench.panels()
     columns = min(COLUMNS, max(1, len(panels)))
     rows = max(1, -(-len(panels) // columns))
@@ -92,7 +92,7 @@ def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
 
 
 def cost_figure(bench: Bench) -> Figure:
-    """Time to press a scene against size, on log-log axes, with the fitted exponent and slope 1."""
+    """The figure of time to press a scene against its size, with fitted exponents and slope 1."""
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log")

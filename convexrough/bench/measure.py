@@ -27,13 +27,14 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
 
-#: Largest proved error of reference loads, over the largest load: two roundoffs.
+#: Largest proved error that reference loads may have, over the largest load: two roundoffs.
 ACCURATE = 2.0**-52
 
-#: Least and largest number of runs, of which the fastest counts; `patience` [s] limits the number.
+#: Least and largest number of runs, of which the fastest counts. Between these limits, runs start
+#: for `patience` [s].
 LEAST_RUNS, MOST_RUNS = 3, 25
 
-#: Number of timed plain products, of which the fastest is the unit of time.
+#: Number of timed products (`plain_product`), of which the fastest is the unit of time.
 PRODUCTS = 8
 
 #: Vertices (P, Q / f) of a load path, over the load at the paper's approach.
@@ -53,7 +54,7 @@ class Attempt:
 
     solver    : name of the method;  setting : description of the settings
     settings  : the solver object;  influence : compliance operator; None for the cheapest
-    most      : largest number of asperities for which it is run
+    most      : the attempt is made for at most this many asperities
     """
 
     solver: str
@@ -64,7 +65,7 @@ class Attempt:
 
 
 class Task(NamedTuple):
-    """A function `work` that is timed, and `prepare`, which makes its argument for each run."""
+    """A function `work` that is timed, and a function `prepare` that makes its argument."""
 
     prepare: Callable[[Make], Any]
     work: Callable[[Any], object]
@@ -150,7 +151,7 @@ def measure_attempt(
 
 
 def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
-    """The row of one of TASKS on a scene of about this size."""
+    """The row of the task `name` of `TASKS`, on a scene with about `size` asperities."""
     make, task = partial(scene, family, REFINEMENTS[size]), TASKS[name]
     row = Row(name, family, len(make()), product=plain_product(make()))
     row, found = _timed(row, lambda: task.prepare(make), task.work, patience)
@@ -161,7 +162,7 @@ def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
 
 
 def measure_sweep(size: int, scenes: int, workers: int) -> Row:
-    """The row of a sweep over random heights, with a cycle each; the time is per scene."""
+    """The row of a sweep over random heights with a cycle of each scene; the time is per scene."""
     from convexrough.sweeps.sweep import sweep
 
     a = 1.0 / REFINEMENTS[size]

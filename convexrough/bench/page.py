@@ -61,7 +61,7 @@ def machine_line(bench: Bench) -> str:
 
 
 def size_table(bench: Bench) -> list[list[str]]:
-    """A heading and a row for each scene: seconds of each task, and of a press also in products."""
+    """A heading, and a row for each scene: the times [s] of tasks; a press also in products."""
     on = f"in products on {bench.machine['cores']} cores"
     heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *OTHERS]
     table = [[*heading, "MB", "proved error"]]
@@ -128,7 +128,7 @@ def _renew(page: Path, bench: Bench) -> list[Path]:
 
 
 def split_page(page: Path) -> tuple[str, str]:
-    """The text before and after the block of a page; FileError unless there is one block."""
+    """The text before and after the block of a page. Raises FileError unless it has one block."""
     with file_errors(page, "be read"):
         text = page.read_text(encoding="utf-8")
     before, begin, rest = text.partition(BEGIN)

@@ -19,7 +19,7 @@ from convexrough.progress import LOGGER
 from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
-#: Factors of the least time for which `Profile.rows` reports parts.
+#: `Profile.rows` reports the parts of cases that are solved within these multiples of the least time.
 FACTORS = (1, 2, 5, 10, 100)
 
 
@@ -41,7 +41,7 @@ class Profile(Table):
 
     @property
     def ratios(self) -> Array:
-        """(k, m) seconds over the time of the fastest right answer to each case."""
+        """(k, m) `seconds`, divided by the time of the fastest right answer to the case."""
         least = self.seconds.min(axis=0)
         none = np.full_like(self.seconds, np.inf)
         ratios: Array = np.divide(self.seconds, least, where=np.isfinite(least), out=none)
@@ -53,7 +53,7 @@ class Profile(Table):
         return part
 
     def rows(self) -> list[dict[str, str | int | float]]:
-        """For each solver the numbers of outcomes and of right sets, and parts within `FACTORS`."""
+        """For each solver the numbers of outcomes and right sets, and its `part` for `FACTORS`."""
         parts = np.array([self.part(factor) for factor in FACTORS]).T
         return [
             {"solver": solver}

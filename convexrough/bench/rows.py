@@ -12,10 +12,10 @@ import numpy as np
 from convexrough.bench.scenes import FAMILIES, Family
 from convexrough.version import __version__
 
-#: Relative difference of times up to which they count as equal.
+#: Times count as equal up to this relative difference.
 NOISE = 0.1
 
-#: Smallest number of asperities for fits of exponents: below, fixed costs dominate.
+#: Exponents are fitted to scenes of at least this many asperities, as fixed costs dominate below.
 FITTED_FROM = 10_000
 
 
@@ -121,7 +121,9 @@ class Bench:
 
 
 def frontier(rows: Iterable[Row]) -> list[Row]:
-    """The Pareto frontier: points for which no other is as fast and as accurate, and not equal."""
+    """The Pareto frontier: the points that no other, different point equals in speed and accuracy.
+
+    The other point may be better in one of the two, or in both."""
     points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
@@ -136,7 +138,7 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points as accurate as the default and faster by more than `NOISE`; all if it is missing."""
+    """Points as accurate as the default solver's and faster by more than `NOISE`, or all without it."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:
@@ -146,7 +148,7 @@ def better_than_default(rows: Iterable[Row]) -> list[Row]:
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
-    """b of the least-squares fit  log cost = a + b log size; nan for fewer than two sizes."""
+    """The exponent b of the least-squares fit  log cost = a + b log size; nan for one size."""
     if len(set(sizes)) < 2:
         return math.nan
     slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)

@@ -19,7 +19,7 @@ APPROACH = 5e-5
 #: and tip radii (10 %); the first with asperities moved at random by up to 0.15 of the spacing.
 FAMILIES: tuple[Family, ...] = ("lattice", "rough", "scattered")
 
-#: Refinement of a scene by approximate number of asperities.
+#: The refinement with which a scene has about this many asperities.
 REFINEMENTS = {61: 1.0, 700: 3.4, 8_400: 12.0, 13_000: 15.0, 36_000: 25.0, 120_000: 45.0,
                330_000: 75.0, 1_300_000: 150.0, 5_200_000: 300.0}  # fmt: skip
 

@@ -25,7 +25,7 @@ from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 Sizes = tuple[tuple[Family, int], ...]
 
-#: Number of times that the default solver and apparently faster ones are timed again.
+#: The default solver and apparently faster ones are timed again this many times.
 ROUNDS = 4
 
 #: Compliance operators for Newton's method, with the largest number of asperities for each.
@@ -40,7 +40,7 @@ def _of(family: Family, *sizes: int) -> Sizes:
     return tuple((family, size) for size in sizes)
 
 
-#: Scenes on which all solvers are compared.
+#: Families and sizes of the scenes on which all solvers are compared.
 WORK = (*_of("lattice", 61, 700, 8_400), *_of("rough", 8_400), *_of("scattered", 8_400))
 
 #: Scenes on which a press with the default solver is timed.
@@ -50,7 +50,7 @@ PRESSES = (
     *_of("scattered", 13_000, 36_000, 120_000, 330_000),
 )
 
-#: Scenes of the tasks that follow a press.
+#: Families and sizes of the scenes on which the tasks that follow a press are timed.
 FOLLOWING = {
     "shear": _of("lattice", 61, 700, 36_000, 120_000, 330_000),
     "loss curve": _of("lattice", 61, 700, 120_000),

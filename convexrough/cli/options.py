@@ -36,7 +36,7 @@ json_option = click.option(
 
 
 def _from_here(given: tuple[Any, ...]) -> Any:
-    """The solvers of --solver; from here on modules of the current folder can be imported."""
+    """The solvers of --solver. This call makes modules of the current folder importable."""
     if given[-1] and "" not in sys.path:
         sys.path.insert(0, "")
     return given[-1]

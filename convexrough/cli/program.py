@@ -101,7 +101,7 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """Signals of Ctrl-C while the body runs; each also raises KeyboardInterrupt as usual."""
+    """A list of the Ctrl-C signals in the body; each also raises KeyboardInterrupt as usual."""
     seen: list[int] = []
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or current_thread() is not main_thread():

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Pressing(NamedTuple):
-    """How to press: as a scene file says, or a sphere of this radius; all None not to press."""
+    """How to press: as a scene file says, or a sphere of this radius; all None to press nothing."""
 
     scene: Path | None
     radius: float | None
@@ -38,7 +38,7 @@ class Pressing(NamedTuple):
     modulus: float | None
 
     def check(self) -> None:
-        """Raise UsageError for options that do not go together."""
+        """Raise UsageError for options that exclude each other, or that lack a required one."""
         scene, radius, approach, load, modulus = self
         others = any(each is not None for each in self[1:])
         if scene is not None and others:
@@ -52,7 +52,7 @@ class Pressing(NamedTuple):
     def of(
         self, surface: Surface, summits: Callable[[Surface], Asperities]
     ) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
-        """The surface in the scene's unit, and a function that presses; None without a sphere."""
+        """The surface in the scene's unit, and the function that presses it, or None."""
         if self.scene is not None:
             return _as_in_scene(self.scene, surface, summits)
         if self.radius is None:

@@ -220,6 +220,6 @@ def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
     loads = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        if found.holds:  # the loads may be too inaccurate for exact arithmetic
+        if found.holds:  # loads may be too inaccurate for a proof in exact arithmetic
             loads = solve(file.problem(), start=loads).loads
         return prove(file.scene, loads, **control)

@@ -22,14 +22,14 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
-#: Scenes and answers, a line for each case; `tests/gallery_answers.py` writes it.
+#: The file of scenes and answers, a line for each case, which `tests/gallery_answers.py` writes.
 DATA = "cases.json"
 
 #: Friction and material of all cases; only cases in other units have another contact modulus.
 FRICTION = 0.5
 MATERIAL = Material(contact_modulus=1.0, poisson_ratio=0.3)
 
-#: Number of shear forces in a history before the last.
+#: Number of shear forces in a history before the last one.
 REVERSALS = 100_000
 
 
@@ -134,7 +134,7 @@ def _judged(
     touching: NDArray[np.bool_],
     within: float,
 ) -> Checked:
-    """The comparison. Differences are exact, as some errors are smaller than float64 rounding."""
+    """The comparison. It is in exact arithmetic, as some errors are below float64's rounding."""
     exact = [Fraction(each) for each in digits]
     apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
     largest = max(map(abs, exact))
@@ -207,7 +207,7 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces divided by the last and largest; "nested": each range is in all earlier ones."""
+    """Shear forces over the last and largest one; if "nested", each range is in all before it."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

@@ -32,7 +32,7 @@ smallest load / largest load. proved: scope of the proof that the answer is the 
 
 
 def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
-    """The files of these cases by name, and last index.md and index.json."""
+    """Pairs of the name and contents of each file of these cases; last index.md and index.json."""
     index: dict[str, Any] = {}
     for name in names:
         LOGGER.info(name)

@@ -13,19 +13,19 @@ from convexrough.normal.certificate import certify
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.program import WRITERS, Form, scaled_eigenvalues, stated
 
-#: Number of bristles of each asperity; the smallest number; and the number of variables above which
-#: fewer bristles are used. Heuristics for small files.
+#: Number of bristles (springs) of each asperity; its smallest value; and the number of variables
+#: above which fewer bristles are used. These heuristics keep files small.
 BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
 
 #: Largest number of asperities of a cone program that is also written as CBF.
 SMALL = 20
 
-#: An entry of the index.
+#: The entry of a case in the index.
 About = dict[str, Any]
 
 
 def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
-    """The entry of a case in the index, with reasons for missing programs, and the files."""
+    """The entry of a case in the index, with reasons for missing programs; and its files by name."""
     problem = NormalProblem.assemble(case.scene, **case.control, influence="dense")
     loads = np.array([float(digits) for digits in case.loads])
     own = loads[problem.candidates] / problem.units.force

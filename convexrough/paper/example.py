@@ -25,7 +25,7 @@ RINGS = {"F": 1, "E": 6, "D": 6, "C": 6, "B": 12, "A": 6}
 
 
 def scene() -> cr.Scene:
-    """The scene, with every asperity that the undeformed sphere overlaps."""
+    """The paper's scene, with every asperity that the undeformed sphere overlaps."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     return cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")

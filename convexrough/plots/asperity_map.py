@@ -28,7 +28,8 @@ from convexrough.plots.style import (
     round_ticks,
 )
 
-#: From DENSE discs on, vector files contain pixels; from CROWDED on, a mosaic replaces the discs.
+#: From DENSE discs on, vector files contain these as pixels. From CROWDED discs on, a mosaic of
+#: coloured pixels replaces the discs.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.
@@ -67,7 +68,7 @@ class Window(NamedTuple):
 
     @property
     def sides(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom, top."""
+        """The abscissae of the left and right side, the ordinates of the bottom and the top."""
         return self.x - self.half, self.x + self.half, self.y - self.half, self.y + self.half
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
@@ -85,7 +86,7 @@ def draw_map(
     smooth: Sequence[float] = (),
     window: Window | None = None,
 ) -> Window:
-    """Draw a disc at each point with a radius, and a faint dot at the others; return the window.
+    """Draw a disc at each point with a radius and a faint dot at others; return the part shown.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
@@ -161,7 +162,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 def draw_outline(
     axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
 ) -> None:
-    """Draw a circle or ellipse about the origin, or nothing without semi-axes."""
+    """Draw a circle (one semi-axis) or an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
         axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
@@ -170,7 +171,7 @@ def draw_outline(
 def status_layers(
     status: NDArray[np.str_], radii: Array, stick_radii: Array | None = None
 ) -> list[Layer]:
-    """A layer for each status, and one of the stick discs of partly slipping asperities."""
+    """A layer of discs for each status, and one for the stick discs of "partial" asperities."""
     layers = [
         Layer(name, np.where(status == name, radii, 0.0), colour)
         for name, (colour, _) in LOOKS.items()
@@ -182,7 +183,7 @@ def status_layers(
 
 
 def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
-    """Legend entries for each status that occurs, and for stick discs."""
+    """Legend entries for each status that occurs, and with `stick` for stick discs."""
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
@@ -201,7 +202,7 @@ def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) one radius for the chosen points, about 0.42 of the spacing; 0 for the others."""
+    """(n,) radii of discs: one radius, about 0.42 of the spacing, at chosen points, 0 at others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     size = float(np.ptp(points, axis=0).max()) or 1.0
@@ -215,7 +216,7 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
-    """The square about the discs (or else all points) and the smooth outline, with a 6 % margin."""
+    """The square about all discs (all points if there is no disc) and outlines, with a 6 % margin."""
     points, radii = length.of(points), length.of(radii)
     outline = [length.of(axis) for axis in smooth]
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
@@ -235,7 +236,7 @@ def _draw_open(axes: Axes, points: Array) -> None:
 
 
 def _blended(layers: Sequence[Layer], whole: Array) -> Array:
-    """(n, 4) the mean colour of each asperity, with later layers above earlier ones."""
+    """(n, 4) the mean colour of each asperity's disc, with later layers above earlier ones."""
     mean = np.tile(to_rgba("white"), (len(whole), 1))
     for each in layers:
         part = np.divide(each.radii, whole, out=np.zeros(len(whole)), where=whole > 0) ** 2

@@ -87,7 +87,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(result: object) -> str:
-    """A small picture of a result as an HTML image; for a cycle or path, the map of statuses."""
+    """A small picture of a result as an HTML image; for a cycle or path it is a map of statuses."""
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):

@@ -1,6 +1,6 @@
-"""`between`: a path with additional points, for figures of curved loops.
+"""`between`: a path with additional points, with which figures show curved loops.
 
-Figures call it only if these points are not known, because it solves normal problems.
+Figures call it only if nobody passed such a path to them, because it solves normal problems.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from convexrough.friction.path import LoadPath, history, load_path
 
-#: Largest number of points, of asperities times points, and of steps between two given points.
+#: Largest numbers: of points; of asperities times points; of steps between two given points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
 #: Number of segments at varying load up to which points are added; each needs a solution.
@@ -19,13 +19,13 @@ MOST_SEGMENTS = 24
 
 
 def between(path: LoadPath) -> LoadPath:
-    """The path with points added between the given ones; unchanged if these cost too much."""
+    """The path with points added between the given ones, or unchanged if these cost too much."""
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
     if not path.load_constant:
         each = min(each, 8) if m <= MOST_SEGMENTS else 1
     each = min(each, MOST_BETWEEN)
-    follows_on = path.load_constant or path.start == 0.0  # no start from another contact
+    follows_on = path.load_constant or path.start == 0.0  # it does not start from another contact
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))

@@ -49,7 +49,8 @@ def cycle_figures(
     """The figures of steady cycles of one contact.
 
     loops      : the loop of each cycle; None to compute them
-    asperities : asperities with loops; default: one at each distance from the centre, at most 6
+    asperities : indices of asperities whose loops are drawn; default: one at each distance from the
+        centre, at most 6
 
     "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles only the four
         whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest. Also loops of the asperities
@@ -81,7 +82,7 @@ def cycle_figures(
 
 
 def _spread(amplitudes: Sequence[float]) -> list[int]:
-    """Indices of the loops to draw: all, or those nearest to 1/4, 1/2, 3/4 and 1 of the widest."""
+    """Indices of the loops to draw: all, or those nearest to 1/4, 1/2, 3/4, 1 of the largest."""
     if len(amplitudes) <= MOST_LOOPS:
         return list(range(len(amplitudes)))
     parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
@@ -98,7 +99,7 @@ def loops_figure(
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """The figure of loops: of the contact, the same less an elastic part, and of asperities.
+    """The figure of loops: of the contact, of the contact less an elastic part, and of asperities.
 
     names, meaning : entries and title of the legend of the asperities
     loops : loops of the cycles, with loops of the asperities;  count : number of all cycles
@@ -173,7 +174,7 @@ def _draw_asperity_loops(
     cycle: Cycle,
     scale: Scale,
 ) -> None:
-    """Draw Q_i / (f P_i) against X_i + slip_i; an asperity that slides runs along +-1."""
+    """Draw Q_i / (f P_i) against X_i + slip_i; while an asperity slides the ordinate is +-1."""
     limits = scale.limit * cycle.contact.loads / cycle.contact.load
     kept = loop.asperities.tolist()
     for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
@@ -188,7 +189,7 @@ def _draw_asperity_loops(
 
 
 def ring_colour(order: int, count: int) -> Any:
-    """The colour of a ring of asperities, lighter outwards."""
+    """The colour of ring `order` of `count` rings of asperities; outer rings are lighter."""
     return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
 
 

@@ -12,7 +12,7 @@ from convexrough.plots.style import SINGLE, title
 
 
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
-    """The map of derivatives by heights.
+    """The map of derivatives with respect to heights.
 
     "gradient" : contact discs, coloured by D0 / J times dJ / dz, with the approach D0, the number J
         and the height z of the asperity; open asperities as dots
@@ -25,7 +25,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
 
 
 def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
-    """Draw derivatives by heights: dark where negative, light where positive."""
+    """Draw derivatives with respect to heights: negative ones dark, positive ones light."""
     parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"

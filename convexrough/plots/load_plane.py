@@ -33,10 +33,10 @@ from convexrough.scene.rings import evenly_chosen
 
 MOST_CURVES = 4
 
-#: Line patterns that tell memory curves apart also in grey.
+#: Line patterns by which memory curves can be told apart also in grey.
 PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 
-#: Number of sizes of ellipses, the largest ones, whose losses are drawn.
+#: Losses are drawn for at most this many sizes of ellipses, the largest ones.
 MOST_FACTORS = 5
 
 

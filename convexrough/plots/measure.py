@@ -24,7 +24,7 @@ from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import parsed
 
-#: Units of SI by their powers of length and force, and prefixes by their powers of a thousand.
+#: SI units by their powers of length and force; and prefixes in order of their powers of a thousand.
 SYMBOLS = {(1, 0): "m", (0, 1): "N", (-2, 1): "Pa", (1, 1): "J"}
 PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 
@@ -41,23 +41,23 @@ class Measure(NamedTuple):
     said: str = ""
 
     def of(self, values: Number) -> Number:
-        """The values in this measure."""
+        """The values divided by `size`, as the axis shows them."""
         return values / self.size
 
     def short(self, name: str) -> str:
-        """The label of an axis, without the size of the symbol."""
+        """The label of an axis, without the value of the symbol."""
         if self.symbol:
             return f"${name}\\,/\\,{self.symbol}$"
         return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
 
     def label(self, name: str) -> str:
-        """The label of an axis, with the unit or the size of the symbol."""
+        """The label of an axis, with the unit or the value of the symbol."""
         known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
         return self.short(name) + known
 
 
 def measure(size: float, unit: str, symbol: str = "") -> Measure:
-    """The measure of values up to `size`: SI with a prefix, or another `unit`, or `size` itself."""
+    """The unit of an axis of values up to `size`: SI with prefix, or another `unit`, or `size`."""
     if known := _metric(unit):
         name, exponent = known
         step = _step(abs(size) * 10.0**exponent)
@@ -148,7 +148,9 @@ class Scale:
 
     @cached_property
     def travel(self) -> float:
-        """[length] X0: X at gross sliding of the smooth contact; without one, of this contact."""
+        """[length] X0, the displacement of the smooth contact at gross sliding.
+
+        If there is no smooth contact, it is that of this contact."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
         scene = self.contact.scene  # X0 = c_t f times the approach from first touch

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from convexrough.errors import InputError
 
-#: Formats of files, and limits of the resolution [pixels per inch].
+#: The formats of files; and the limits of the resolution [pixels per inch].
 FORMATS = ("png", "svg", "pdf")
 LEAST_DPI, MOST_DPI = 50, 600
 

@@ -84,7 +84,7 @@ def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
     layers = [
         Layer(
             "_inner discs" if step else "contact discs",
-            contact.contact_radii * np.sqrt(1.0 - (step / steps) ** 2),  # where p = p0 step / steps
+            contact.contact_radii * np.sqrt(1.0 - (step / steps) ** 2),  # here p = p0 step / steps
             colours.to_rgba(peaks * ((step + 0.5) / steps if steps > 1 else 1.0)),
             None,
         )
@@ -156,7 +156,7 @@ def _loads_figure(scale: Scale) -> Figure:
     axes = figure.subplots()
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # mark asperities with a load
+    if contact.certificate.scope == "none":  # of undecided asperities mark only loaded ones
         unsure &= touching
     r, share = distances(scale), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)
@@ -176,7 +176,7 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Draw 100 p(r) A / P of the smooth sphere; A: median cell area of seven or more asperities."""
+    """Draw 100 p(r) A / P of the smooth sphere, with the median cell area A of the asperities."""
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points

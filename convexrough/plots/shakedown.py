@@ -47,7 +47,7 @@ def shakedown_figures(found: Shakedown) -> Figures:
 
 
 def draw_factors(axes: Axes, found: Shakedown) -> None:
-    """Draw each asperity in the shade of its factor; of kind "vector", of its slip."""
+    """Draw each asperity in the shade of its factor, or of its slip if the kind is "vector"."""
     vector = found.kind == "vector"
     known, points = np.isfinite(found.factors), found.scene.contact_points
     values = np.linalg.norm(found.mechanism, axis=-1).max(axis=0) if vector else found.factors
@@ -86,7 +86,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """The map of how many asperities slide in every cycle; hatched where |Q| exceeds f P."""
+    """The map of how many asperities slide in every cycle, hatched where |Q| exceeds f P."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0

@@ -106,7 +106,7 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
 
 
 def _doubtful(state: State) -> Any:
-    """(n,) True for asperities to mark: undecided ones, or all with a load if nothing is proved."""
+    """(n,) True for undecided asperities; if nothing is proved, only for those with a load."""
     unsure = state.status == "undecided"
     return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
 

@@ -26,7 +26,7 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
 
-#: Number of forces of the slider, by the largest number of touching asperities.
+#: Number of forces of the slider, by the largest number of touching asperities it is used for.
 FORCES = {2_500: 101, 20_000: 51}
 FEWEST_FORCES = 21
 
@@ -46,7 +46,7 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The slides of a loaded contact with a sphere and with friction; others: InputError."""
+        """The states of a contact. Raises InputError without a load, a sphere or friction."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         if contact.load == 0:
             raise InputError("slider page", found="no asperity that touches", expected="a contact")
@@ -58,7 +58,7 @@ class Slides:
 
 
 def slider_html(slides: Slides, proved: Sequence[str]) -> str:
-    """The page as text; proved : lines that say what is proved of the contact."""
+    """The page as text; `proved` are lines that say what is proved of the contact."""
     found = json.dumps(slider_data(slides, proved), separators=(",", ":"))
     template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
@@ -142,7 +142,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
 def _stick(
     contact: Contact, loading: LoadPath, steady: list[Cycle], shown: Indices
 ) -> list[list[int]]:
-    """Stick radius over contact radius in thousandths, 0 where sliding, -1 where undecided."""
+    """`stick` of `slider_data`: a row for each force, with an entry for each disc."""
     left = np.maximum(1.0 - _shares(contact, loading, shown), 0.0)
     rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
     statuses = np.array([each.status[shown] for each in steady])
@@ -152,7 +152,7 @@ def _stick(
 
 
 def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
-    """(m, k) shear forces over friction limits."""
+    """(m, k) shear forces of k asperities at m forces, over the friction limit of each."""
     limits = checks.friction(contact.scene.friction) * contact.loads[which]
     return np.asarray(loading.asperity_forces[:, which] / limits)
 

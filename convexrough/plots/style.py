@@ -46,7 +46,7 @@ def title(axes: Axes, text: str) -> None:
 
 
 def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
-    """The colour bar, added to the right, with its name above it or along it."""
+    """A colour bar, added to the right of the axes, with its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
     found.ax.tick_params(labelsize=TICK)
     found.ax.yaxis.get_offset_text().set_fontsize(TICK)
@@ -101,7 +101,7 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
 
 
 def no_contact(*stems: str) -> Figures:
-    """Figures with these names that say that nothing touches."""
+    """Figures under these names, each with the text that nothing touches."""
     figures = {stem: Figure(figsize=(SINGLE, 2.6), layout="constrained") for stem in stems}
     for figure in figures.values():
         say_nothing(figure.subplots())
@@ -128,7 +128,7 @@ def shades_of(count: int, low: float = 0.3) -> Array:
 
 
 def mark_points(axes: Axes, x: Array, y: Array) -> None:
-    """Draw dots; if they are few, number them next to the dots. Dots at one place share a label."""
+    """Draw dots; if they are few, write their numbers beside them, at one place in one label."""
     if len(x) <= MOST_DOTS:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:

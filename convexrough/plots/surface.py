@@ -36,7 +36,7 @@ from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowd
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 
-#: Number of summits above which their dots are pixels inside a vector file.
+#: Above this number of summits, vector files contain their dots as pixels.
 MANY = 1000
 
 #: Colour of summits, bright on every grey.
@@ -45,7 +45,7 @@ SUMMIT = "#ffd24a"
 #: Labelled ticks of the pruning axis, as fractions of Sz.
 PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
-#: Marks of proved scopes: they differ in shape for print without colours.
+#: Mark of each scope of a certificate. Marks differ in shape for print without colours.
 SCOPES = {"global": ("o", ROUGH), "local": ("s", ROUGH), "none": ("X", UNSURE),
           "failed": ("^", UNSURE)}  # fmt: skip
 
@@ -193,7 +193,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """Draw contacts, smooth contact and most crowded pair; return half the contacts' width."""
+    """Draw contacts, smooth contact and the most crowded pair; return half the contacts' width."""
     points, radii = contact.scene.contact_points, contact.contact_radii
     touching, scale = contact.loads > 0, Scale(contact)
     reach = np.abs(points - scale.centre).max(axis=1) + radii
@@ -251,7 +251,7 @@ def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
 
 
 def _bins(values: Array) -> Array:
-    """Edges of bins for all values; if all are equal, of bins around the value."""
+    """Edges of the bins of a histogram of all values, also if these are equal."""
     low, high = float(values.min()), float(values.max())
     size = max(abs(low), abs(high)) or 1.0
     room = high - low if high - low > 1e-9 * size else size

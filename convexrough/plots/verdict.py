@@ -24,10 +24,10 @@ from convexrough.plots.style import (
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict
 
-#: Number of suspects that are numbered, likeliest first.
+#: The indices of at most this many suspects are written, of the likeliest ones.
 NUMBERED = 5
 
-#: Shade of each status, told apart also in grey.
+#: Grey shade of each status.
 SHADES = {"open": "0.93", "contact": "0.72", "partial": "0.72", "sliding": "0.45"}
 NAMES = {"partial": "partial slip"}
 

@@ -1,1 +1,1 @@
-"""The scene: a sphere or another pressed body, asperities and their patterns, and material."""
+"""The scene: a sphere or another pressed body, asperities and their patterns, and the material."""

@@ -63,7 +63,7 @@ class Asperities(Record):
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
-        The results share data that depend only on the positions, such as distances.
+        They share all data that depend only on the positions, such as distances.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -110,7 +110,7 @@ class Asperities(Record):
 
     @cached_property
     def layout(self) -> Layout:
-        """Data that depend only on the positions."""
+        """The positions, with data that depend only on them."""
         return Layout(self.positions)
 
     @property

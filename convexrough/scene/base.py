@@ -19,7 +19,7 @@ Radius: TypeAlias = float | tuple[float, float]
 
 
 def checked(radius: Any) -> Radius:
-    """The radius, checked; a pair of equal radii becomes one number."""
+    """The radius; a pair of equal radii becomes one number. Raises InputError if it is wrong."""
     if np.ndim(radius) == 0:
         return _length("sphere_radius", radius)
     if len(radius) != 2:
@@ -30,12 +30,12 @@ def checked(radius: Any) -> Radius:
 
 
 def along(radius: Radius) -> tuple[float, float]:
-    """The radii Rx and Ry."""
+    """The radii of curvature Rx along x and Ry along y."""
     return radius if isinstance(radius, tuple) else (radius, radius)
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """The finite radii R, each with the axes (0 is x, 1 is y) along which the shape has it."""
+    """Each finite radius R, with the slice of the axes (0 is x, 1 is y) along which it holds."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]
@@ -43,7 +43,7 @@ def curved(radius: Radius) -> list[tuple[float, slice]]:
 
 
 def named(radius: Radius) -> str:
-    """The name of the shape."""
+    """The name of the shape, such as "a sphere"."""
     if not curved(radius):
         return "a flat"
     if not isinstance(radius, tuple):
@@ -52,7 +52,7 @@ def named(radius: Radius) -> str:
 
 
 def sphere_radius(radius: Radius, what: str) -> float:
-    """The radius of a sphere. Raises InputError for other shapes."""
+    """The radius, if the shape is a sphere. Raises InputError for other shapes."""
     if isinstance(radius, tuple) or not curved(radius):
         raise InputError(what, found=named(radius), expected="a sphere")
     return radius

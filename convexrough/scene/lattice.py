@@ -1,4 +1,4 @@
-"""The lattice of points, found from their coordinates."""
+"""The lattice on which points lie, found from their coordinates."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from convexrough.checks import SMALLEST
 
 Sites = NDArray[Any]  # whole numbers
 
-#: Largest difference of points from the sites of a lattice, divided by the largest coordinate: a
-#: little more than the rounding errors of coordinates.
+#: Largest accepted distance of points from the sites of a lattice, divided by the largest
+#: coordinate. It is a little more than the rounding errors of coordinates.
 SITE_ERROR = 32 * 2.0**-53
 
-#: Largest difference of points from the sites, divided by the spacing.
+#: Largest accepted distance of points from the sites, divided by the spacing.
 CLOSEST = 1e-7
 
 #: Lattices with a spacing below this part of the largest coordinate are not used.
@@ -53,7 +53,7 @@ class Lattice(Cached):
 
     @property
     def exactly(self) -> list[list[Fraction]]:
-        """The basis without rounding, as fractions."""
+        """The rows b1 and b2 of the exact basis, as fractions."""
         given = self.basis if self.unshrunk is None else self.unshrunk
         return [[self.shrink * Fraction(x) for x in row] for row in given.tolist()]
 
@@ -74,7 +74,7 @@ class Lattice(Cached):
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points. Relative to the sites' middle the two fits decouple.
+        # Fit origin and basis to all points. For sites relative to their middle, the fits decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
@@ -92,7 +92,7 @@ class Lattice(Cached):
         return found
 
     def sites(self, points: Array) -> Sites | None:
-        """(n, 2) i and j of the points; None if one of them is not on the lattice."""
+        """(n, 2) the sites (i, j) of the points; None if one of them is not on the lattice."""
         sites = _nearest_sites(points - self.origin, self.basis)
         off = np.abs(points - self.origin - sites @ self.basis).max(initial=0.0)
         reach = np.abs(points).max(initial=0.0)
@@ -108,7 +108,7 @@ def _shortest(points: Array) -> Array | None:
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]
-    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # limits powers
+    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # no overflow
     points = (nearby[:, None] - nearby).reshape(-1, 2) / unit
     squares = (points**2).sum(axis=1)
     near = np.argsort(squares)

@@ -14,11 +14,11 @@ from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.scene.patterns import Pattern
 
-#: For more asperities than this a lattice is sought before nearest neighbours are computed.
+#: For more asperities than this, a lattice is looked for before nearest neighbours are computed.
 MANY = 5000
 
 
-#: Largest difference of points made on a lattice from its sites, over the largest coordinate.
+#: Bound on the distance from their sites of points made on a lattice, over the largest coordinate.
 MADE_SITE_ERROR = 16 * 2.0**-53
 
 
@@ -26,7 +26,7 @@ MADE_SITE_ERROR = 16 * 2.0**-53
 class Layout(Cached):
     """Distinct points (n, 2) [length] in the plane, with data that depend only on them.
 
-    made : the lattice on which they were made, with i and j (n, 2); None to search for one
+    made : the lattice on which they were made, and their sites (i, j) (n, 2); None if it is unknown
     """
 
     points: Array
@@ -38,7 +38,7 @@ class Layout(Cached):
 
     @classmethod
     def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
-        """The sites of a pattern with norms up to a limit, scaled to a spacing [length]."""
+        """The sites of a pattern with norms of at most `limit`, scaled to a spacing [length]."""
         sites, order = pattern.within(limit)
         points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
         if len(points) < 3:
@@ -57,21 +57,21 @@ class Layout(Cached):
 
     @cached_property
     def sites(self) -> Sites | None:
-        """(n, 2) i and j of each point on the lattice; None if there is none."""
+        """(n, 2) the site (i, j) of each point on the lattice; None if there is no lattice."""
         if self.made is not None:
             return self.made[1]
         return None if self.lattice is None else self.lattice.sites(self.points)
 
     @cached_property
     def order(self) -> Indices | None:
-        """(n,) indices that sort the points by i and then by j, the order of Fourier transforms."""
+        """(n,) indices that sort points by i, then by j, as for Fourier transforms; or None."""
         if self.sites is None:
             return None
         i, j = (self.sites - self.sites.min(axis=0)).T
         return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
 
     def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
-        """The indices where `wanted` (n,) is True; for many points on a lattice, in `order`."""
+        """The indices where `wanted` (n,) is True; many points on a lattice are in `order`."""
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]

@@ -8,7 +8,7 @@ from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
 
-#: Number of asperities per batch in `crowding`. A heuristic, for speed.
+#: Number of asperities that `crowding` processes together. It affects speed only.
 BATCH = 256
 
 #: Number of points up to which all distances are computed. It affects speed only.
@@ -16,7 +16,7 @@ FEW = 400
 
 
 def separations(points: Array, point_error: float = 0.0) -> Array:
-    """(n,) [length] lower bounds on the distances to the nearest neighbour.
+    """(n,) [length] lower bounds on the distance of each point to its nearest neighbour.
 
     point_error : [length] bound on the error of each coordinate
     """

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 
-#: Random heights and logarithms of radii are normal, clipped at this many standard deviations so
-#: that only finitely many asperities can touch.
+#: Random heights and logarithms of radii are normally distributed. They are clipped at this many
+#: standard deviations, so that only finitely many asperities can touch.
 CUT_DEVIATIONS = 6.0
 
 
@@ -20,7 +20,7 @@ CUT_DEVIATIONS = 6.0
 class Pattern:
     """The sites i b1 + j b2 of a lattice with the spacing 1.
 
-    skew   : the norm |i b1 + j b2|^2 is i^2 + skew i j + j^2
+    skew   : coefficient in the norm of a site, |i b1 + j b2|^2 = i^2 + skew i j + j^2
     second : b2; b1 is (1, 0)
     """
 
@@ -37,7 +37,7 @@ class Pattern:
         return 1.0 / self.second[1]
 
     def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
-        """i and j (n, 2) of the sites with norms up to a limit, and indices (n,) that sort them.
+        """(n, 2) the sites (i, j) with norms of at most `limit`, and (n,) indices that sort them.
 
         The sites are ordered by norm and then by angle; the indices sort them by i and then by j.
         """
@@ -49,18 +49,18 @@ class Pattern:
         taken = norms <= limit
         i, j = (each - top for each in np.nonzero(taken))
         x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # < 1, the least difference of norms
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of norms
         order = np.argsort(norms[taken] + turns)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
 
     def coordinates(self, i: NDArray[Any], j: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """The coordinates x and y of i b1 + j b2."""
+        """The coordinates x and y of the sites i b1 + j b2."""
         return i + self.second[0] * j, self.second[1] * j
 
 
-#: The patterns with six and with four nearest neighbours.
+#: The lattice in which each site has six nearest neighbours, and the one in which it has four.
 HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
 SQUARE = Pattern(0, (0.0, 1.0))
 
@@ -73,6 +73,6 @@ def checked_seed(seed: int | None) -> int:
 
 
 def cut_normal(count: int, seed: int, *, stream: int) -> Array:
-    """(count,) clipped standard normal numbers. Heights and radii use independent streams."""
+    """(count,) clipped standard normal numbers. A `stream` is independent of all others."""
     numbers = np.random.default_rng([seed, stream]).standard_normal(count)
     return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)

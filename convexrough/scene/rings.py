@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 
 
 def rings(distances: Array, loads: Array) -> list[Indices]:
-    """The loaded asperities, grouped by distance from the axis, the innermost group first."""
+    """The indices of loaded asperities in groups of equal distance from the axis, nearest first."""
     touching = np.flatnonzero(loads)
     order = np.argsort(distances[touching], kind="stable")
     outwards = distances[touching[order]]
@@ -25,11 +25,11 @@ def rings(distances: Array, loads: Array) -> list[Indices]:
 
 
 def one_of_each_ring(distances: Array, loads: Array, most: int) -> list[int]:
-    """The first asperity of each ring, for at most `most` evenly chosen rings."""
+    """The first loaded asperity of each of at most `most` rings, which are evenly chosen."""
     return [int(ring[0]) for ring in evenly_chosen(rings(distances, loads), most)]
 
 
 def evenly_chosen(items: Sequence[Item], most: int) -> list[Item]:
-    """At most `most` of the items, evenly chosen, with the first and the last."""
+    """At most `most` evenly chosen items of a sequence, including its first and its last one."""
     places = np.linspace(0, len(items) - 1, min(most, len(items))).astype(int)
     return [items[i] for i in places]

@@ -27,7 +27,7 @@ Geometry = Literal["summit", "closest"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Record):
-    """A sphere, the asperities on which it is pressed, and the material of both.
+    """A sphere, the asperities on which it is pressed, and the material of both bodies.
 
     sphere_radius : [length] radius R of a sphere; inf for a flat. A pair (Rx, Ry) of radii of
         curvature along x and y makes an ellipsoid, or a cylinder if one of them is inf
@@ -93,7 +93,7 @@ class Scene(Record):
 
     @cached_property
     def relative_radii(self) -> Array:
-        """(n,) [length] R_i with 1/R_i = 1/R + 1/rho_i, tip radii rho_i and the `curvature` 1/R."""
+        """(n,) [length] R_i, from 1/R_i = `curvature` + 1/rho_i with the tip radius rho_i."""
 
         def relative(rho: Array) -> Array:
             return frozen(1.0 / (self.curvature + 1.0 / rho))
@@ -115,7 +115,7 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] `radius`, plus the tip radius rho_i if the geometry is "closest"."""
+        """(n,) [length] `radius`; in the geometry "closest", `radius` + the tip radius rho_i."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
@@ -124,7 +124,7 @@ class Scene(Record):
     def contact_tails(self) -> Array | None:
         """(n, 2) [length] exact contact points minus `contact_points`; None if all are 0.
 
-        The error of each is at most 2^-96 of the size of the contact point.
+        The error of each is at most 2^-96 times the size of the contact point.
         """
         points = self.asperities.positions
         if self.contact_points is points:
@@ -139,7 +139,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points, if it is a scaled copy of that of the summits."""
+        """The lattice of the contact points if it is that of the summits, scaled; else None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -169,7 +169,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] heights minus `drops`: d_i. At the approach D0 the overlap is D0 + d_i."""
+        """(n,) [length] d_i, heights minus `drops`. At the approach D0 the overlap is D0 + d_i."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
@@ -199,10 +199,10 @@ def reach(
     height: float,
     geometry: Geometry,
 ) -> float:
-    """[length] distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho))).
+    """[length] the distance r from the axis at which an asperity of this height just touches.
 
-    D0 is the approach, z the height, R the radius of the sphere (the larger of two), rho the tip
-    radius.
+    It solves D0 + z = r^2 / (2 R), or D0 + z = r^2 / (2 (R + rho)) in the geometry "closest". D0 is
+    the approach, z the height, R the (larger) radius of the sphere, and rho the tip radius.
     """
     radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)
     depth = approach + height

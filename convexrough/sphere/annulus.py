@@ -5,8 +5,8 @@ force over the friction limit, and phi the deflection over its largest value. In
 
     t = 1 - s^3,    phi = 1 - s^2,
 
-and the energies of `mindlin` are polynomials of x. They are written without subtractions, so each
-keeps its relative accuracy down to x = 0. The sphere slides at x = 1.
+and the energies of `mindlin` are polynomials of x. They are written without subtractions, so that
+each keeps its relative accuracy down to x = 0. The sphere slides at x = 1.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from convexrough.arrays import Number
 
 
 def width_at(deflection: Number) -> Number:
-    """x at a deflection phi of either sign; 1 for |phi| >= 1."""
+    """The width x at a deflection phi of either sign; 1 for |phi| >= 1."""
     size = np.minimum(np.abs(deflection), 1.0)
     return size / (1.0 + np.sqrt(1.0 - size))
 
 
 def width_under(force: Number) -> Number:
-    """x under a force t of either sign; 1 for |t| >= 1."""
+    """The width x under a force t of either sign; 1 for |t| >= 1."""
     size = np.minimum(np.abs(force), 1.0)
     return width_between(size, 1.0 - size)
 
 
 def width_between(force: Number, left: Number) -> Number:
-    """x under a force t >= 0; `left` is 1 - t, which keeps its relative accuracy."""
+    """The width x under a force t >= 0, with `left` = 1 - t given to full relative accuracy."""
     s = np.cbrt(np.maximum(left, 0.0))
     return np.minimum(force, 1.0) / (1.0 + s + s * s)
 

@@ -1,6 +1,6 @@
-"""A smooth ellipsoid on a half-space: docs/theory/bodies.md, with Carlson's integrals.
+"""The contact of a smooth ellipsoid on a half-space (docs/theory/bodies.md).
 
-Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; the integrals R_D and R_F: DLMF 19.16.
+Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; Carlson's integrals R_D, R_F: DLMF 19.16.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def slenderness(ratio: float) -> float:
 def semi_axes(
     load: float, contact_modulus: float, radii: tuple[float, float]
 ) -> tuple[float, float]:
-    """[length] the semi-axes a along x and b along y."""
+    """[length] the semi-axes of the contact ellipse, a along x and b along y."""
     from scipy.special import elliprd
 
     largest = max(radii)
@@ -34,7 +34,7 @@ def semi_axes(
 
 
 def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> float:
-    """[length] delta, the approach of distant points of the two bodies."""
+    """[length] the approach delta of distant points of the two bodies."""
     from scipy.special import elliprf
 
     a, b = axes

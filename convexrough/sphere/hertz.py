@@ -13,7 +13,7 @@ import numpy as np
 
 from convexrough.arrays import Number
 
-#: Coefficients of the series of (x - sin x) / x^3 in -x^2, the last first.
+#: Coefficients of the power series of (x - sin x) / x^3 in -x^2, in descending order of powers.
 LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
 
 
@@ -39,7 +39,7 @@ def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Num
 
 
 def _cube_root(value: Number) -> Number:
-    """The cube root; the root of 8 x is exactly twice the root of x, on every machine."""
+    """The cube root. On every machine the result for 8 x is exactly twice the result for x."""
     mantissa, exponent = np.frexp(value)
     thirds, rest = np.divmod(exponent, 3)
     return np.ldexp(np.cbrt(np.ldexp(mantissa, rest)), thirds)
@@ -57,7 +57,7 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
 
 
 def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
-    """Normal displacement of both surfaces at a distance r from the axis (Johnson, 3.42).
+    """The sum of both surfaces' normal displacements at a distance r from the axis (Johnson, 3.42).
 
     It is a^2/R - r^2/(2R) inside the contact. Outside it is
     (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)], which equals

@@ -93,7 +93,7 @@ class SmoothSphere(Record):
         return hertz.pressure(distance, self.contact_radius, self.peak_pressure)
 
     def normal_displacement(self, distance: ArrayLike) -> Any:
-        """[length] normal displacement of both surfaces at a distance [length] from the axis."""
+        """[length] sum of both surfaces' normal displacements at a distance from the axis."""
         return hertz.surface_displacement(distance, self.contact_radius, self.radius)
 
     @property
@@ -172,7 +172,7 @@ class SmoothSphere(Record):
         return checks.friction(self.scene.friction)
 
     def _share(self, what: str, forces: ArrayLike) -> Array:
-        """t = Q / (f P), checked to be in [-1, 1]."""
+        """The shares t = Q / (f P). Raises InputError if they are not in [-1, 1]."""
         forces = checks.bearable(what, forces, self.largest_force)
         return np.clip(forces / self.largest_force, -1.0, 1.0)
 
@@ -181,8 +181,8 @@ class SmoothSphere(Record):
 class SmoothEllipsoid(SmoothSphere):
     """A smooth ellipsoid, with results like those of `SmoothSphere`.
 
-    The contact is an ellipse with the semi-axes a, b. `contact_radius` is sqrt(a b). For the
-    argument `distance` of a point give s sqrt(a b), with s^2 = x^2/a^2 + y^2/b^2. The stick zone is
+    The contact is an ellipse with the semi-axes a, b. `contact_radius` is sqrt(a b). For a point
+    (x, y), the argument `distance` is s sqrt(a b), with s^2 = x^2/a^2 + y^2/b^2. The stick zone is
     an ellipse of the same shape. The ratio of tangential to normal compliance is approximated by
     its mean over all directions, Mindlin's ratio; this is exact at nu = 0.
 

@@ -43,7 +43,7 @@ def surface_displacement(
     shear_modulus: float,
     poisson_ratio: float,
 ) -> Number:
-    """[length] displacement of both surfaces along x, the sum of both bodies, at (x, y).
+    """[length] the sum of both surfaces' displacements along x, at the point (x, y).
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2];  shear_modulus : G
 

@@ -142,7 +142,7 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits; its approach, and its sphere centred on the map, are used
+    contact : contact of the map's summits, which gives the approach and the (centred) sphere
 
     Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
 

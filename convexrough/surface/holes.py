@@ -53,7 +53,7 @@ def clipped(heights: Array) -> int:
 
 
 def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height below the largest; 0 if not surprising.
+    """The number of pixels with the most frequent height; 0 if it is the largest or not surprising.
 
     The number is surprising if the height is 20 times as frequent in a sample as any other height,
     and occurs on at least 20 pixels of the sample.

@@ -39,8 +39,8 @@ MOST_LISTED = 10
 #: A contact farther from the middle than this fraction of the map's half width causes a warning.
 NEAR_EDGE = 0.9
 
-#: A statistic of the summits causes a warning if it differs more than this, relative to its value
-#: for a Gaussian surface with the same moments.
+#: Largest relative difference without a warning: of a statistic of the summits from its value for a
+#: Gaussian surface, and of the asperities' load from that of the whole map.
 UNLIKE = 0.2
 
 

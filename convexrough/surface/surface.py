@@ -53,8 +53,8 @@ class Surface(Record, Plottable):
     filled  : number of pixels that were holes
     clipped : number of pixels at the largest height if the map seems to be cut off there, else 0;
         by default determined from `heights`
-    repeated : number of pixels with the most frequent height below the largest, if these are
-        surprisingly many, else 0; by default determined from `heights`
+    repeated : number of pixels with the most frequent height if they are surprisingly many and this
+        is not the largest height, else 0; by default determined from `heights`
     copied  : share of rows that equal the row before, or that of columns if this is larger; by
         default determined from `heights`
     source  : the file, or a description

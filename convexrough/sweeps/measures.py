@@ -25,8 +25,7 @@ Stages = Mapping[str, Stage]
 #: Numbers in a summary, by their name and the label of their row.
 Numbers = dict[tuple[str, str], float]
 
-#: The number ONSET has these QUANTILES of the shear forces at which loaded asperities start to
-#: slide, divided by f P.
+#: ONSET: these quantiles of the shear forces at which loaded asperities start to slide, over f P.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
 #: Errors that mean that one scene failed; the others are still computed.
@@ -49,11 +48,7 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The numbers of a scene.
-
-    doubts   : why they are not certified, or ""
-    cautions : why the model may not apply to the scene, or ""
-    """
+    """The numbers of a scene; why they are not certified, and why the model may fail, or ""."""
 
     numbers: Numbers
     doubts: str

@@ -56,9 +56,7 @@ def planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for the scenes of `source`.
-
-    The first scene without an error shows which numbers exist, and how large batches may be.
+    """The plan for the scenes of `source`; the first that is solved shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the numbers depend, except `measures` and the version

@@ -27,7 +27,7 @@ from convexrough.errors import ExtraError, InputError, WorkerError
 from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
 from convexrough.threads import cores
 
-#: Largest number of batches that wait in an executor; and for local processes, that of each process.
+#: Largest number of batches submitted at a time: to an executor, and for each local process.
 AT_ONCE, EACH = 1000, 2
 
 #: The sweep ends after this many lost batches, which are batches whose worker died.

@@ -20,8 +20,8 @@ from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: The quantiles that are printed; and the largest numbers of rows and failures that are printed, and
-#: of figures that are drawn.
+#: The quantiles that are printed; and the largest numbers of rows and failures that are printed,
+#: and of figures that are drawn.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
