@@ -20,7 +20,7 @@ SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
 class Kind(NamedTuple):
-    """A kind of number: the words for it in error messages, and its condition on finite numbers."""
+    """A kind of number: its name in error messages, and the condition on finite numbers."""
 
     expected: str
     holds: Callable[[float], bool]

@@ -10,7 +10,7 @@ from convexrough.arrays import Array
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
-    """k P^(2/3) + v - D for each asperity, with loads P (0 if negative), displacements v, depths D."""
+    """k P^(2/3) + v - D for asperities with loads P (0 if negative), displacements v, depths D."""
     return elementwise(_residual, k, loads, displacement, depth)
 
 

@@ -19,7 +19,7 @@ from convexrough.progress import LOGGER
 from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
-#: `Profile.rows` reports the parts of cases that are solved within these multiples of the least time.
+#: `Profile.rows` reports the parts of cases solved within these multiples of the least time.
 FACTORS = (1, 2, 5, 10, 100)
 
 

@@ -121,9 +121,7 @@ class Bench:
 
 
 def frontier(rows: Iterable[Row]) -> list[Row]:
-    """The Pareto frontier: the points that no other, different point equals in speed and accuracy.
-
-    The other point may be better in one of the two, or in both."""
+    """The Pareto frontier: the points for which no different one is as fast and as accurate."""
     points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
@@ -138,7 +136,9 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points as accurate as the default solver's and faster by more than `NOISE`, or all without it."""
+    """Points as accurate as the default solver's and faster by more than `NOISE`; or all points.
+
+    All points are better if the default solver has none."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:

@@ -25,7 +25,7 @@ About = dict[str, Any]
 
 
 def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
-    """The entry of a case in the index, with reasons for missing programs; and its files by name."""
+    """The entry of a case in the index, with reasons for missing programs; its files by name."""
     problem = NormalProblem.assemble(case.scene, **case.control, influence="dense")
     loads = np.array([float(digits) for digits in case.loads])
     own = loads[problem.candidates] / problem.units.force

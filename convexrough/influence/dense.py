@@ -42,10 +42,7 @@ def dense_matrix(points: Array, scale: float) -> Array:
 
 
 def entry_error(point_error: float, nearest: float) -> float:
-    """Bound on the relative error of a computed scale / r, if r is at least `nearest` [length].
-
-    point_error : [length] bound on the error of each coordinate of the points
-    """
+    """Bound on the relative error of a computed scale / r, for distances r >= `nearest`."""
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
     return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)

@@ -6,9 +6,9 @@ is the sum of [A3] and [A4] over all asperities. The mean of u over the asperiti
 difference of this mean and u.
 
 In theory u is the same at all adhered asperities. The computed values differ slightly, for two
-reasons. [A3] and [A4] spread each force over a disc, and `shear` uses point forces. Unless Poisson's
-ratio is 0, displacements decay more slowly along the shear than across it, and `shear` uses an
-average over directions. So slips differ around a ring of asperities and may be backwards.
+reasons. [A3] and [A4] spread each force over a disc, but `shear` uses point forces. And unless
+Poisson's ratio is 0, displacements decay more slowly along the shear than across it, but `shear`
+averages over directions. So slips differ around a ring of asperities and may be backwards.
 
 Nothing here is certified. Displacements and energies are for both bodies, twice the paper's.
 """

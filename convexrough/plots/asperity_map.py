@@ -216,7 +216,7 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
-    """The square about all discs (all points if there is no disc) and outlines, with a 6 % margin."""
+    """The square about the discs (or all points if there are none) and outlines, with a margin."""
     points, radii = length.of(points), length.of(radii)
     outline = [length.of(axis) for axis in smooth]
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)

@@ -1,6 +1,6 @@
 """`between`: a path with additional points, with which figures show curved loops.
 
-Figures call it only if nobody passed such a path to them, because it solves normal problems.
+Figures call it only if they are not given such a path, because it solves normal problems.
 """
 
 from __future__ import annotations

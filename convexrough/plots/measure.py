@@ -24,7 +24,7 @@ from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import parsed
 
-#: SI units by their powers of length and force; and prefixes in order of their powers of a thousand.
+#: SI units by their powers of length and force; and prefixes in ascending order.
 SYMBOLS = {(1, 0): "m", (0, 1): "N", (-2, 1): "Pa", (1, 1): "J"}
 PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 
@@ -148,9 +148,7 @@ class Scale:
 
     @cached_property
     def travel(self) -> float:
-        """[length] X0, the displacement of the smooth contact at gross sliding.
-
-        If there is no smooth contact, it is that of this contact."""
+        """[length] X0: displacement at gross sliding, of the smooth contact or else of this one."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
         scene = self.contact.scene  # X0 = c_t f times the approach from first touch

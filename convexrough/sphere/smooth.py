@@ -3,7 +3,7 @@
 The smooth sphere is the scene's sphere, pressed with the same load on a plane without asperities.
 Under the normal load this is Hertz's contact; under shear the theory of Cattaneo, Mindlin and
 Deresiewicz holds. Results are for both bodies. Source: Johnson, Contact Mechanics (1985), chapters
-4 and 7; equations 12 to 16 of Dini and Hills (2009), for displacements and losses of one body.
+4 and 7; and Dini and Hills (2009), equations 12 to 16, in which results are for one body.
 """
 
 from __future__ import annotations

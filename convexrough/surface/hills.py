@@ -49,9 +49,7 @@ def hills(heights: Array) -> Hills:
 
 
 def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]:
-    """The maxima, the tallest first; and for each pixel the number of the one above it.
-
-    Steps to the highest neighbour lead from the pixel to this maximum."""
+    """The maxima, the tallest first; and for each pixel the number of the maximum of its hill."""
     highest = ndimage.maximum_filter(ranks, size=3, mode="nearest")
     above = order[highest.ravel()]
     while (further := above[above]).size and (further != above).any():

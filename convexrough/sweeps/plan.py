@@ -27,8 +27,7 @@ TRIED = 5
 class Plan:
     """The computation of a sweep.
 
-    size     : number of scenes in a batch, which becomes a part of the table
-    manifest : the contents of manifest.json
+    size     : number of scenes in a batch or part;  manifest : the contents of manifest.json
     """
 
     source: Source

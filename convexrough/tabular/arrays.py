@@ -91,7 +91,7 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     known : names to read, in lower case; other columns are kept only if they have the same length
 
     Raises FileError if the package for such files is missing or no columns are found, OSError, and
-    the errors `SPOILED` of corrupted files.
+    the errors of corrupted files.
     """
     named = named_arrays(path)
     (first, values), *others = named.items() or [("", np.zeros(0))]
