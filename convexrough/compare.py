@@ -179,7 +179,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers, with and without a last Newton step if they offer it, and installed extras."""
+    """All solvers; those with a last Newton step also without it; SCS and QOCO if installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),

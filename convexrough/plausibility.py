@@ -41,7 +41,7 @@ STEEP = 0.2
 
 
 def limits_of(contact: Contact) -> dict[str, Any]:
-    """Measures of the validity of the model, by name; they are numbers if no unit is given.
+    """Measures of the validity of the model, by name; ratios or counts if no unit is given.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the sphere's radius

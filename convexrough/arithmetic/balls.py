@@ -209,7 +209,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """The arrays, pairs or balls that `function`, applied to each array in `values`, gives."""
+    """`function` applied to corresponding arrays of `values`: arrays, pairs or balls of one type."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)

@@ -1,7 +1,7 @@
 """Sums over pairs of arbitrary points: distant pairs by a mesh, near pairs one by one.
 
 1 / r^q is the sum of a smooth part L (`softened`) and a rest S, which is 0 for distances above the
-"reach". The part L is W G W^T: W interpolates from the nodes of a square mesh, and Fourier
+"reach". For L, the code uses W G W^T: W interpolates from the nodes of a square mesh, and Fourier
 transforms multiply by G, which has the values of L between nodes. S is a sparse matrix.
 docs/theory/operators-mesh.md derives the method and the error bounds.
 """

@@ -153,7 +153,7 @@ def _window(squares: NDArray[Any]) -> float:
 
 
 def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
-    """The factor by which two Gaussian averages G of this width [spacing] multiply each wave."""
+    """The factor by which G^2, a mean with a Gaussian of this width [spacing], multiplies waves."""
     dual = 2.0 * np.pi * np.linalg.inv(basis).T
     i, j = (np.fft.fftfreq(n) for n in size)
     i, j = i[:, None], np.abs(j[: size[1] // 2 + 1])

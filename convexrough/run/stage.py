@@ -193,7 +193,7 @@ class Result(Table, Plottable):
         return not any(self.doubts())
 
     def tables(self) -> dict[str, Columns]:
-        """The tables to write, as columns by name, by the file name without its ending."""
+        """The tables to write: for each file name without its ending, the columns by name."""
         return {self.name: columns_of(self.known)}
 
     def figures(self) -> Mapping[str, Figure]:

@@ -153,7 +153,7 @@ def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
 
 
 def _again(error: ErrorDetails) -> InitErrorDetails:
-    """The same mistake as pydantic needs it to raise several mistakes at once."""
+    """The same mistake, in the form that pydantic needs to raise several mistakes at once."""
     kind = error["type"] if error["type"] in ("told", "missing") else "expected"
     expects = "a table" if error["type"] == "model_type" else error["msg"]
     again = PydanticCustomError(kind, "{said}", {"said": expects})

@@ -123,7 +123,6 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     The crowding of a pair is (a_i + a_j) / r_ij, with contact radii a and the distance r. The most
     crowded pairs are first.
 
-
     >>> pairs, values = cr.surface.crowded(contact, above=0.5)
     >>> print(len(pairs), f"{values.max() / contact.crowding:.6g}")
     12 1

@@ -75,7 +75,7 @@ def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Ro
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
         return _failed(error, columns)
-    except KeyError as error:  # the first scene had the number: its list was longer, perhaps
+    except KeyError as error:  # a swept list may be shorter than that of the first scene
         return "failed", f"the results have no {error}", [np.nan] * len(columns)
     said = "; ".join(filter(None, (unsure, warned)))
     return ("undecided" if unsure else "certified"), said, values

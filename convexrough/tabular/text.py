@@ -204,7 +204,7 @@ def read_text_table(
 def _headed(
     rows: list[TextRow], title: str, style: Style, known: Sequence[str]
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header, or None, and the rows below; units in the line below join the names."""
+    """The header, with units if the next line has them, or None; and the rows below them."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)

@@ -28,7 +28,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: A hint calls loads up to this fraction of the largest load noise.
+#: Hints call loads "noise" if they are at most this fraction of the largest load.
 NOISE = 1e-6
 
 
