@@ -209,7 +209,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """`function` applied to corresponding arrays of `values`: arrays, pairs or balls of one type."""
+    """`function` applied to matching arrays of `values`: arrays, pairs or balls of one type."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
