@@ -28,8 +28,7 @@ class Interpolation:
     """The interpolation W from nodes to points.
 
     x, y    : (n, width) weights in each direction; a weight of W is the product of two of them
-    patches : for groups of points of one block of mesh cells: the first point, the point after the
-        last, and the first node (i, j) of the block
+    patches : of groups of points in one block: first point, point after the last, first node (i, j)
     """
 
     x: NDArray[Any]
