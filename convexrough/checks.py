@@ -1,4 +1,4 @@
-"""Checks of single values; each raises an InputError with the value found and what is expected."""
+"""Checks of arguments, which raise an InputError with the value found and what is expected."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """Base of results: `repr` has a line for each field; unpickled arrays are read-only."""
+    """Base of results; `repr` has a line for each field. Arrays stay read-only in pickles."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()

@@ -113,7 +113,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Form to remove before finding summits.")  # fmt: skip
 @click.option("--fill", is_flag=True, help="Fill holes in the map and report them.")
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
+              help="Fit each tip to a square of N by N pixels.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
               help="Remove hills less prominent than PART of the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,

@@ -38,7 +38,7 @@ class Layout(Cached):
 
     @classmethod
     def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
-        """The sites of a pattern with norms of at most `limit`, scaled to a spacing [length]."""
+        """The sites up to the squared distance `limit` [spacing^2], times a spacing [length]."""
         sites, order = pattern.within(limit)
         points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
         if len(points) < 3:
