@@ -149,18 +149,22 @@ def summits(
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
+    from convexrough.run.results import MOST_CSV_ROWS
     from convexrough.surface import read, report
 
     how = Pressing(**{name: options.pop(name) for name in Pressing._fields})
     how.check()
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
-    _claim(out, force, reads=[surface, *([how.scene] if how.scene else [])])
+    reads = [surface, *([how.scene] if how.scene else [])]
+    _claim(out, force, reads)
     with progress(f"reading {surface}"):
         scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
         with blamed_on(surface):
             scan, press = how.of(scan, lambda it: it.summits(prune, fit))
             scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
+    if len(scanned.summits) > MOST_CSV_ROWS:
+        _refuse_existing(out.with_suffix(".npz"), force, reads)
     with progress("writing"):
         files = _written(out, scanned, figures=not no_figures, formats=formats, dpi=dpi)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
@@ -176,7 +180,7 @@ def _outputs(table: Path) -> list[Path]:
         f"{stem}.{kind}" for stem in ("map", "histograms", "provability") for kind in FORMATS
     ]
     names = (f"{table.stem}-{name}" for name in ("provability.csv", *figures))
-    return [table, *map(table.with_name, names)]
+    return [table.with_name(f"{table.stem}.csv"), *map(table.with_name, names)]
 
 
 def _claim(path: Path, force: bool, reads: list[Path]) -> None:
@@ -188,11 +192,17 @@ def _claim(path: Path, force: bool, reads: list[Path]) -> None:
         raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
     if not path.parent.is_dir():
         raise FileError(f"{path}: no folder {path.parent}")
-    for each in filter(Path.exists, _outputs(path)):
-        if any(each.samefile(read) for read in reads if read.exists()):
-            raise FileError(f"{each}: is an input; --out names another file")
-        if not force:
-            raise FileError(f"{each}: exists already; --force replaces it, --out names another")
+    for each in _outputs(path):
+        _refuse_existing(each, force, reads)
+
+
+def _refuse_existing(path: Path, force: bool, reads: list[Path]) -> None:
+    if not path.exists():
+        return
+    if any(path.samefile(read) for read in reads if read.exists()):
+        raise FileError(f"{path}: is an input; --out names another file")
+    if not force:
+        raise FileError(f"{path}: exists already; --force replaces it, --out names another")
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:

@@ -214,10 +214,11 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     """Balls of the loads; where a load is inexact, (indentation / k)^(3/2) if that is smaller."""
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
-    return elementwise(_smaller, loads, indentation, problem.exact.coefficients)
+    return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
 
 
-def _smaller(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
+def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
+    """The loads P, or (n / k)^(3/2) where P is inexact and that ball is smaller."""
     ratio = Ball(n, dn) / Ball(k, dk)
     by_law = ratio.positive_part() * ratio.sqrt()
     better = (dP > POOR * P.high) & (by_law.radius < dP)

@@ -174,6 +174,19 @@ def test_inputs_and_files_beside_the_table_are_kept(command: Any) -> None:
 
 
 @pytest.mark.usefixtures("surface")
+def test_a_long_table_keeps_the_map(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is written as .npz, the name of the map here; the ending of a table may be in capitals."""
+    assert command("summits", "scan.npz", "--out", "table.CSV", "--no-figures").status == 0
+    assert Path("table.csv").exists()
+    before = Path("scan.npz").read_bytes()
+    monkeypatch.setattr("convexrough.run.results.MOST_CSV_ROWS", 3)
+    outcome = command("summits", "scan.npz", "--out", "scan.csv", "--no-figures", "--force")
+    assert outcome.status == 2
+    assert "scan.npz: is an input; --out names another file" in outcome.err
+    assert Path("scan.npz").read_bytes() == before
+
+
+@pytest.mark.usefixtures("surface")
 def test_nothing_is_overwritten_unasked(command: Any) -> None:
     Path("summits.csv").write_text("mine")
     outcome = command("summits", "scan.npz")
