@@ -85,8 +85,7 @@ def solve(
         raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
-        radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
-        bends = np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
+        bends = _curvatures(sphere_radius)
         modulus = arb(float(contact_modulus))
         control, tips = arb(approach if load is None else load), exact(tip_radii)
         points, descents = _contact_points(exact(positions), tips, bends, geometry)
@@ -237,9 +236,9 @@ def _terms(
     scene: Any, loads: Sequence[arb], rows: Iterable[int]
 ) -> Iterator[tuple[arb, arb, arb, arb]]:
     """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
-    modulus, bend = arb(float(scene.material.contact_modulus)), 1 / arb(float(scene.sphere_radius))
+    modulus, bends = arb(float(scene.material.contact_modulus)), _curvatures(scene.sphere_radius)
     tips, heights = exact(scene.asperities.tip_radii), exact(scene.asperities.heights)
-    positions, bends = exact(scene.asperities.positions), np.array([bend, bend])
+    positions, bend = exact(scene.asperities.positions), bends.sum() / 2
     points, descents = _contact_points(positions, tips, bends, scene.geometry)
     for i in rows:
         law = (9 * (bend + 1 / tips[i]) / (16 * modulus**2)).root(3)
@@ -263,6 +262,12 @@ def relative_errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArra
                 for v, r in _pairs(values, reference)
             ]
         )
+
+
+def _curvatures(sphere_radius: float | tuple[float, float]) -> Balls:
+    """1 / Rx and 1 / Ry."""
+    radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
+    return np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
 
 
 def _contact_points(

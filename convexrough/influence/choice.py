@@ -48,9 +48,10 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         layout, lattice = scene.asperities.layout, scene.lattice
         return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
     if kind == "lattice":
-        raise InputError(
-            "influence", found="lattice", expected="asperities on a two-dimensional lattice"
-        )
+        expected = "contact points on a two-dimensional lattice"
+        if scene.asperities.lattice is not None:
+            expected += ': equal tip radii, geometry "summit", or influence "scattered"'
+        raise InputError("influence", found="lattice", expected=expected)
     if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error, tails)
     return ScatteredInfluence(points, scale, error, tails)

@@ -285,7 +285,7 @@ def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
         distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
         # On a reduced basis every difference beyond the square is longer than this.
         whole = reach >= max(rows, columns) - 1
-        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis[0]))
+        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis.T).min())
         order = np.argsort(distances)
         for k in order[(distances[order] > done) & (distances[order] <= sure)]:
             yield float(distances[k]), int(i[k]), int(j[k])

@@ -69,7 +69,7 @@ class LatticeInfluence:
     array       : (N, 2) [length] points; each coordinate has an error of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
     layout      : the exact positions of the summits; `array` contains them times `lattice.shrink`,
-        rounded. `shrink` is 1 in the geometry "summit", and R / (R + tip radius) in "closest"
+        rounded: 1 in the geometry "summit"; in "closest", R / (R + tip radius) along x and y
     lattice     : the lattice of the points
     scale       : 1 / (pi E*), which is A_ij r_ij
     """
@@ -314,10 +314,10 @@ class LatticeInfluence:
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
         x, y, unknown = self.layout.cached(off_sites)
-        shrunk = float(self.lattice.shrink)
-        x, y = (shrunk / self.spacing * each[self.members] for each in (x, y))
+        shrunk = [float(factor) / self.spacing for factor in self.lattice.shrink]
+        x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
         most = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)
-        unknown = shrunk / self.spacing * unknown + 4 * ROUNDOFF * most
+        unknown = max(shrunk) * unknown + 4 * ROUNDOFF * most
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return np.zeros(len(self)), 0.0

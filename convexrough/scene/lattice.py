@@ -35,27 +35,34 @@ class Lattice(Cached):
 
     origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2: a reduced (shortest) basis
     site_error : [length] bound on the distance of points from their sites along x and along y
-    shrink, unshrunk : factors of the exact basis if `shrunk` made this lattice; else 1 and None
+    shrink, unshrunk : if `shrunk` made this lattice, the factors along x and y and the basis before;
+        else 1, 1 and None
     """
 
     origin: Array
     basis: Array
     site_error: float
-    shrink: Fraction = Fraction(1)
+    shrink: tuple[Fraction, Fraction] = (Fraction(1), Fraction(1))
     unshrunk: Array | None = None
 
-    def shrunk(self, factor: Fraction) -> Lattice:
-        """The lattice of the points times `factor`; `site_error` includes the rounding errors."""
+    def shrunk(self, along_x: Fraction, along_y: Fraction) -> Lattice | None:
+        """The lattice of the points times these factors of at most 1; None if `basis` is not
+        reduced any more. `site_error` includes the rounding errors.
+        """
         assert self.unshrunk is None
-        times = float(factor)
-        site_error = 2.0 * times * self.site_error
-        return Lattice(times * self.origin, times * self.basis, site_error, factor, self.basis)
+        times = np.array([float(along_x), float(along_y)])
+        basis = times * self.basis
+        a, b = basis
+        if 2.0 * abs(a @ b) > min(a @ a, b @ b) * (1.0 + 1e-9):
+            return None
+        site_error = 2.0 * float(times.max()) * self.site_error
+        return Lattice(times * self.origin, basis, site_error, (along_x, along_y), self.basis)
 
     @property
     def exactly(self) -> list[list[Fraction]]:
         """The rows b1 and b2 of the exact basis, as fractions."""
         given = self.basis if self.unshrunk is None else self.unshrunk
-        return [[self.shrink * Fraction(x) for x in row] for row in given.tolist()]
+        return [[t * Fraction(x) for t, x in zip(self.shrink, row, strict=True)] for row in given]
 
     @property
     def spacing(self) -> float:

@@ -143,10 +143,13 @@ class Scene(Record):
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
-        if (radii != radii[0]).any() or not isinstance(self.sphere_radius, float):
+        if (radii != radii[0]).any():
             return None
-        radius = Fraction(self.sphere_radius)
-        return lattice.shrunk(radius / (radius + Fraction(float(radii[0]))))
+        tip, shrink = Fraction(float(radii[0])), [Fraction(1), Fraction(1)]
+        for R, axes in self.curved:
+            radius = Fraction(R)
+            shrink[axes] = [radius / (radius + tip)] * len(shrink[axes])
+        return lattice.shrunk(*shrink)
 
     @property
     def point_error(self) -> float:

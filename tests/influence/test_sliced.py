@@ -162,9 +162,11 @@ def test_points_are_where_they_are(seed: int, slices: int) -> None:
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize(
+    ("geometry", "R"), [("summit", 1.0), ("closest", 1.0), ("closest", (0.3, np.inf))]
+)
 @pytest.mark.parametrize("shift", [0.0, 0.3e-3, None])
-def test_the_sharp_residual(geometry: Any, shift: float | None) -> None:
+def test_the_sharp_residual(geometry: Any, R: Any, shift: float | None) -> None:
     """Gaps of loads, whatever these are, in ball arithmetic: within what is said of them."""
     rng = np.random.default_rng(4)
     if shift is None:  # exactly on their sites
@@ -173,7 +175,7 @@ def test_the_sharp_residual(geometry: Any, shift: float | None) -> None:
         lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     heights = 1e-6 * rng.standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
-    scene = cr.Scene(1.0, asperities, cr.Material(0.7, 0.3), geometry=geometry)
+    scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)
     contact = cr.press(scene, approach=5e-5)
     for control in ({"approach": 5e-5}, {"load": contact.load}):
         problem = NormalProblem.assemble(scene, influence="lattice", **control)
