@@ -150,10 +150,12 @@ def _arrays(path: Path) -> HeightGrid:
         return HeightGrid(_numbers(found[""]))
     named = {name.lower(): values for name, values in found.items()} | found
     maps = [name for name in found if named[name].ndim == 2 and name.lower() not in ("x", "y")]
-    chosen = next((name for name in HEIGHTS if name in named), maps[0] if len(maps) == 1 else None)
-    if chosen is None:
-        names = ", ".join(found) or "none"
+    likely = [name for name in found if name.lower() in HEIGHTS] or maps
+    likely = ["heights"] if "heights" in likely else likely
+    if len(likely) != 1:
+        names = ", ".join(likely or found) or "none"
         raise InputError("arrays", found=names, expected='one called "heights"', where=str(path))
+    chosen = likely[0]
     masks = [name for name in found if name.lower() in ("mask", "valid")]
     if masks and found[masks[0]].shape == named[chosen].shape:
         expected = "none: nan in the heights where they are not valid"

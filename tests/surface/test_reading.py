@@ -51,6 +51,9 @@ def test_arrays(tmp_path: Path) -> None:
         raw(tmp_path / "x.npz")
     np.savez(tmp_path / "b.npz", whatever=HEIGHTS.astype(np.float32), other=np.zeros(3))
     assert_array_equal(raw(tmp_path / "b.npz", pixel=1.0).heights, HEIGHTS.astype(np.float32))
+    np.savez(tmp_path / "two.npz", height=HEIGHTS, z=2 * HEIGHTS, pixel=1.0)
+    with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
+        raw(tmp_path / "two.npz")
     np.save(tmp_path / "i.npy", (100 * HEIGHTS).astype(np.int16))
     assert raw(tmp_path / "i.npy", pixel=50.0).heights.dtype == np.float64
 
