@@ -13,6 +13,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.tabular.table import COLUMNS, Reading, matrix, read_table
 from convexrough.tabular.text import COMMENT, TextTable, read_text_table
+from convexrough.tabular.units import parsed
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
@@ -28,12 +29,15 @@ class HeightGrid(NamedTuple):
 
     pixel : size along x and y; None if not stated
     unit, height_unit : units of the pixel and of the heights; "" if not stated
+    unclear : the first comment that states a length or a unit of length, but not in words that
+        `read_grid` knows; "" if there is none
     """
 
     heights: Array
     pixel: tuple[float, float] | None = None
     unit: str = ""
     height_unit: str = ""
+    unclear: str = ""
 
 
 def read_grid(path: Path) -> HeightGrid:
@@ -46,6 +50,19 @@ def read_grid(path: Path) -> HeightGrid:
     map.
     """
     table = read_text_table(path, ("x", "y", "height", *COLUMNS["height"].also), _COMMENT)
+    return _map(path, table)._replace(unclear=next(filter(_unclear, table.comments), ""))
+
+
+def _unclear(comment: str) -> bool:
+    """True for a comment such as "# Breite: 50 µm", "# z unit: nm" or "# Pixel size = 0.5"."""
+    key, marked, value = comment.replace("=", ":").rpartition(":")
+    length = _LENGTH.fullmatch(value.strip())
+    unit = parsed(length[2] if length else value.strip())
+    stated = unit is not None and unit.kind == "length" or length and "pixel" in key.lower()
+    return bool(marked and stated and not _SAID.fullmatch(comment))
+
+
+def _map(path: Path, table: TextTable) -> HeightGrid:
     width = len(table.rows[0].cells) if table.rows else 0
     if table.header is None and width != 3:
         heights = matrix(path, table)
@@ -124,8 +141,11 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
     if heights.size > 4 * len(z) + 100:
         found = f"{len(z):,} points of a grid of {heights.size:,}"
         raise InputError("x, y", found=found, expected="a regular grid", where=str(path))
-    if len(np.unique(row * heights.shape[1] + column)) < len(z):
-        raise InputError("x, y", found="a point twice", expected="each once", where=str(path))
+    once, count = np.unique(row * heights.shape[1] + column, return_counts=True)
+    if len(once) < len(z):
+        k = int(np.argmax((row * heights.shape[1] + column) == once[np.argmax(count)]))
+        found = f"the point {x[k]:g}, {y[k]:g} {count.max()} times"
+        raise InputError("x, y", found=found, expected="each point once", where=str(path))
     heights[row, column] = z
     return HeightGrid(heights, (dx, dy), units[0], units[2])
 

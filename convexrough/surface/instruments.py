@@ -29,6 +29,9 @@ def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> He
     path.open("rb").close()  # raises the usual error for a missing file
     try:
         with open_topography(str(path)) as reader:
+            if not reader.channels:
+                expected = "a map of heights; export it as text, for example"
+                raise InputError("file", found="no heights", expected=expected, where=str(path))
             channel = reader.default_channel
             given: dict[str, Any] = {}
             if channel.physical_sizes is None and pixel is not None:
@@ -37,7 +40,9 @@ def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> He
                 given["physical_sizes"] = tuple(count * size for count, size in counts)
             topography = reader.topography(**given)
     except ReadFileError as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        if reason.startswith("tried"):  # each of its formats, with an error for each
+            reason = "it is in none of its formats; export the map as text, for example"
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     if topography.dim != 2:
         raise InputError("file", found="a line scan", expected="a map", where=str(path))

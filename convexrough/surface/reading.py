@@ -70,6 +70,10 @@ def read(
     """
     with blamed_on(path, unless_known=True):
         grid = _grid(Path(path), pixel)
+        if grid.unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
+            expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm", or all three options'
+            expected += " --pixel, --unit, --height-unit, if the file is right without this line"
+            raise InputError("comments", found=grid.unclear.strip(), expected=expected)
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)
         if upwards and not length:

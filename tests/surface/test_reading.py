@@ -169,6 +169,9 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         ("# Width: 9 by 9 µm\n# Height: 7 µm\n" + matrix(), {}, "units: found by 9 µm and µm"),
         ("# Height: 7 µm\n" + matrix(), {"pixel": 1.0, "unit": "mm"}, "comments: found only a hei"),
         ("# Width: 9 m\n# Height: 7 m\n" + matrix(), {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
+        ("# Breite: 9 mm\n# Werte: nm\n" + matrix(), {}, "comments: found # Breite: 9 mm, exp"),
+        ("# z unit: nm\n" + matrix(), {"pixel": 1.0, "unit": "mm"}, "comments: found # z unit"),
+        ("# Pixel = 0.5\n" + matrix(), {"pixel": 1.0}, "comments: found # Pixel = 0.5"),
         ("# Value units: V\n" + matrix(), {"pixel": 1.0, "unit": "m"}, "height_unit: found 'V'"),
         (
             matrix().replace("\n", "\nx", 1),
@@ -184,7 +187,7 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         (
             "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
             {},
-            "x, y: found a point twice, expected each",
+            "x, y: found the point 1, 1 2 times, expected each",
         ),
         ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
