@@ -73,7 +73,7 @@ def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
         found = f"{values.mask.sum()} masked values"
         raise InputError(what, found=found, expected=f"{expected} without gaps")
     try:
-        if np.asarray(values).dtype.kind not in "iufO":
+        if np.asarray(values).dtype.kind not in "biufO":
             raise TypeError("no real numbers")
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

@@ -163,23 +163,24 @@ class Cycle(Table, Plottable):
         solutions for each interval. Their errors are about 0.1 %; the proved bounds on these errors
         are some per cent.
         """
-        return frozen(self.partial_slip_losses + self.sliding_losses)
+        return self._shares[2]
 
     @property
     def asperity_loss_errors(self) -> Array:
         """(n,) [force length] proved bounds on the errors of `asperity_losses`."""
-        return self._shares[2]
+        return self._shares[3]
 
     @cached_property
-    def _shares(self) -> tuple[Array, Array, Array]:
+    def _shares(self) -> tuple[Array, Array, Array, Array]:
         levels, n = self.contact.cached(FrictionLevels), len(self.scene)
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
-            return unknown, unknown, frozen(np.full(n, np.inf))
+            return unknown, unknown, unknown, frozen(np.full(n, np.inf))
         slip, slide = shared(levels, self._walk.later, CELLS)
-        partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
+        both = slip + slide
+        values = [frozen(levels.to_scene(each.value)) for each in (slip, slide, both)]
         uncertainty = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + uncertainty)
+        return *values, frozen(levels.to_scene(both.error) + uncertainty)
 
     @cached_property
     def _walk(self) -> _Closed:

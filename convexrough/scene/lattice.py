@@ -35,8 +35,8 @@ class Lattice(Cached):
 
     origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2: a reduced (shortest) basis
     site_error : [length] bound on the distance of points from their sites along x and along y
-    shrink, unshrunk : if `shrunk` made this lattice, the factors along x and y and the basis before;
-        else 1, 1 and None
+    shrink, unshrunk : if `shrunk` made this lattice, the factors along x and y, and the basis
+        before; else 1, 1 and None
     """
 
     origin: Array

@@ -58,7 +58,7 @@ def _unclear(comment: str) -> bool:
     key, marked, value = comment.replace("=", ":").rpartition(":")
     length = _LENGTH.fullmatch(value.strip())
     unit = parsed(length[2] if length else value.strip())
-    stated = unit is not None and unit.kind == "length" or length and "pixel" in key.lower()
+    stated = unit.kind == "length" if unit else length and "pixel" in key.lower()
     return bool(marked and stated and not _SAID.fullmatch(comment))
 
 

@@ -97,7 +97,8 @@ class Verdict(Claim, Table, Plottable):
     def errors_alone(self) -> Array:
         """(n,) [force] error bounds of `certificate`, plus the sizes of loads that count as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
-        return frozen(self.certificate.load_errors + ignored)
+        errors = self.certificate.load_errors + ignored
+        return frozen(np.where(ignored > 0, np.nextafter(errors, np.inf), errors))
 
     def nearby(self) -> tuple[Array, Array] | None:
         """(n,), (n,) [force] the loads of `solution` and their error bounds; None without one."""

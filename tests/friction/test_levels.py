@@ -50,6 +50,7 @@ def test_states_and_cycles(name: str, holding: Any, fraction: float) -> None:
         assert_known(moved, cycle.displacement_error, true.displacement, BOUND)
         shares = off(cycle.asperity_losses, true.energies)
         assert shares.max() <= 8 * ULP * cycle.asperity_losses.max()
+        assert (shares <= cycle.asperity_loss_errors).all()
         assert_known(
             cycle.slips, cycle.slip_errors, 2 * true.slips, BOUND
         ) if true.slips.any() else None
