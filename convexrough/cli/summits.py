@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from convexrough.cli.options import FORMATS, PATH, figure_options, json_option
+from convexrough.cli.options import PATH, figure_options, output_options
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
@@ -19,7 +19,7 @@ from convexrough.cli.speech import (
     say_aside,
     written,
 )
-from convexrough.errors import FileError, InputError, blamed_on
+from convexrough.errors import InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
@@ -118,15 +118,11 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Remove hills less prominent than PART of the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
-@click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
-              help="Table of summits to write; figures go to the same folder.")  # fmt: skip
-@click.option("--no-figures", is_flag=True, help="Do not write figures.")
 @figure_options
-@click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
-@json_option
+@output_options
 def summits(
     surface: Path,
-    out: Path,
+    out: Path | None,
     prune: float,
     fit: int,
     detrend: Any,
@@ -145,86 +141,50 @@ def summits(
     the map: give --scene; or --radius and --approach; or --radius, --load and --modulus. It then
     reports contacts, certificate, crowding and model error for several values of --prune, and
     recommends one of these values. With --whole it also presses every pixel at the same approach,
-    for comparison.
+    for comparison. It writes summits.csv, a summary and figures. Results of a.npz go to the folder
+    a-summits unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
-    from convexrough.run.results import MOST_CSV_ROWS
+    from convexrough.run.results import results_folder
     from convexrough.surface import read, report
 
     how = Pressing(**{name: options.pop(name) for name in Pressing._fields})
     how.check()
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
+    folder = out or Path(f"{surface.stem}-summits")
     reads = [surface, *([how.scene] if how.scene else [])]
-    _claim(out, force, reads)
-    with progress(f"reading {surface}"):
-        scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
-        with blamed_on(surface):
-            scan, press = how.of(scan, lambda it: it.summits(prune, fit))
-            scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
-    if len(scanned.summits) > MOST_CSV_ROWS:
-        _refuse_existing(out.with_suffix(".npz"), force, reads)
-    with progress("writing"):
-        files = _written(out, scanned, figures=not no_figures, formats=formats, dpi=dpi)
-    lines = [*report.describe_surface(scanned), *written(out.parent, files)]
+    with results_folder(folder, force=force, reads=reads) as new:
+        with progress(f"reading {surface}"):
+            scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
+            with blamed_on(surface):
+                scan, press = how.of(scan, lambda it: it.summits(prune, fit))
+                scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
+        with progress("writing"):
+            files = _written(new, scanned, figures=not no_figures, formats=formats, dpi=dpi)
+    lines = [*report.describe_surface(scanned), *written(folder, files)]
     echo(report.surface_summary(scanned), lines, as_json, report.warnings_about(scanned))
     if scanned.curve is None:
         say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
     return DONE if scanned.certified else NOT_CERTIFIED
 
 
-def _outputs(table: Path) -> list[Path]:
-    """The table of summits and all files that a run may write beside it."""
-    figures = [
-        f"{stem}.{kind}" for stem in ("map", "histograms", "provability") for kind in FORMATS
-    ]
-    names = (f"{table.stem}-{name}" for name in ("provability.csv", *figures))
-    return [table.with_name(f"{table.stem}.csv"), *map(table.with_name, names)]
+def _written(folder: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
+    """Write the table of summits, the results against pruning, summary and figures; the paths."""
+    from convexrough.run.results import write_figures, write_json, write_tables
+    from convexrough.surface.report import curve_columns, summit_columns, surface_summary
 
-
-def _claim(path: Path, force: bool, reads: list[Path]) -> None:
-    """Raise FileError unless the table and the files beside it may be replaced or written.
-
-    reads : input files, which must not be replaced
-    """
-    if path.suffix.lower() != ".csv":
-        raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: no folder {path.parent}")
-    for each in _outputs(path):
-        _refuse_existing(each, force, reads)
-
-
-def _refuse_existing(path: Path, force: bool, reads: list[Path]) -> None:
-    if not path.exists():
-        return
-    if any(path.samefile(read) for read in reads if read.exists()):
-        raise FileError(f"{path}: is an input; --out names another file")
-    if not force:
-        raise FileError(f"{path}: exists already; --force replaces it, --out names another")
-
-
-def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """Write the table of summits, the results against pruning and the figures; return paths.
-
-    Other files of an earlier run are removed.
-    """
-    from convexrough.run.results import write_figures, write_tables
-    from convexrough.surface.report import curve_columns, summit_columns
-
-    tables = {path.stem: summit_columns(scanned.summits)}
+    tables = {"summits": summit_columns(scanned.summits)}
     if scanned.curve is not None:
-        tables[f"{path.stem}-provability"] = curve_columns(scanned.curve)
-    files = write_tables(path.parent, tables)
+        tables["provability"] = curve_columns(scanned.curve)
+    files = write_tables(folder, tables)
+    files.append(write_json(folder / "summary.json", surface_summary(scanned)))
     if figures:
         from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
 
         pictures = surface_figures(
             scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
         )
-        named = {f"{path.stem}-{stem}": figure for stem, figure in pictures.items()}
-        files += write_figures(path.parent, named, **saved)
-    for each in set(_outputs(path)) - set(files):
-        each.unlink(missing_ok=True)
+        files += write_figures(folder, pictures, **saved)
     return files

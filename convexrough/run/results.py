@@ -12,7 +12,7 @@ import os
 import platform
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,6 +52,7 @@ def results_folder(
     Raises FileError, before the body runs, if `folder` cannot be written or replaced.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
+    parents = [each for each in folder.parents if not each.exists()]
     with file_errors(folder, "hold results"):
         folder.parent.mkdir(parents=True, exist_ok=True)
         remove_unfinished(folder if folder.is_dir() else folder.parent)
@@ -71,6 +72,9 @@ def results_folder(
             _moved(new, folder)
         finally:
             shutil.rmtree(new, ignore_errors=True)
+            for each in parents:
+                with suppress(OSError):  # it holds results
+                    each.rmdir()
 
 
 def _moved(new: Path, folder: Path) -> None:

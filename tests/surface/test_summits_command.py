@@ -19,7 +19,7 @@ contact_modulus = {modulus}
 poisson_ratio = 0.3
 [asperities]
 pattern = "file"
-path = "summits.csv"
+path = "scan-summits/summits.csv"
 geometry = "closest"
 [normal]
 load = {load}
@@ -51,9 +51,9 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--no-figures")
     assert outcome.status == 0
     assert outcome.err.startswith("convexrough: hint: use --scene or --radius to press")
-    assert outcome.out.endswith("\nwritten here: summits.csv\n")
+    assert outcome.out.endswith("\nwritten to scan-summits: summits.csv, summary.json\n")
     summits = cr.surface.read("scan.npz").summits()
-    table = rows("summits.csv")
+    table = rows("scan-summits/summits.csv")
     assert len(table) == len(summits)
     for name, values in (("x", summits.x), ("y", summits.y), ("height", summits.heights),
                          ("tip_radius", summits.tip_radii), ("deviation", summits.deviations),
@@ -91,7 +91,8 @@ def test_pressed_as_a_scene_says(command: Any) -> None:
     trusted = [row["trusted"] for row in found["provability"] if row["prune"] >= first]
     assert trusted
     assert all(trusted)
-    assert rows("summits-provability.csv")[0]["prune"] == "0.0"
+    assert rows("scan-summits/provability.csv")[0]["prune"] == "0.0"
+    assert json.loads(Path("scan-summits/summary.json").read_text()) == found
     said = command("summits", "scan.npz", "--radius", "1e4", "--load", "100", "--modulus", "1",
                    "--json", "--no-figures", "--force")  # fmt: skip
     assert json.loads(said.out) == found
@@ -104,10 +105,10 @@ def test_a_scene_in_another_unit(command: Any) -> None:
     Path("metres.toml").write_text(text)
     options = ("--json", "--no-figures", "--force")
     one = json.loads(command("summits", "scan.npz", "--scene", "scene.toml", *options).out)
-    small = [float(row["tip_radius"]) for row in rows("summits.csv")]
+    small = [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")]
     other = json.loads(command("summits", "scan.npz", "--scene", "metres.toml", *options).out)
     assert_allclose(
-        [float(row["tip_radius"]) for row in rows("summits.csv")], np.array(small) / 1e6
+        [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")], np.array(small) / 1e6
     )
     assert other["surface"]["unit"] == "m"
     for first, second in zip(one["provability"], other["provability"], strict=True):
@@ -142,62 +143,39 @@ def test_not_certified_is_exit_status_three(
     outcome = command("summits", "scan.npz", "--prune", "0", "--radius", "1e4", "--approach", "3",
                       "--detrend", "none", "--no-figures")  # fmt: skip
     assert outcome.status == 3
-    assert Path("summits.csv").exists()
+    assert Path("scan-summits/summits.csv").exists()
     assert " none " in outcome.out
     assert "cannot be trusted" in outcome.err
 
 
 @pytest.mark.usefixtures("surface")
-def test_inputs_and_files_beside_the_table_are_kept(command: Any) -> None:
-    Path("scan.csv").write_text("1,2,1\n2,3,2\n1,2,1\n")
-    for out, kept in (
-        ("scan.csv", "scan.csv: is an input; --out names another file"),
-        ("link.csv", "link.csv: is an input"),
-    ):
-        if out == "link.csv":
-            Path(out).symlink_to("scan.csv")
-        outcome = command("summits", "scan.csv", "--pixel", "1", "--out", out, "--force")
-        assert outcome.status == 2
-        assert kept in outcome.err
-    for name in ("mine-map.pdf", "mine-provability.csv"):
-        Path(name).write_text("mine")
-        outcome = command("summits", "scan.npz", "--out", "mine.csv", "--formats", "png,pdf")
-        assert outcome.status == 2
-        assert f"{name}: exists already; --force replaces it" in outcome.err
-        assert (
-            command("summits", "scan.npz", "--out", "mine.csv", "--no-figures", "--force").status
-            == 0
-        )
-        assert not Path(name).exists()
-        Path("mine.csv").unlink()
-    assert Path("scan.csv").read_text().startswith("1,2,1")
+def test_files_of_others_are_kept(command: Any) -> None:
+    """Only the files of an earlier run are replaced; a folder with an input is refused."""
+    Path("mine").mkdir()
+    for name in ("map.pdf", "provability.csv", "scan.npz"):
+        Path("mine", name).write_text("mine")
+    options = ("--out", "mine", "--formats", "png,pdf")
+    outcome = command("summits", "scan.npz", *options)
+    assert outcome.status == 2
+    assert "mine: not empty; --force replaces its results; or name another folder" in outcome.err
+    assert sorted(path.name for path in Path().iterdir()) == ["mine", "scan.npz", "scene.toml"]
+    assert command("summits", "scan.npz", "--out", "mine", "--no-figures", "--force").status == 0
+    assert Path("mine/map.pdf").read_text() == Path("mine/scan.npz").read_text() == "mine"
+    assert command("summits", "scan.npz", *options, "--force").status == 0
+    assert command("summits", "scan.npz", "--out", "mine", "--no-figures", "--force").status == 0
+    assert {path.name for path in Path("mine").iterdir()} == {
+        *("files.json", "provability.csv", "scan.npz", "summary.json", "summits.csv")
+    }
+    refused = command("summits", "scan.npz", "--out", ".", "--force")
+    assert refused.status == 2
+    assert "holds scan.npz, an input; name another folder" in refused.err
 
 
 @pytest.mark.usefixtures("surface")
-def test_a_long_table_keeps_the_map(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is written as .npz, the name of the map here; the ending of a table may be in capitals."""
-    assert command("summits", "scan.npz", "--out", "table.CSV", "--no-figures").status == 0
-    assert Path("table.csv").exists()
-    before = Path("scan.npz").read_bytes()
+def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("convexrough.run.results.MOST_CSV_ROWS", 3)
-    outcome = command("summits", "scan.npz", "--out", "scan.csv", "--no-figures", "--force")
-    assert outcome.status == 2
-    assert "scan.npz: is an input; --out names another file" in outcome.err
-    assert Path("scan.npz").read_bytes() == before
-
-
-@pytest.mark.usefixtures("surface")
-def test_nothing_is_overwritten_unasked(command: Any) -> None:
-    Path("summits.csv").write_text("mine")
-    outcome = command("summits", "scan.npz")
-    assert outcome.status == 2
-    assert "summits.csv: exists already; --force replaces it, --out names another" in outcome.err
-    assert Path("summits.csv").read_text() == "mine"
-    assert sorted(path.name for path in Path().iterdir()) == [
-        "scan.npz",
-        "scene.toml",
-        "summits.csv",
-    ]
+    assert "summits.npz" in command("summits", "scan.npz", "--no-figures").out
+    assert len(np.load("scan-summits/summits.npz")["height [µm]"]) > 3
 
 
 @pytest.mark.sample(8)
@@ -211,8 +189,7 @@ def test_nothing_is_overwritten_unasked(command: Any) -> None:
         (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),
         (("bare.npy", "--pixel", "1", "--fit", "4"), "fit: found 4, expected an odd number"),
         (("bare.npy", "--pixel", "1", "--prune", "5"), "prune: found 5.0, expected a number"),
-        (("bare.npy", "--pixel", "1", "--out", "a.txt"), "a.txt: found .txt, expected .csv"),
-        (("bare.npy", "--pixel", "1", "--out", "no/a.csv"), "no/a.csv: no folder no"),
+        (("plane.npy", "--pixel", "1", "--out", "no/a"), "heights: found nothing but a plane"),
         (("holes.npy", "--pixel", "1"), "found 3 holes (nan) in 1,200 pixels"),
         (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
         (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
