@@ -20,7 +20,8 @@ def bench(
     """Measure time and error of solvers for many scene sizes.
 
     Results go to the folder bench-results unless --out names another. With --page, the command also
-    replaces the text between the markers of the page FILE, and the figures in the folder of FILE.
+    replaces the text of the page FILE between the markers "bench: begin" and "bench: end", and the
+    figures of the page in the folder "figures" next to FILE.
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite

@@ -28,19 +28,26 @@ from convexrough.errors import FileError, blamed_on
     show_default=True,
     help="Largest difference allowed, as a fraction of the largest load.",
 )
-@click.option("--log", metavar="FILE", type=PATH, help="Write each iteration to a CSV file.")
+@click.option(
+    "--log",
+    metavar="FILE",
+    type=PATH,
+    help="Write the iterations of Newton's method and Clarabel to a CSV file.",
+)
 @json_option
 def compare(
     scene: Path, solvers: tuple[str, ...], within: float, log: Path | None, as_json: bool
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
-    If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
+    SCS and QOCO also solve the cone program if they are installed. With --solver, only the named
     solvers are compared with Newton's method.
 
-    The exit status is 3 if no result is certified, if a load differs from Newton's by more than
-    --within, if a solver does not support the scene, or if two certified results contradict each
-    other, which would reveal a mistake in the mathematics or the code.
+    Exit status: 0 if all results agree; 2 wrong input; 3 if no result is certified, if a load
+    differs from Newton's by more than --within, if a solver does not accept the scene, or if a
+    certified result contradicts another that is proved to be the only solution; 4 if a solver
+    failed and there is no contradiction. A contradiction would reveal a mistake in the mathematics
+    or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -15,7 +15,7 @@ from convexrough.errors import blamed_on
 @click.command()
 @click.argument("scene", type=PATH)
 @click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
-              multiple=True, help="Only this format; may be repeated.")  # fmt: skip
+              multiple=True, help="Write only this format; may be repeated.")  # fmt: skip
 @click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
               help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
               )  # fmt: skip
@@ -31,7 +31,7 @@ def export(
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
     contact law, and its dual, which bounds the energy from below. The format mps and a second npz
     (qpsolvers) contain the quadratic program of bristles (springs that together follow Hertz's
-    law). index.json gives the minimum, and how to convert a solution to loads.
+    law). index.json gives the minimum of each program, and how to convert a solution to loads.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

@@ -24,7 +24,7 @@ solver_option = click.option(
 html_option = click.option(
     "--html",
     is_flag=True,
-    help="Write slider.html, an interactive page (for a sphere with friction).",
+    help="Also write slider.html, an interactive page.",
 )
 force_option = click.option(
     "--force", is_flag=True, help="Overwrite the results of an earlier run."

@@ -23,7 +23,10 @@ def paper(
     formats: tuple[str, ...],
     dpi: int,
 ) -> int:
-    """Reproduce the example of Dini and Hills (2009)."""
+    """Reproduce the example of Dini and Hills (2009).
+
+    Tables and figures go to the folder paper-results unless --out names another.
+    """
     from convexrough.atomic import write_text
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data

@@ -38,8 +38,9 @@ def run(
 ) -> int:
     """Compute a scene; write tables, certificate and figures.
 
-    Results of a.toml go to the folder a-results unless --out names another. If the file has a table
-    [sweep], the command does the same as `convexrough sweep`.
+    Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
+    with a sphere and friction. If the file has a table [sweep], the command does the same as
+    `convexrough sweep`.
     """
     from convexrough import checks
     from convexrough.run.results import origin, results_folder, slider_page, write_results
@@ -85,7 +86,7 @@ def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: 
     from convexrough.cli.sweep import sweep as command
 
     if given:
-        raise click.UsageError("--proof and --html are of one scene, not of a sweep.")
+        raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
     options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json, force=force)
     status: int = click.get_current_context().invoke(command, **options)
     return status
@@ -100,7 +101,10 @@ def _proved(results: list[Result]) -> Proof | None:
 @click.command()
 @click.argument("scene", type=PATH)
 def new(scene: Path) -> int:
-    """Write an example of a scene file, with comments."""
+    """Write an example of a scene file, with comments.
+
+    SCENE is the name of the new file; a file of this name must not exist.
+    """
     from importlib.resources import files
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")

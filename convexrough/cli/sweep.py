@@ -39,7 +39,9 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
 @json_option
-@click.option("--part", metavar="K/N", callback=_part, help="Compute the K-th of N sets of scenes.")
+@click.option(
+    "--part", metavar="K/N", callback=_part, help="Compute the K-th of N shares of the scenes."
+)
 @force_option
 @click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
 @click.option(
@@ -70,9 +72,10 @@ def sweep(
     another. With --summary DIR in place of SWEEP the command computes no scenes, but prints
     quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
-    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or
-    workers died twice while computing the same scenes; 130 interrupted. Completed parts are kept,
-    and --resume continues.
+    Exit status: 0 if all rows of the table are certified; 2 wrong input; 3 if a row is undecided; 4
+    if a scene failed, or if workers died twice while computing the same scenes; 130 interrupted. If
+    the command stops early, the rows computed so far are kept, and the same command with --resume
+    computes the rest.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

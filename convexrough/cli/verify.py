@@ -61,24 +61,29 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
 @click.argument("scene", type=PATH)
 @click.argument("loads", type=PATH)
 @click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-              help="Largest error allowed, as a fraction of the largest load.")  # fmt: skip
+              help="Largest error allowed: of a load, over the largest load; of a total, over this "
+              "total.")  # fmt: skip
 @click.option("--floor", metavar="X", type=float, default=0.0,
-              help="Treat loads up to X as zero, so that their asperities are open.")  # fmt: skip
+              help="Treat loads up to X as zero: their asperities are claimed to be open."
+              )  # fmt: skip
 @click.option("--tolerance", metavar="X", type=float,
               help="Largest distance of a position from its asperity; default 1 % of the smallest "
               "spacing.")  # fmt: skip
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Read NAME (load, x, y, ...) from this column, a header or number.")  # fmt: skip
+              help="Read NAME (load, x, y, ...) from this column: a header, or a number from 1."
+              )  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
               help="Multiply the numbers of a column by FACTOR.")  # fmt: skip
 @click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
-              help="-1 if compression is negative in the file.")  # fmt: skip
-@click.option("--missing-open", is_flag=True, help="Asperities without a row in the file are open.")
+              help="Use -1 if compression is negative in the file.")  # fmt: skip
+@click.option("--missing-open", is_flag=True,
+              help="Asperities without a row are claimed to be open.")  # fmt: skip
 @click.option("--nodes", is_flag=True,
               help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
 @click.option("--shear", metavar="FORCES", type=PATH,
               help="Also check the shear forces in this file.")  # fmt: skip
-@click.option("--shear-force", metavar="Q", type=float, help="Prescribed total of FORCES.")
+@click.option("--shear-force", metavar="Q", type=float,
+              help="Prescribed total of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
 @out_option
 @force_option
@@ -107,11 +112,12 @@ def verify(
     order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
     is a column pressure, rows are nodes or pixels. Pressure times area is added to the load of the
     nearest asperity. The areas are in the column named area; without it, each row is a pixel of a
-    regular grid.
+    regular grid. With --out the command writes a table, a figure and verdict.json.
 
     Exit status: 0 if it is proved that exactly the claimed asperities touch, and that the errors of
-    loads, shear forces and prescribed totals are at most --within; 2 wrong input; 4 if the shear
-    problem could not be solved; 3 otherwise. With --explain it is 0 if the files can be read.
+    loads, shear forces and prescribed totals are at most --within; 2 wrong input; 3 if a claim is
+    wrong or not proved, or if --proof finds no proof; 4 if the shear problem could not be solved.
+    With --explain nothing is checked, and the status is 0 if the files can be read.
     """
     from convexrough.plausibility import cautions_about
     from convexrough.run.results import results_folder
