@@ -71,9 +71,9 @@ class Pressing(NamedTuple):
 def _as_in_scene(
     scene: Path, surface: Surface, summits: Callable[[Surface], Asperities]
 ) -> tuple[Surface, Callable[[Asperities], Contact]]:
-    from convexrough.run.scene_file import read_scene, read_units
+    from convexrough.run.scene_file import read_scene, read_study
 
-    unit = read_units(scene).length
+    unit = read_study(scene).units.names.length
     if unit and not surface.unit:
         raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
     if surface.unit and not unit:
@@ -167,7 +167,20 @@ def summits(
     echo(report.surface_summary(scanned), lines, as_json, report.warnings_about(scanned))
     if scanned.curve is None:
         say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
+    if how.scene is not None and (other := _other_table(how.scene, folder / "summits.csv")):
+        table = files[0].name
+        say_aside("hint", f"{how.scene} reads {other}, which is not {folder / table}")
     return DONE if scanned.certified else NOT_CERTIFIED
+
+
+def _other_table(scene: Path, table: Path) -> str:
+    """The table of asperities that a scene file names, if it is not `table`; else ""."""
+    from convexrough.run.scene_file import read_study
+
+    layout = read_study(scene).asperities
+    if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
+        return ""
+    return layout.path
 
 
 def _written(folder: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:

@@ -178,9 +178,9 @@ class Cycle(Table, Plottable):
             return unknown, unknown, unknown, frozen(np.full(n, np.inf))
         slip, slide = shared(levels, self._walk.later, CELLS)
         both = slip + slide
-        values = [frozen(levels.to_scene(each.value)) for each in (slip, slide, both)]
+        partial, gross, lost = (frozen(levels.to_scene(it.value)) for it in (slip, slide, both))
         uncertainty = 0.0 if self.order == "proved" else np.inf
-        return *values, frozen(levels.to_scene(both.error) + uncertainty)
+        return partial, gross, lost, frozen(levels.to_scene(both.error) + uncertainty)
 
     @cached_property
     def _walk(self) -> _Closed:

@@ -27,7 +27,6 @@ from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.table import Reading, few, named_columns
 from convexrough.tabular.toml_slips import explained
-from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
@@ -150,9 +149,9 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     )
 
 
-def read_units(path: Path) -> UnitNames:
-    """The units that a scene file names. Raises FileError and SceneFileError."""
-    return _study(path, read_text(path, MOST_BYTES)).units.names
+def read_study(path: Path) -> Study:
+    """The checked tables of a scene file. Raises FileError and SceneFileError."""
+    return _study(path, read_text(path, MOST_BYTES))
 
 
 def _study(path: Path, text: str) -> Study:

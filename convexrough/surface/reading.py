@@ -84,7 +84,7 @@ def read(
             heights = heights * upwards.into(length)
         size = _pixel(grid.pixel, pixel)
         name = length.name if length else ""
-        surface = Surface(heights, size, name, filled=holes, source=str(path))
+        surface = Surface(heights, size, name, filled_pixels=holes, source=str(path))
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
             likely = f"{SLOPES[0]:g} to {SLOPES[1]:g}"
@@ -112,7 +112,8 @@ def _pixel(
     return there
 
 
-def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
+def _mended(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
+    """The heights with holes filled, and a map of the pixels that were holes, or None."""
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
     if (rest := heights[~marks & ~np.isnan(heights)]).size:
@@ -123,7 +124,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
     empty = np.isnan(heights) | marks
     holes = int(np.count_nonzero(empty))
     if holes == 0:
-        return heights, 0
+        return heights, None
     named = [f"{each:g}" for each in np.unique(heights[empty])]
     row, column = np.argwhere(empty)[0] + 1
     found = f"{holes:,} holes ({', '.join(named)}) in {heights.size:,} pixels"
@@ -133,7 +134,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
         raise InputError("heights", found=found, expected="some heights")
     if not fill:
         raise InputError("heights", found=found, expected="none, or fill=True, --fill to fill them")
-    return filled(heights), holes
+    return filled(heights), empty
 
 
 def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:

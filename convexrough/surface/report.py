@@ -158,6 +158,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("surface", surface.source),
         ("pixels", f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}"),
         ("removed", "; ".join(map(str, surface.removed)) or "nothing"),
+        *_pressed_by(scanned),
         *((("holes filled", f"{surface.filled:,}"),) if surface.filled else ()),
         ("heights", f"Sz {surface.max_height:.4g}{unit}, Sq {surface.rms_height:.4g}{unit}, "
                     f"rms slope {surface.rms_slope:.3g}"),
@@ -187,6 +188,17 @@ def describe_surface(scanned: Scanned) -> list[str]:
         change = f"{100 * scanned.whole.resolution:.2g} %"
         described += labelled([("resolution", f"pixels twice as wide change the load by {change}")])
     return described
+
+
+def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
+    """The line on the radius that presses, if a curved form was removed from the map."""
+    curvature = sum(each.curvature for each in scanned.surface.removed)
+    if scanned.contact is not None and curvature:
+        scene = scanned.contact.scene
+        with_form, form = scene.curvature + curvature, 1.0 / curvature
+        both = f"{1.0 / with_form:.6g}" if with_form > 0 else "no hill"
+        said = f"{scene.mean_radius:.6g}; the removed form, {form:.6g}, is not in it: together"
+        yield "pressing radius", f"{said} {both}"
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
@@ -241,6 +253,24 @@ def _describe_crowded(contact: Contact) -> list[str]:
     return lines
 
 
+def _near_holes(scanned: Scanned) -> Iterator[str]:
+    """A warning about summits whose paraboloids are fitted to pixels that were holes."""
+    if scanned.surface.filled_pixels is None:
+        return
+    from scipy.ndimage import maximum_filter  # slow to import
+
+    near = maximum_filter(scanned.surface.filled_pixels, scanned.summits.origin.fit)
+    invented = near[tuple(scanned.summits.pixels.T)]
+    if not (count := np.count_nonzero(invented)):
+        return
+    said = f"{count:,} summits are fitted to filled pixels, whose heights are not measured"
+    if scanned.contact is not None and scanned.contact.loads.any():
+        loads = scanned.contact.loads[invented]
+        said += f": {np.count_nonzero(loads):,} of them touch, with "
+        said += f"{loads.sum() / scanned.contact.loads.sum():.1%} of the load"
+    yield said
+
+
 def warnings_about(scanned: Scanned) -> Iterator[str]:
     """The warnings about a surface and its contact."""
     surface, summits, contact = scanned.surface, scanned.summits, scanned.contact
@@ -258,6 +288,7 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
                 f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} of what the "
                 "spectral moments of a Gaussian surface would give"
             )
+    yield from _near_holes(scanned)
     if scanned.curve is None:
         return
     chosen = summits.origin.prune

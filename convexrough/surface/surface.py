@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
@@ -50,7 +50,7 @@ class Surface(Record, Plottable):
     pixel   : (dx, dy) [length], or one number for squares
     unit    : unit of all lengths, "" if unknown
     removed : forms subtracted from the heights, in this order
-    filled  : number of pixels that were holes
+    filled_pixels : (ny, nx) True for pixels that were holes; None if there were none
     clipped : number of pixels at the largest height if the map seems to be cut off there, else 0;
         by default determined from `heights`
     repeated : number of pixels with the most frequent height if they are surprisingly many and this
@@ -71,7 +71,7 @@ class Surface(Record, Plottable):
     pixel: tuple[float, float]
     unit: str
     removed: tuple[Removed, ...]
-    filled: int
+    filled_pixels: NDArray[np.bool_] | None
     source: str
     clipped: int
     repeated: int
@@ -83,7 +83,7 @@ class Surface(Record, Plottable):
         pixel: float | tuple[float, float],
         unit: str = "",
         removed: tuple[Removed, ...] = (),
-        filled: int = 0,
+        filled_pixels: NDArray[np.bool_] | None = None,
         source: str = "",
         clipped: int | None = None,
         repeated: int | None = None,
@@ -91,15 +91,20 @@ class Surface(Record, Plottable):
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
-        for name, value in (("unit", unit), ("removed", removed), ("filled", filled)):
+        for name, value in (("unit", unit), ("removed", removed), ("source", source)):
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "source", source)
+        object.__setattr__(self, "filled_pixels", filled_pixels)
         there = holes.clipped(self.heights) if clipped is None else clipped
         object.__setattr__(self, "clipped", there)
         alike = holes.repeated(self.heights) if repeated is None else repeated
         object.__setattr__(self, "repeated", alike)
         same = holes.copied(self.heights) if copied is None else copied
         object.__setattr__(self, "copied", same)
+
+    @property
+    def filled(self) -> int:
+        """The number of pixels that were holes."""
+        return 0 if self.filled_pixels is None else int(np.count_nonzero(self.filled_pixels))
 
     @property
     def size(self) -> tuple[float, float]:

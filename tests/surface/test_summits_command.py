@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,8 @@ def test_a_scene_in_another_unit(command: Any) -> None:
     small = [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")]
     other = json.loads(command("summits", "scan.npz", "--scene", "metres.toml", *options).out)
     assert_allclose(
-        [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")], np.array(small) / 1e6
+        [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")],
+        np.array(small) / 1e6,
     )
     assert other["surface"]["unit"] == "m"
     for first, second in zip(one["provability"], other["provability"], strict=True):
@@ -178,6 +180,27 @@ def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.Monkey
     assert len(np.load("scan-summits/summits.npz")["height [µm]"]) > 3
 
 
+@pytest.mark.usefixtures("surface")
+def test_a_scene_that_reads_another_table_is_named(command: Any) -> None:
+    options = ("--scene", "scene.toml", "--no-figures")
+    assert "reads" not in command("summits", "scan.npz", *options).err
+    said = command("summits", "scan.npz", *options, "--out", "other").err
+    table = Path("other", "summits.csv")
+    assert f"scene.toml reads scan-summits/summits.csv, which is not {table}" in said
+
+
+def test_summits_on_filled_pixels_are_counted(command: Any, surface: cr.surface.Surface) -> None:
+    heights = np.array(surface.heights)
+    row, column = surface.summits().pixels[0]
+    heights[row + 1 : row + 3, column] = np.nan
+    np.savez("holes.npz", heights=heights, pixel=1.0, unit="µm")
+    pressed = ("--radius", "1e4", "--load", "10", "--modulus", "1", "--no-figures")
+    said = command("summits", "holes.npz", *pressed, "--fill").err
+    assert re.search(
+        r"1 summits are fitted to filled pixels.*: 1 of them touch, with \d+\.\d%", said
+    )
+
+
 @pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("arguments", "message"),
@@ -225,7 +248,12 @@ def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.S
     assert "of the variance of the heights: " in ran.err
     assert "--detrend sphere, removes it" in ran.err
     assert "the same approach  asperities  whole map  difference" in ran.out
-    mended = ("--detrend", "sphere", "--force", "--json", "--whole")
+    mended = ("--detrend", "sphere", "--force", "--whole")
+    said = command("summits", "ball.npz", *pressed, *mended).out
+    assert re.search(
+        r"pressing radius +10000; the removed form, 1\d+\.\d+, is not in it: toge", said
+    )
+    mended = (*mended, "--json")
     ran = command("summits", "ball.npz", *pressed, *mended)
     assert "variance" not in ran.err
     found = json.loads(ran.out)["whole"]
