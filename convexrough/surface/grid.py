@@ -136,18 +136,25 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
     if units[0] != units[1]:
         found = f"{units[0] or 'none'} and {units[1] or 'none'}"
         raise InputError("units", found=found, expected="one along x and y", where=str(path))
+    heights, pixel = on_grid(path, x, y, z)
+    return HeightGrid(heights, pixel, units[0], units[2])
+
+
+def on_grid(path: Path, x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
+    """The map from points (n,) in any order, and the pixel (dx, dy); missing points are nan."""
     (column, dx), (row, dy) = steps(path, "x", x), steps(path, "y", y)
     heights = np.full((int(row.max()) + 1, int(column.max()) + 1), np.nan)
     if heights.size > 4 * len(z) + 100:
         found = f"{len(z):,} points of a grid of {heights.size:,}"
         raise InputError("x, y", found=found, expected="a regular grid", where=str(path))
-    once, count = np.unique(row * heights.shape[1] + column, return_counts=True)
+    place = row * heights.shape[1] + column
+    once, count = np.unique(place, return_counts=True)
     if len(once) < len(z):
-        k = int(np.argmax((row * heights.shape[1] + column) == once[np.argmax(count)]))
+        k = int(np.argmax(place == once[np.argmax(count)]))
         found = f"the point {x[k]:g}, {y[k]:g} {count.max()} times"
         raise InputError("x, y", found=found, expected="each point once", where=str(path))
     heights[row, column] = z
-    return HeightGrid(heights, (dx, dy), units[0], units[2])
+    return heights, (dx, dy)
 
 
 def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.surface.detrend import Trend
-from convexrough.surface.grid import HeightGrid, read_grid, steps
+from convexrough.surface.grid import HeightGrid, on_grid, read_grid, steps
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
@@ -23,6 +25,11 @@ TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
 #: Names that the array of heights may have in an .npz file with several arrays.
 HEIGHTS = ("heights", "height", "z")
+
+#: Names that say in an .npz or .mat file what its heights and pixels are, and parts of other names
+#: that probably do, which `read` refuses.
+STATED = ("pixel", "unit", "height_unit")
+SCALES = re.compile("unit|scale|factor|gain|offset|pixel|spacing|step|resol|calib|^d[xyz]$", re.I)
 
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
@@ -58,8 +65,9 @@ def read(
         masked, BAD in text, and marks such as -9999 or 1e38 far from all heights
 
     An .npz or .mat file contains `heights`, and may contain `unit`, `height_unit`, and `pixel` or x
-    and y of the columns and rows. A text file is a matrix, possibly with Gwyddion's comments on its
-    size, or columns x, y and height on a grid. Formats of instruments need the extra `surface`.
+    and y, of columns and rows or of each height. Text contains a matrix, possibly with Gwyddion's
+    comments on its size. A matrix with three columns is a list of x, y and height on a grid.
+    Formats of instruments need the extra `surface`.
 
     Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
     InputError if the file contains no usable map.
@@ -151,26 +159,26 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
 
 def _arrays(path: Path) -> HeightGrid:
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
-    if "" in found:
-        return HeightGrid(_numbers(found[""]))
     named = {name.lower(): values for name, values in found.items()} | found
-    maps = [name for name in found if named[name].ndim == 2 and name.lower() not in ("x", "y")]
-    likely = [name for name in found if name.lower() in HEIGHTS] or maps
-    likely = ["heights"] if "heights" in likely else likely
-    if len(likely) != 1:
-        names = ", ".join(likely or found) or "none"
-        raise InputError("arrays", found=names, expected='one called "heights"', where=str(path))
-    chosen = likely[0]
+    chosen = "" if "" in found else _chosen(path, found)
     masks = [name for name in found if name.lower() in ("mask", "valid")]
     if masks and found[masks[0]].shape == named[chosen].shape:
         expected = "none: nan in the heights where they are not valid"
         raise InputError("arrays", found=masks[0], expected=expected, where=str(path))
     size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
     both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
-    units = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
-    heights = _numbers(named[chosen])
-    if "x" in named and "y" in named:
-        heights, apart = _placed(path, heights, *(_numbers(np.squeeze(named[it])) for it in "xy"))
+    others = [name for name in found if name.lower() not in STATED and SCALES.search(name)]
+    if others:
+        expected = f"{', '.join(STATED)} for what the heights and pixels are, or none of these"
+        raise InputError("arrays", found=", ".join(others), expected=expected, where=str(path))
+    units = [str(named[name]) if name in named else "" for name in STATED[1:]]
+    heights = np.squeeze(_numbers(named[chosen]))
+    columns = {name: named[name] for name in "xy" if name in named}
+    if not columns and heights.ndim == 2 and heights.shape[1] == 3:  # as in a text file
+        *both_axes, heights = heights.T
+        columns = dict(zip("xy", both_axes, strict=True))
+    if len(columns) == 2:
+        heights, apart = _placed(path, heights, *(_numbers(np.squeeze(columns[it])) for it in "xy"))
         if both is not None and not np.allclose(both, apart, rtol=ROUNDED, atol=0.0):
             expected = f"{apart[0]:g} by {apart[1]:g}, the steps of x and y"
             said = f"{both[0]:g} by {both[1]:g}"
@@ -179,9 +187,22 @@ def _arrays(path: Path) -> HeightGrid:
     return HeightGrid(heights, both, *units)
 
 
+def _chosen(path: Path, found: dict[str, NDArray[Any]]) -> str:
+    """The name of the array of heights."""
+    maps = [name for name in found if found[name].ndim == 2 and name.lower() not in ("x", "y")]
+    likely = [name for name in found if name.lower() in HEIGHTS] or maps
+    likely = ["heights"] if "heights" in likely else likely
+    if len(likely) != 1:
+        names = ", ".join(likely or found) or "none"
+        raise InputError("arrays", found=names, expected='one called "heights"', where=str(path))
+    return likely[0]
+
+
 def _placed(path: Path, heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
     """Heights sorted by x and y, which are two vectors or two matrices, and the pixel (dx, dy)."""
     vectors = x.ndim == y.ndim == 1
+    if heights.ndim == 1 and x.shape == y.shape == heights.shape:
+        return on_grid(path, x, y, heights)
     shape = (len(y), len(x)) if vectors else x.shape
     if heights.shape != shape or not (vectors or y.shape == shape):
         found = " by ".join(map(str, heights.shape))

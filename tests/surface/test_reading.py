@@ -51,6 +51,17 @@ def test_arrays(tmp_path: Path) -> None:
         raw(tmp_path / "x.npz")
     np.savez(tmp_path / "b.npz", whatever=HEIGHTS.astype(np.float32), other=np.zeros(3))
     assert_array_equal(raw(tmp_path / "b.npz", pixel=1.0).heights, HEIGHTS.astype(np.float32))
+    points = np.column_stack([it.ravel() for it in (*np.meshgrid(x, y), HEIGHTS)])[::-1]
+    np.save(tmp_path / "points.npy", points)
+    savemat(tmp_path / "points.mat", dict(zip("xyz", points.T[:, :, None], strict=True)))
+    for name in ("points.npy", "points.mat"):
+        surface = raw(tmp_path / name)
+        assert_allclose(surface.heights, HEIGHTS)
+        assert_allclose(surface.pixel, (2.0, 3.0))
+    for name in ("scale", "z_unit", "dx"):
+        np.savez(tmp_path / "more.npz", heights=HEIGHTS, pixel=1.0, **{name: 0.5})
+        with pytest.raises(cr.InputError, match=f"arrays: found {name}, expected pixel, unit, hei"):
+            raw(tmp_path / "more.npz")
     np.savez(tmp_path / "two.npz", height=HEIGHTS, z=2 * HEIGHTS, pixel=1.0)
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
         raw(tmp_path / "two.npz")
