@@ -34,7 +34,7 @@ from convexrough.plots.fretting import draw_slip
 from convexrough.plots.gradient import draw_gradient
 from convexrough.plots.load_plane import draw_closed, draw_curve, draw_losses, draw_path
 from convexrough.plots.measure import Scale, measure
-from convexrough.plots.notebook import Figure, image_tag
+from convexrough.plots.notebook import Figure, image_tag, new_axes
 from convexrough.plots.path import draw_loop as draw_path_loop
 from convexrough.plots.press import draw_pressure
 from convexrough.plots.shakedown import draw_factors
@@ -68,7 +68,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         wrongly claimed asperities; Comparison, PathComparison: times of the solvers or methods;
         PhaseLosses: loss against phase; Shakedown: map of factors; Surface, Summits: map;
         Provability: contacts against pruning
-    axes   : matplotlib axes; default: those of a new figure, which notebooks show
+    axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
 
     Raises InputError for anything else.
     """
@@ -77,7 +77,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
-        axes = Figure(figsize=(SINGLE, 3.2), layout="constrained").subplots()
+        axes = new_axes((SINGLE, 3.2))
     contact = getattr(result, "contact", result)
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)

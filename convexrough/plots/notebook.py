@@ -1,13 +1,15 @@
-"""Figures that notebooks display without pyplot, and `save`."""
+"""Figures and axes that notebooks display, and `save`."""
 
 from __future__ import annotations
 
+import sys
 from base64 import b64encode
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure as MatplotlibFigure
 
@@ -26,6 +28,23 @@ class Figure(MatplotlibFigure):
 
     def _repr_png_(self) -> bytes:
         return as_png(self)
+
+
+class ShownAxes(Axes):
+    """Axes whose figure notebooks display, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        figure = self.get_figure(root=True)
+        assert figure is not None
+        return as_png(figure)
+
+
+def new_axes(size: tuple[float, float]) -> Axes:
+    """The axes of a new figure of this size [inches]; `pyplot.show` shows it if pyplot is used."""
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        axes: Axes = pyplot.figure(figsize=size, layout="constrained").subplots()
+        return axes
+    return Figure(figsize=size, layout="constrained").add_subplot(axes_class=ShownAxes)
 
 
 class Figures(dict[str, MatplotlibFigure]):
