@@ -142,9 +142,11 @@ def verify(
         with file_errors(each, "be written"):
             each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
     with ExitStack() as stack:
-        stack.enter_context(_reported(junit))
+        names = " ".join(map(str, filter(None, (scene, loads, shear))))
+        stack.enter_context(_reported(junit, names))
         file = read_scene(scene)
-        manner = _manner(units=file.scene.units, convert=file.convert, **how)
+        shared = ("x", "y") if shear is not None else ()
+        manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
         if explain:
             read = [read_loads(loads, file.scene, manner)]
             read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
@@ -172,7 +174,7 @@ def verify(
         if evidence is not None:
             evidence.save((new or Path()) / "proof.json")
     if junit is not None:
-        write_text(junit, report.junit(found))
+        write_text(junit, report.junit(found, names))
     lines = report.describe_verdict(found)
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
@@ -191,7 +193,7 @@ def verify(
 
 
 @contextmanager
-def _reported(path: Path | None) -> Iterator[None]:
+def _reported(path: Path | None, files: str) -> Iterator[None]:
     """Write errors of the body as JUnit XML, and raise them again."""
     from convexrough.verdict.report import junit
 
@@ -199,7 +201,7 @@ def _reported(path: Path | None) -> Iterator[None]:
         yield
     except ConvexroughError as error:
         if path is not None:
-            write_text(path, junit(error))
+            write_text(path, junit(error, files))
         raise
 
 

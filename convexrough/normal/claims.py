@@ -182,7 +182,8 @@ class Claim(ABC):
             example = f", as {prefix}N for N" if prefix and unit == "N" else ""
             modulus = ", or of the modulus" if self.total_prescribed is None else ""
             size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
-        return " and ".join(filter(None, ("have the other sign" if factor < 0 else "", size)))
+        sign = "have the other sign than the prescribed total" if factor < 0 else ""
+        return " and ".join(filter(None, (sign, size)))
 
     @property
     def wrongly_claimed(self) -> Indices:

@@ -85,6 +85,7 @@ class Reading:
     columns : names in the file, by known name;  scales : factors of the numbers
     units   : units of the scene;  convert : convert columns in other units, else refuse them
     scalable : messages may propose the options --scale and --column
+    shared  : columns that are read from another file, too, so that no message proposes --scale
     alike   : columns of one quantity must have one unit, even if the scene names none
     """
 
@@ -93,6 +94,7 @@ class Reading:
     units: UnitNames = NAMELESS
     convert: bool = False
     scalable: bool = False
+    shared: Sequence[str] = ()
     alike: bool = True
 
 
@@ -171,9 +173,11 @@ def read_table(
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
     wanted = (*required, *optional, *(each for names in instead.values() for each in names))
-    known = [*wanted, *INDEX[:-1], *(each.lower() for each in how.columns.values())]
+    called = [each.lower() for each in how.columns.values()]
+    known = [*wanted, *INDEX[:-1], *called]
     with reading(path):
-        source = _source(path, known) if table is None else _text_source(table)
+        sheet = [*required, *(names[0] for names in instead.values()), *called]
+        source = _source(path, known, sheet) if table is None else _text_source(table)
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
@@ -249,7 +253,7 @@ def _factors(
         scene = how.units.unit(kind)
         if name in how.scales and (scene is None or not said):
             continue
-        ways = [f"--scale {name}={{}}"] if how.scalable else []
+        ways = [f"--scale {name}={{}}"] if how.scalable and name not in how.shared else []
         try:
             found = known_unit(place, said, kind)
         except InputError as error:
@@ -290,7 +294,7 @@ def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     return np.array([str(cell) for cell in cells]) if numbers is None else numbers
 
 
-def _source(path: Path, known: Sequence[str]) -> _Source:
+def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
     if path.suffix.lower() in ARRAYS:
         arrays = read_arrays(path, known)
         count = len(next(iter(arrays.values()), []))
@@ -304,7 +308,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             numbers=_as_numbers,
             mistakes=[],
         )
-    return _text_source(read_text_table(path, known))
+    return _text_source(read_text_table(path, known, required=sheet))
 
 
 def _text_source(table: TextTable) -> _Source:

@@ -161,18 +161,22 @@ def _with_unit(name: str) -> re.Match[str] | None:
 
 
 def read_text_table(
-    path: Path, known: Sequence[str] = (), comment: re.Pattern[str] = COMMENT
+    path: Path,
+    known: Sequence[str] = (),
+    comment: re.Pattern[str] = COMMENT,
+    required: Sequence[str] = (),
 ) -> TextTable:
     """The cells of a text file or workbook. Raises FileError if it is empty or of another kind.
 
     known : names of columns, in lower case; the line with most of them is the header
+    required : those of them without which a sheet of a workbook is not read if another has them
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
     title, separator, sheet = "", "", ""
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
-        separator, (sheet, numbered) = "\t", _sheet_lines(path, known)
+        separator, (sheet, numbered) = "\t", _sheet_lines(path, known, required)
     for number, line in numbered:
         text = line.strip("\r\n")
         inner = text.strip()
@@ -275,11 +279,13 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
-def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[int, str]]]:
-    """The name and the numbered rows of the first sheet with a known column, or of the first sheet.
+def _sheet_lines(
+    path: Path, known: Sequence[str], required: Sequence[str]
+) -> tuple[str, Iterator[tuple[int, str]]]:
+    """The name and the numbered rows of the first sheet with most of the columns `required`.
 
-    Tabs separate cells. A known column is one of `known`. The name is in quotes, and followed by
-    the names of other sheets with known columns.
+    Without any, it is the first with a column of `known`, or the first. Tabs separate cells. The
+    name is in quotes, and followed by the names of other sheets that would do as well.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -290,11 +296,17 @@ def _sheet_lines(path: Path, known: Sequence[str]) -> tuple[str, Iterator[tuple[
             for page in book.worksheets
         ]  # fmt: skip
 
-    def wanted(page: list[list[str]]) -> bool:
-        return any(bare(cell).lower() in known for row in page[:SAMPLE] for cell in row)
+    def there(page: list[list[str]]) -> tuple[int, bool]:
+        names = {bare(cell).lower() for row in page[:SAMPLE] for cell in row}
+        return len(names & {*required}), not names.isdisjoint(known)
 
-    found = [page for page in pages if wanted(page[1])] or pages[:1] or [("", [])]
-    (first, rows), others = found[0], [f'"{name}"' for name, _ in found[1:]]
+    counts = [there(rows) for _, rows in pages]
+    best = counts.index(max(counts))
+    also = [
+        i for i, count in enumerate(counts) if i != best and count == counts[best] != (0, False)
+    ]
+    others = [f'"{pages[i][0]}"' for i in also]
+    (first, rows) = pages[best]
     name = f'"{first}"' + (f", not {' or '.join(others)}" if others else "")
     return name, enumerate(map("\t".join, rows), 1)
 

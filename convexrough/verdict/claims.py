@@ -164,9 +164,13 @@ def _negative(
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
-    if largest <= floor:
+    if largest <= max(floor, SMALL * least):
         advice = "without --sign -1" if sign < 0 else "--sign -1"
-        yield f"column {name}: no {name} is positive, expected positive compression: {advice}"
+        found = f"no {name} is positive"
+        if largest > floor:
+            found = f"no {name} is above {largest:.2g}, and the least is {-least:.4g}"
+            advice += f" and --floor {rounded_up(largest)}"
+        yield f"column {name}: {found}, expected positive compression: {advice}"
         return
     if least <= SMALL * largest:
         hint = f"; --floor {rounded_up(least)} counts noise as 0"

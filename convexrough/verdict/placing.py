@@ -202,7 +202,9 @@ class Placing:
             where = " and ".join(self.table.rows[i] for i in np.flatnonzero(index == twice)[:2])
             wrong = f"{twice} in {where}, expected each asperity once"
         elif least > 0 and most < count:
-            question = "from 0 or from 1? Expected x and y, or a row of asperity 0"
+            question = (
+                f"from 0 or from 1? Expected x and y, or a row {count} if from 1, 0 if from 0"
+            )
             wrong = f"numbers from {least} to {most}: {question}"
         elif most - (first := min(least, 1)) >= count:
             wrong = f"{most}, expected at most {count - 1 + first}, the last asperity"

@@ -152,15 +152,18 @@ def reason(claim: Claim) -> str:
     return ", ".join(parts)
 
 
-def junit(found: Verified | ConvexroughError) -> bytes:
-    """JUnit XML: a test case for each check of each claim, or one case with the error."""
-    suite = ElementTree.Element("testsuite", name="convexrough verify")
+def junit(found: Verified | ConvexroughError, files: str) -> bytes:
+    """JUnit XML: a test case for each check of each claim, or one case with the error.
+
+    files : the names of the files, for the names of the suite and of its cases
+    """
+    suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
     if isinstance(found, Verified):
         kind, cases = "failure", list(_cases(found))
     else:
         kind, cases = "error", [("input", str(found))]
     for name, text in cases:
-        case = ElementTree.SubElement(suite, "testcase", classname="convexrough.verify", name=name)
+        case = ElementTree.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name)
         if text:
             ElementTree.SubElement(case, kind, message=name).text = text
     suite.set("tests", str(len(suite)))

@@ -110,7 +110,7 @@ class Verdict(Claim, Table, Plottable):
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
-                f"loads on {len(small):,} asperities proved open are at most {noise:.2g} "
+                f"of the loads, {len(small):,} on asperities proved open are at most {noise:.2g} "
                 f"({noise / self.largest:.1g} of the largest load): "
                 f"--floor {rounded_up(noise)} counts them as 0"
             )

@@ -213,6 +213,8 @@ READ: dict[str, tuple[Any, ...]] = {
     "workbook of text": (lambda case: [
         [[str(cell).replace(".", ",") for cell in row] for row in rows(case.table())]], "a.xlsx"),
     "workbook's second sheet": (lambda case: [[["notes"]], rows(case.table())], "a.xlsx"),
+    "workbook's sheet of loads": (
+        lambda case: [[["x", "y"], [0.0, 1.0]], rows(case.table())], "a.xlsx"),
     "index from 0": (shuffled,),
     "numbers of nodes": (lambda case: lines(shuffled(case, 1, "Node"), "\t"),),
     "a permutation of any name": (lambda case: shuffled(case, 1, "Element Nr."),),
@@ -370,7 +372,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
-                                      "from 3 to 5: from 0 or from 1?"),
+                                      "from 3 to 5: from 0 or from 1? Expected x and y, or a row 12 if from 1,"),
     "an index beyond the largest integers": (lambda _: {"index": [1e19, 2], "load": [1, 2]}, "",
                                              "rows: found 2, expected 12, one per asperity of th"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",
@@ -384,9 +386,12 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "the wrong sheet": (
         lambda case: [[["load", "E"], [3.0, 70e9]], rows(case.table())], "a.xlsx",
         'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
-    "a sheet without loads": (
-        lambda case: [[["x", "y"], [0.0, 0.0]], rows(case.table())], "a.xlsx",
+    "sheets without loads": (
+        lambda _: [[["x", "y"], [0.0, 0.0]], [["y"], [0.0]]], "a.xlsx",
         "found x, y in sheet \"Sheet\", not \"Sheet1\", expected a column 'load'"),
+    "a sign with noise": (
+        lambda case: {"load": np.where(case.loads > 0, -case.loads, 1e-9 * case.loads.max())}, "",
+        "and the least is -", "expected positive compression: --sign -1 and --floor "),
     "half a gzip": (lambda _: gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz", "ended before"),
     "pressures without areas": (lambda case: case.table("x y pressure"), "",
                                 "expected a column 'area', or x and y on a regular grid"),

@@ -126,7 +126,7 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     noisy = {int(i): 1.5e-20 for i in np.flatnonzero(contact.loads == 0)}
     outcome = command("verify", "a.toml", claim(contact, noisy))
     assert outcome.status == 3
-    assert "hint: loads on 24 asperities proved open are at most 1.5e-20" in outcome.err
+    assert "hint: of the loads, 24 on asperities proved open are at most 1.5e-20" in outcome.err
     assert "--floor 2e-20 counts them as 0" in outcome.err
     assert "and 14 more: --json and --out list all" in outcome.out
     floored = command("verify", "a.toml", claim(contact, noisy), "--floor", "2e-20")
@@ -197,12 +197,13 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
         assert expected in refused.err
     rounded = command(*asked, shear_file(0.998 * state.forces))
     assert "below f P, but not within 0.01 %: without a column status" in rounded.err
-    for factor, said in ((-1, "have the other sign"), (-1e3, "have the other sign and are 10^3"),
+    for factor, said in ((-1, "have the other sign than"), (-1e3, "total and are 10^3"),
                          (1e-6, "are 10^-6 times what they should be: another unit, as MN for N?"),
                          (1.25, "are 1.25 times those of the solution")):  # fmt: skip
         outcome = command(*asked, shear_file(factor * state.forces))
         assert outcome.status == 3
-        assert f"hint: the shear forces {said}" in outcome.err
+        assert "hint: the shear forces " in outcome.err
+        assert said in outcome.err
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(spoiled), "--json")
