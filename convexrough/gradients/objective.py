@@ -73,6 +73,9 @@ class Objective(Record):
         needed = NUMBERS[self.of]
         if getattr(self, needed) is None:
             raise InputError(needed, found="none", expected=f"a number, for the {self.of}")
+        if self.force is not None and needed != "force":
+            expected = f"none, as the {self.of} does not depend on it"
+            raise InputError("force", found=self.force, expected=expected)
         for name in PRESCRIBED:
             if (given := getattr(self, name)) is not None:
                 object.__setattr__(self, name, checks.finite(name, given))

@@ -80,7 +80,7 @@ class Keys(FileTable):
         first: dict[str, str] = {}
         for where, key in _swept(keys):
             name, _, rest = key.partition(".")
-            if not rest or "." in rest:
+            if not all(key.split(".")) or not rest:
                 expects = 'expected a table and a key of it, such as "asperities.height_std"'
                 yield f"{where}.{key}", expects
             elif name == "sweep":

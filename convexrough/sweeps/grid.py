@@ -17,7 +17,7 @@ import numpy as np
 
 from convexrough.scene.patterns import CUT_DEVIATIONS
 
-#: A key of a scene file, "table.key", and its values.
+#: A key of a scene file, "table.key" or "table.table.key", and its values.
 Axis = tuple[str, tuple[Any, ...]]
 
 Law = Literal["uniform", "normal", "lognormal"]
@@ -110,8 +110,12 @@ class Grid:
         """The tables of a scene file with these values and this seed."""
         tables = {name: {**table} for name, table in self.tables.items()}
         for key, value in values.items():
-            table, _, name = key.partition(".")
-            tables.setdefault(table, {})[name] = value
+            *names, last = key.split(".")
+            table: dict[str, Any] = tables
+            for name in names:  # a table within a table is copied, too
+                table[name] = {**table.get(name, {})}
+                table = table[name]
+            table[last] = value
         if seed is not None and tables.get("asperities", {}).get("pattern") != "file":
             tables.setdefault("asperities", {})["seed"] = seed
         return tables

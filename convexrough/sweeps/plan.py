@@ -10,7 +10,7 @@ from typing import Any
 
 from convexrough.errors import InputError
 from convexrough.sweeps.batch import VERSIONS, Batch
-from convexrough.sweeps.measures import FAILURES, Column, chosen, unit
+from convexrough.sweeps.measures import FAILURES, Column, Stages, chosen, unit
 from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
@@ -92,8 +92,17 @@ def planned(
         "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
         "drawn": [] if grid is None else [draw.key for draw in grid.draws],
         "not_measured": [name for name in asked.stages if name not in used],
+        "own_loads": _own_loads(asked.stages, used, labels) if grid else [],
         "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
         **said,
         "versions": VERSIONS,
     }
     return Plan(source, columns, size, manifest)
+
+
+def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
+    """The measured tables whose loads stay as they are in a sweep over the load of [normal]."""
+    if not {"normal.load", "normal.approach"} & {*swept}:
+        return []
+    own = [name for name, stage in stages.items() if name in used and stage.highest_load]
+    return [name for name in own if not any(key.startswith(f"{name}.") for key in swept)]

@@ -71,11 +71,16 @@ def failures(table: SweepTable) -> list[str]:
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """A warning with the number of certified scenes that have a message; [] if there are none."""
+    """Warnings: tables with loads of their own, and the certified scenes that have a message."""
+    own = [
+        f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep the key "
+        f'"{name}.reference" with it, in [sweep.together]'
+        for name in table.manifest["own_loads"]
+    ]
     said = _messages(table, "certified")
     first, count = next(said, ""), 1 + sum(1 for _ in said)
     warned = f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
-    return [warned] if first else []
+    return [*own, warned] if first else own
 
 
 def _messages(table: SweepTable, status: str) -> Iterator[str]:

@@ -173,7 +173,7 @@ assert np.allclose(found.x, answer, atol=1e-6)
 # touch with :math:`P_1 = P_2 = 1 / (1 + A) = 0.4`. The energy is a saddle: along
 # :math:`P_1 + P_2 = \text{const}` it is highest in the middle, so the state in which both touch is
 # not even a local minimum. Beyond :math:`A = 1` the energy is not convex and the solution is not
-# unique. The shell lemma of :doc:`03_why_cvxpy_refuses` tells how close real asperities may be.
+# unique. The shell lemma of lesson 3 tells how close real asperities may be.
 
 closer = np.array([[1.0, 1.5], [1.5, 1.0]])
 crowded = [case for case in CASES if allowed(*solve_case(case, np.ones(2), closer))]

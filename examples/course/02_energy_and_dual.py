@@ -8,7 +8,7 @@ the error of the loads. The status that a solver reports does not.
 
 Seven Hertzian tips stand on short elastic stems. The load :math:`P_i` compresses tip :math:`i` by
 :math:`k P_i^{2/3}`. Stems and substrate move by :math:`(M P)_i` with a symmetric, positive
-definite matrix :math:`M`. (The stems are the diagonal of :math:`M`; :doc:`03_why_cvxpy_refuses`
+definite matrix :math:`M`. (The stems are the diagonal of :math:`M`; lesson 3
 treats asperities without stems.) If the tips must take up the displacements :math:`D_i`, the loads
 minimise
 

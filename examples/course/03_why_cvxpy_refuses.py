@@ -156,7 +156,7 @@ print("accepted by the rules:", split.is_dcp())
 assert not split.is_dcp()
 
 # %%
-# Script :doc:`05_exact_cones` writes this term in a form that the rules accept.
+# Lesson 5 writes this term in a form that the rules accept.
 #
 # An independent check
 # --------------------

@@ -6,7 +6,7 @@ r"""
 second-order cone program with four cones per asperity. The program is exact: it has the same
 minimum and the same loads.
 
-The shell lemma (:doc:`03_why_cvxpy_refuses`) leaves for each asperity the local energy
+The shell lemma (lesson 3) leaves for each asperity the local energy
 :math:`h(P) = \tfrac 3 5 k P^{5/3} - \tfrac 1 2 \sigma P^2` with :math:`\sigma = 1 / (\pi E^* s)`.
 It is convex up to some load :math:`B`, but it is written as a difference of convex functions. Let
 :math:`t` be the contact radius divided by that at :math:`P = B`. Then :math:`P = B t^3`, and with

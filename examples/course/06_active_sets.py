@@ -114,8 +114,8 @@ assert period > 1
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
 # It is once differentiable, so Newton's method applies, and the signs of the solution give the
-# active set. A step that does not make the residual smaller is halved. (Where the energy is
-# convex, :doc:`03_why_cvxpy_refuses`, the linear system of a step always has a solution.)
+# active set. A step that does not make the residual smaller is halved. If the energy is
+# convex (lesson 3), the linear system of a step always has a solution.
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:

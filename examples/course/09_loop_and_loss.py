@@ -12,7 +12,7 @@ remembers only the turning points of the force.
 # The naive form
 # --------------
 #
-# By :doc:`08_shear` all shear states are differences of pressings. Let :math:`V(L)` be the minimum
+# By lesson 8 all shear states are differences of pressings. Let :math:`V(L)` be the minimum
 # of the energy at the total load :math:`L`; its derivative is the approach :math:`D_0(L)`. With
 # :math:`L = P - Q / f` the loss of a cycle between :math:`\pm Q` is
 #

@@ -13,7 +13,7 @@ each corner of the curve.
 # The naive form
 # --------------
 #
-# :doc:`09_loop_and_loss` had constant :math:`P`: a contact remembers the turning points of
+# Lesson 9 had constant :math:`P`: a contact remembers the turning points of
 # :math:`Q`, and the branch after a turning point is the first loading at twice the size. Now
 # :math:`P` varies as well. The naive form takes the contact pressed by the present :math:`P` and
 # applies the history of :math:`Q` to it. The path has four points: press; shear; increase the load

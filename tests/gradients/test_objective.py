@@ -90,3 +90,8 @@ def test_autograd() -> None:
     np.testing.assert_array_equal(autograd.grad(function)(x), slopes)
     other = autograd.grad(lambda y: function(y) ** 2)(x)
     np.testing.assert_allclose(other, 2 * value * slopes, rtol=1e-14)
+
+
+def test_a_force_without_use_is_refused() -> None:
+    with pytest.raises(cr.InputError, match="force: found .*, expected none, as the load does not"):
+        of_loss(of="load", load=None, approach=5e-5)

@@ -75,6 +75,23 @@ def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) ->
     assert len(identities) == 2
 
 
+def test_a_key_of_a_table_within_a_table() -> None:
+    own = {"material": {"sphere": {"youngs_modulus": 1.0, "poisson_ratio": 0.3}, "base": {}}}
+    grid = Grid(own, over=(("material.sphere.youngs_modulus", (2.0, 3.0)),))
+    for number, modulus in enumerate((2.0, 3.0)):
+        there = grid.with_values(*grid.point(number))["material"]
+        assert there == {"sphere": {"youngs_modulus": modulus, "poisson_ratio": 0.3}, "base": {}}
+    assert own["material"]["sphere"]["youngs_modulus"] == 1.0
+
+
+def test_a_table_with_its_own_loads_is_named() -> None:
+    path = {"loads": [3e-7, 2e-7], "forces": [1e-8, 0.0]}
+    for swept, own in (("normal.load", ["path"]), ("sphere.radius", [])):
+        sweep = {"measure": ["path.loss"], "over": {swept: [1.0, 2.0]}}
+        plan = plan_of({**tables(path=path), "sweep": sweep}, Path("sweep.toml"))
+        assert plan.manifest["own_loads"] == own
+
+
 WRONG = {
     "no table": ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
     "unknown key": (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),

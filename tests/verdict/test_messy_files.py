@@ -372,7 +372,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
-                                      "from 3 to 5: from 0 or from 1? Expected x and y, or a row 12 if from 1,"),
+                                      "from 0 or from 1? Expected x and y, or a row 12 if from"),
     "an index beyond the largest integers": (lambda _: {"index": [1e19, 2], "load": [1, 2]}, "",
                                              "rows: found 2, expected 12, one per asperity of th"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",
