@@ -58,7 +58,7 @@ class Ball:
             return cls.around(pair, PAIR_ROUNDOFF * abs(pair.high) + TINY)
         pair = value if isinstance(value, Pair) else Pair.exact(value)
         high = np.asarray(pair.high, dtype=np.float64)
-        return cls(Pair(high, np.asarray(pair.low)), np.zeros_like(high))
+        return cls(Pair(high, np.asarray(pair.low)), np.zeros(high.shape))
 
     @classmethod
     @quietly

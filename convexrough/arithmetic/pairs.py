@@ -40,7 +40,7 @@ class Pair(NamedTuple):
     def exact(cls, values: Number) -> Pair:
         """float64 numbers as pairs whose low parts are 0."""
         high = np.asarray(values, dtype=np.float64)
-        return cls(high, np.zeros_like(high))
+        return cls(high, np.zeros(high.shape))
 
     @classmethod
     def nearest(cls, value: Fraction) -> Pair:
@@ -141,6 +141,8 @@ class Pair(NamedTuple):
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
     """(length,) read-only numbers, slices of which `part` computes in several threads."""
+    if length <= CHUNK:
+        return Pair(*map(frozen, part(slice(0, length))))
     found = Pair(np.empty(length), np.empty(length))
 
     def compute(some: slice) -> None:
