@@ -198,61 +198,66 @@ def pressed(name: str, holding: Holding = "approach", influence: Any = "dense") 
 
 
 class Bristles:
-    """Shear at constant normal loads in steps, whatever order asperities move in, in float64.
+    """Shear in steps, whatever order asperities move in, in float64.
 
-    Each asperity is a row of bristles in parallel, which together carry Mindlin's law: at a
-    deflection phi of the largest c_t f k P^(2/3), a bristle of the limit y = 1 - s^2, s uniform on
-    (0, 1), carries min(phi, y) on first loading, and what it remembers clamped to +-y after that.
-    The error falls as the square of their number, and with the steps.
-
-    positions, loads : of those that touch
+    Each asperity is a row of bristles in parallel, which together carry Mindlin's law (Popov's
+    dimensional reduction): at the part s of a contact radius, s uniform on (0, reach), a bristle
+    is bent by at most C - s^2 C0, where C = k P^(2/3) is the indentation and C0 that of `contact`.
+    It is clamped to that, and remembers the rest. The error falls as the square of their number,
+    and with the steps.
     """
 
-    def __init__(self, contact: cr.Contact, count: int = 1000) -> None:
-        scene, on = contact.scene, contact.loads > 0
+    def __init__(self, contact: cr.Contact, count: int = 1000, reach: float = 1.0) -> None:
+        self.scene, self.on = contact.scene, contact.loads > 0
+        scene, on, P = contact.scene, self.on, contact.loads[self.on]
         nu, E = scene.material.poisson_ratio, scene.material.contact_modulus
-        self.P, self.f = contact.loads[on], scene.friction or 0.0
-        self.ratio = (2 - nu) / (2 * (1 - nu))
+        self.f, self.ratio = scene.friction or 0.0, (2 - nu) / (2 * (1 - nu))
         points = scene.contact_points[on]
         apart = np.hypot(*np.moveaxis(points[:, None] - points, -1, 0))
         np.fill_diagonal(apart, np.inf)
         self.A = 1 / (np.pi * E * apart)
-        self.C = np.cbrt(9 / (16 * E**2) / scene.relative_radii[on]) * np.cbrt(self.P) ** 2
-        s = (np.arange(count) + 0.5) / count
-        self.limits = 1 - s * s
-        self.bent = np.zeros((len(self.P), count))
-        self.deflection, self.delta, self.lost = np.zeros(len(self.P)), 0.0, 0.0
+        self.k = np.cbrt(9 / (16 * E**2) / scene.relative_radii[on])
+        self.C = self.k * np.cbrt(P) ** 2
+        self.stiffness = 1.5 * P / self.C * reach
+        self.below = self.C[:, None] * (reach * (np.arange(count) + 0.5) / count) ** 2
+        self.bent = np.zeros((len(P), count))
+        self.deflection, self.delta, self.lost = np.zeros(len(P)), 0.0, 0.0
 
     @property
     def forces(self) -> Array:
-        return self.f * 1.5 * self.P * self.bent.mean(axis=1)
+        return self.f * self.stiffness * self.bent.mean(axis=1)
 
     @property
     def displacement(self) -> float:
         return self.ratio * self.f * self.delta
 
-    def to(self, forces: Array) -> "Bristles":
-        """Follow the force Q through these values."""
-        for Q in forces:
-            self._step(float(Q) / self.f)
+    def to(self, forces: Array, loads: Array | None = None) -> "Bristles":
+        """Follow the force Q through these values, and the load, if it is not that of `contact`."""
+        for i, Q in enumerate(forces):
+            P = None if loads is None else cr.press(self.scene, load=float(loads[i])).loads[self.on]
+            C = self.C if P is None else self.k * np.cbrt(P) ** 2
+            self._step(float(Q) / self.f, np.maximum(C[:, None] - self.below, 0.0))
         return self
 
-    def _step(self, T: float) -> None:
+    def _step(self, T: float, limits: Array) -> None:
         """eta + A u(eta) = Delta, sum u = T, by Newton on the clamped bristles."""
-        eta, delta, n = self.deflection, self.delta, len(self.P)
+        eta, delta, n = self.deflection, self.delta, len(self.C)
         for _ in range(60):
-            tried = self.bent + ((eta - self.deflection) / self.C)[:, None]
-            bent = np.clip(tried, -self.limits, self.limits)
-            u, c = 1.5 * self.P * bent.mean(axis=1), 1.5 * self.P / self.C * (tried == bent).mean(1)
+            tried = self.bent + (eta - self.deflection)[:, None]
+            bent = np.clip(tried, -limits, limits)
+            u, c = self.stiffness * bent.mean(axis=1), self.stiffness * (tried == bent).mean(1)
             matrix = np.block([[np.eye(n) + self.A * c, -np.ones((n, 1))], [c, np.zeros((1, 1))]])
-            change = np.linalg.solve(matrix, np.append(eta + self.A @ u - delta, u.sum() - T))
-            eta, delta = eta - change[:n], delta - change[n]
+            change = np.linalg.solve(matrix, -np.append(eta + self.A @ u - delta, u.sum() - T))
+            eta, delta = eta + change[:n], delta + change[n]
             if np.abs(change[:n]).max() <= 1e-13 * self.C.max():
                 break
         else:
             raise ArithmeticError("Newton did not arrive: take smaller steps")
-        slid = (np.abs(tried - bent) * self.limits).mean(axis=1)
-        self.lost += self.ratio * self.f**2 * 1.5 * float((self.P * self.C) @ slid)
+        self.lost += (
+            self.ratio
+            * self.f**2
+            * float(self.stiffness @ (np.abs(tried - bent) * limits).mean(axis=1))
+        )
         self.bent, self.deflection, self.delta = bent, eta, delta
 
 

@@ -1,6 +1,7 @@
 """The two scenes of the load paths, with friction, and their largest loads."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scenes import MATERIAL, paper, rough
@@ -28,10 +29,21 @@ def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
     return cr.load_path(scene, loads=loads, forces=forces)
 
 
+def on_flat(points: Any, tip_radii: Any, heights: Any) -> cr.Scene:
+    """Asperities under a sphere so large that it is flat where they are, with friction."""
+    asperities = cr.Asperities(points, tip_radii, heights)
+    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+
+
+def around(load: float) -> cr.Contact:
+    """Three equal contacts around a shorter one, so crowded that they lift it out again."""
+    turn = 2 * np.pi * np.arange(3) / 3
+    points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
+    return cr.press(on_flat(points, 1.0, [-0.05, 0.0, 0.0, 0.0]), load=load)
+
+
 def shaded() -> cr.Scene:
     """A small low asperity between five crowded ones: pressed far, it loses load again."""
     turn = 2 * np.pi * np.arange(5) / 5
-    around = np.column_stack((np.cos(turn), np.sin(turn)))
-    points = np.vstack(([0.0, 0.0], around))
-    asperities = cr.Asperities(points, np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
-    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+    points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
+    return on_flat(points, np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])

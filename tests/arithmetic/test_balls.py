@@ -3,7 +3,7 @@
 import itertools
 import operator
 from collections.abc import Callable
-from math import isfinite
+from math import fsum, isfinite
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.kernels import residual
-from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
+from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
 BITS = 4000
@@ -73,10 +73,20 @@ def many_bits() -> Any:
 some = st.lists(numbers(), min_size=6, max_size=6)
 
 
-@settings(max_examples=50, deadline=None)
-@given(some, some, st.sampled_from([operator.add, operator.sub, operator.mul, operator.truediv]))
-def test_arithmetic(first: Any, second: Any, operation: Callable[[Any, Any], Any]) -> None:
+@settings(max_examples=80, deadline=None)
+@given(
+    some,
+    some,
+    st.sampled_from([operator.add, operator.sub, operator.mul, operator.truediv]),
+    st.booleans(),
+)
+def test_arithmetic(
+    first: Any, second: Any, operation: Callable[[Any, Any], Any], near: bool
+) -> None:
+    """Also of numbers that all but cancel."""
     x, y = balls(first), balls(second)
+    if near:
+        y = Ball.exact(x.mid + Pair(1e-20 * x.mid.high, 1e-40 * x.mid.low))
     found = operation(x, y)
     for i in range(len(x)):
         for a, b in itertools.product(samples(x, i), samples(y, i)):
@@ -199,3 +209,14 @@ def test_what_is_no_number_is_unknown() -> None:
         assert (bad.radius == INF).all()
         assert np.isfinite(bad.value).all()
         assert (bad + 1.0).radius[0] == INF
+
+
+@pytest.mark.parametrize("count", [1000, MANY + 3])
+def test_long_sums(count: int) -> None:
+    """Of sizes that differ; and of more numbers than are added at once."""
+    rng = np.random.default_rng(0)
+    high = rng.choice([-1, 1], (2, count)) * 10.0 ** rng.uniform(-3, 3, (2, count))
+    x = Pair(*two_sum(high, 2.0**-54 * high * rng.uniform(-1, 1, high.shape)))
+    for row, found in zip(zip(*x, strict=True), Ball.exact(x).sum(), strict=True):
+        off = fsum([*row[0], *row[1], -found.mid.high, -found.mid.low])
+        assert abs(off) <= found.radius <= 1e-28 * np.abs(row[0]).sum()

@@ -12,12 +12,7 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from convexrough.convex.cones import (
-    FIVE_CONES,
-    FIVE_CONES_LIMIT,
-    FOUR_CONES,
-    FOUR_CONES_LIMIT,
-)
+from convexrough.convex.cones import FIVE_CONES, FIVE_CONES_LIMIT, FOUR_CONES, FOUR_CONES_LIMIT
 
 S, s, t = sp.symbols("S s t", nonnegative=True)
 LIFT = sp.symbols("y1 y2 y3 y4 y5 z")
@@ -82,12 +77,6 @@ def bernstein(polynomial: Any, limit: Any) -> list[Fraction]:
     ]
 
 
-def test_the_tangent() -> None:
-    """Equal to the energy at t = s, with its slope in the load, t^3."""
-    assert sp.expand((ENERGY - LAM * t**3 + MU).subs(t, s)) == 0
-    assert sp.expand(sp.diff(ENERGY, t).subs(t, s) - LAM * 3 * s**2) == 0
-
-
 @pytest.mark.parametrize("cones", [FOUR_CONES, FIVE_CONES])
 def test_powers_satisfy_the_cones_with_equality(cones: Any) -> None:
     for x, y, w in forms(cones):
@@ -98,24 +87,30 @@ def test_powers_satisfy_the_cones_with_equality(cones: Any) -> None:
     assert sp.expand(LIFTED_ENERGY.subs(CURVE) - ENERGY) == 0
 
 
+def four_cones_as_printed() -> Any:
+    right = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
+    return right + D * (t**2 - s**2) ** 2
+
+
+def five_cones_as_printed() -> Any:
+    right = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
+    return (t - s) ** 2 * (right + B1 * t * (1 - t) + A0 * (1 - t))
+
+
 @pytest.mark.parametrize(
-    ("cones", "weights"), [(FOUR_CONES, FOUR_WEIGHTS), (FIVE_CONES, FIVE_WEIGHTS)]
+    ("cones", "weights", "printed"),
+    [
+        (FOUR_CONES, FOUR_WEIGHTS, four_cones_as_printed()),
+        (FIVE_CONES, FIVE_WEIGHTS, five_cones_as_printed()),
+    ],
 )
-def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(cones: Any, weights: Any) -> None:
+def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(
+    cones: Any, weights: Any, printed: Any
+) -> None:
+    """And so is the identity that the page prints, where the lift is the powers of t."""
     combination = sum(w * cone for w, cone in zip(weights, tangents(cones), strict=True))
     assert sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination) == 0
-
-
-def test_the_four_cone_identity_as_printed() -> None:
-    right = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
-    right += D * (t**2 - s**2) ** 2
-    assert sp.expand(ENERGY - LAM * t**3 + MU - right) == 0
-
-
-def test_the_five_cone_identity_as_printed() -> None:
-    right = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
-    right += B1 * t * (1 - t) + A0 * (1 - t)
-    assert sp.expand(ENERGY - LAM * t**3 + MU - (t - s) ** 2 * right) == 0
+    assert sp.expand(combination.subs(CURVE) - printed) == 0
 
 
 @pytest.mark.parametrize(

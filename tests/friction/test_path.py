@@ -1,11 +1,9 @@
 """Load paths: values of independent prototypes, limits, balances, and bad input."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of
+from path_scenes import LARGEST, ONE, TWO, follow, path_of
 
 import convexrough as cr
 
@@ -108,22 +106,3 @@ def test_pulled_off_and_pressed_again() -> None:
     fresh = follow("paper", [(0.6, 0), (0.6, 0.3)])
     assert path.displacements[3] == pytest.approx(fresh.displacements[1], rel=1e-13, abs=0.0)
     assert_allclose(path.forces[3], fresh.forces[1], atol=1e-14 * LARGEST["paper"])
-
-
-def test_bad_input() -> None:
-    largest = LARGEST["paper"]
-
-    def follow(loads: object, forces: object, scene: cr.Scene = PAPER) -> None:
-        cr.load_path(scene, loads=loads, forces=forces)  # type: ignore[arg-type]
-
-    with pytest.raises(cr.InputError, match=r"forces\[1\].*1\.2 f P: gross sliding"):
-        follow([largest, largest], [0.0, 0.6 * largest])
-    with pytest.raises(cr.InputError, match=r"loads\[1\].*not negative"):
-        follow([largest, -largest], [0.0, 0.0])
-    with pytest.raises(cr.InputError, match=r"forces\[1\].*before contact is lost"):
-        follow([largest, 0.0], [0.0, 1e-9 * largest])
-    with pytest.raises(cr.InputError, match="at least one"):
-        follow([], [])
-    other = cr.press(replace(PAPER, friction=0.4), load=largest)
-    with pytest.raises(cr.InputError, match="another scene"):
-        cr.load_path(PAPER, loads=[largest], forces=[0.0], start=other)

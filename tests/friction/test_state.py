@@ -5,7 +5,7 @@ import pytest
 from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed, with_friction
 from levels_reference import reference as exact
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper
+from scenes import MATERIAL
 
 import convexrough as cr
 
@@ -43,31 +43,18 @@ def test_eighty_digits(influence: str, name: str, fraction: float) -> None:
         assert cycle.balance_defect < 1e-10
 
 
-def test_the_paper_at_half_the_limit() -> None:
-    """Exactly the six asperities of ring A slide; A starts near 0.352, B near 0.616."""
-    contact = pressed("paper")
-    ring = np.round((contact.scene.asperities.distances / 0.0025) ** 2)
-    limit = FRICTION * contact.load
-    state = cr.shear(contact, force=0.5 * limit)
-    assert set(ring[state.status == "sliding"]) == {9}
-    assert (state.status == "sliding").sum() == 6
-    onsets = cr.onset_of_sliding(contact) / limit
-    assert_allclose(onsets[ring == 9], 0.352, atol=5e-4)
-    assert_allclose(onsets[ring == 7], 0.616, atol=1e-3)
-    assert np.ptp(onsets[ring == 7]) < 1e-13  # symmetric rings slide together
-    assert np.nanmax(onsets) == pytest.approx(1.0, abs=1e-12)
-    assert np.isnan(onsets[contact.loads == 0]).all()
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("influence", KINDS)
 def test_onsets_are_where_sliding_starts(influence: str, name: str) -> None:
     contact = pressed(name, influence)
+    limit, every = FRICTION * contact.load, cr.onset_of_sliding(contact)
+    assert np.nanmax(every) == pytest.approx(limit, rel=1e-12)
+    assert np.isnan(every[contact.loads == 0]).all()
     some = np.flatnonzero(contact.loads)[::7]
     onsets = dict(zip(some, cr.onset_of_sliding(contact, which=some), strict=True))
     for i in some:
-        if onsets[i] < 0.999 * FRICTION * contact.load:
+        if onsets[i] < 0.999 * limit:
             before = cr.shear(contact, force=onsets[i] * (1 - 1e-9))
             after = cr.shear(contact, force=onsets[i] * (1 + 1e-9))
             assert before.slips[i] == 0
@@ -99,19 +86,6 @@ def test_zero_and_the_limit() -> None:
     assert back.displacement == -forth.displacement
 
 
-def test_gross_sliding_is_refused() -> None:
-    contact = pressed("paper")
-    limit = FRICTION * contact.load
-    for force in (1.01 * limit, -1.01 * limit):
-        with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding"):
-            cr.shear(contact, force=force)
-    with pytest.raises(cr.InputError, match="found nan, expected a finite number"):
-        cr.shear(contact, force=float("nan"))
-    frictionless = cr.press(paper(), approach=PAPER_APPROACH)
-    with pytest.raises(cr.InputError, match="coefficient of friction"):
-        cr.shear(frictionless, force=1e-9)
-
-
 def test_nothing_loaded() -> None:
     scene = with_friction(
         cr.Scene(1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL, geometry="summit")
@@ -120,11 +94,4 @@ def test_nothing_loaded() -> None:
     state = cr.shear(contact, force=0.0)
     assert (state.forces == 0).all()
     assert (state.status == "open").all()
-    with pytest.raises(cr.InputError, match="at most f P = 0"):
-        cr.shear(contact, force=1e-9)
-
-
-@pytest.mark.parametrize("force", [[1e-8, 2e-8], "a", None, 1 + 1j])
-def test_a_force_is_a_number(force: object) -> None:
-    with pytest.raises(cr.InputError):
-        cr.shear(pressed("paper"), force=force)  # type: ignore[arg-type]
+    assert cr.shear(contact, displacement=0.0).force == 0.0

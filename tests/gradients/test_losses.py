@@ -122,20 +122,6 @@ def test_gross_sliding_from_one_side() -> None:
     np.testing.assert_allclose(moved.heights, expected, rtol=1e-14)
 
 
-def test_no_derivative_in_gross_sliding() -> None:
-    contact = pressed("rough", "load")
-    force = FRICTION * contact.load
-    with pytest.raises(cr.InputError, match="at constant approach f P may fall below"):
-        cr.cycle(contact, maximum=force).gradient(holding="approach")
-    pair = cr.Asperities([[-0.0015, 0.0], [0.0015, 0.0]], 0.02)
-    even = with_friction(cr.Scene(1.0, pair, cr.Material(1.0, 0.3), geometry="summit"))
-    together = cr.press(even, load=1e-8)
-    with pytest.raises(cr.InputError, match="several asperities slide last"):
-        cr.cycle(together, maximum=FRICTION * together.load).gradient()
-    with pytest.raises(cr.InputError, match="asperity: found 1, which slides last, together with"):
-        cr.onset_gradient(together, 1)
-
-
 def test_many_asperities_by_every_operator() -> None:
     asperities = cr.Asperities.hexagonal(
         spacing=2.5e-4, tip_radius=2e-3, within=2.5e-3, height_std=3e-8, seed=1

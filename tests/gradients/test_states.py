@@ -306,17 +306,6 @@ def test_histories_are_paths_whose_load_is_one() -> None:
     assert same.friction == last.friction
 
 
-def test_what_has_no_derivative() -> None:
-    contact = small()
-    scene = contact.scene
-    with pytest.raises(cr.InputError, match="a contact with a load"):
-        cr.press(scene, approach=-1e-4).gradient(load=1.0)
-    with pytest.raises(cr.InputError, match="in gross sliding a history has no derivative"):
-        cr.history(contact, forces=[FRICTION * contact.load]).gradient(losses=[1.0])
-    with pytest.raises(cr.InputError, match="19 values, one per asperity"):
-        contact.gradient(loads=[1.0, 2.0])
-
-
 def test_where_order_fails_there_is_no_sum_of_levels() -> None:
     contact = cr.press(shaded(), load=2.96)
     cycle = cr.cycle(contact, maximum=0.25 * contact.load)

@@ -5,8 +5,10 @@ import pytest
 from extended import inverse_sums
 from numpy.testing import assert_allclose
 from point_layouts import LAYOUTS, disc, jittered
+from scenes import MATERIAL
 
 import convexrough as cr
+from convexrough.influence import couple
 from convexrough.influence.coupling import JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
@@ -188,3 +190,15 @@ def test_the_preconditioner(layout: str, rough: float) -> None:
     assert np.linalg.cond(np.linalg.cholesky(M).T @ np.linalg.cholesky(whole)) ** 2 < (
         0.9 if layout == "clustered" else 0.4
     ) * np.linalg.cond(whole)
+
+
+def test_slopes_on_a_mesh() -> None:
+    rng = np.random.default_rng(1)
+    asperities = cr.Asperities(rng.uniform(-1, 1, size=(3000, 2)), 1e-3)
+    scene = cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+    loads = rng.uniform(0.5, 1.0, size=3000)
+    mesh, matrix = (couple(scene, np.arange(3000), 1.0, kind) for kind in ("scattered", "dense"))
+    assert mesh._double.splitting.meshed  # type: ignore[attr-defined]
+    found, expected = mesh.slopes(loads), matrix.slopes(loads)
+    off = np.abs(found - expected).max(axis=1)
+    assert (off <= 1e-10 * np.median(np.abs(expected))).all()

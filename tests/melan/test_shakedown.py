@@ -343,29 +343,3 @@ def test_one_asperity_slides_on_only_as_all_do(kind: str) -> None:
     assert found.gross == pytest.approx(5.0)
     assert found.proved
     assert found.gap < 1e-10
-
-
-def test_bad_input() -> None:
-    with pytest.raises(cr.InputError, match="force_amplitudes"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=[0.0, 0.0])
-    with pytest.raises(cr.InputError, match="force_amplitudes: found none"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=[])
-    with pytest.raises(cr.InputError, match=r"force_amplitudes\[0\].*finite"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=[np.nan, 1.0])
-    with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, one"):
-        cr.shakedown(PAPER, loads=P, load_amplitudes=[1e-9, 0, 0], force_amplitudes=SWING)
-    for wrong in ([["a", 0.0]], [[np.inf, 0.0]], np.zeros((0, 2))):
-        with pytest.raises(cr.InputError, match="force_amplitudes"):
-            cr.shakedown(PAPER, loads=P, force_amplitudes=wrong, kind="vector")
-    with pytest.raises(cr.InputError, match="kind"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="plastic")  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match=r"load_amplitudes.*not .exact."):
-        cr.shakedown(
-            PAPER, loads=P, load_amplitudes=0.1 * P, force_amplitudes=SWING, kind="elastic"
-        )
-    with pytest.raises(cr.InputError, match="forces"):
-        cr.shakedown(PAPER, loads=P, forces=P, force_amplitudes=SWING)
-    with pytest.raises(cr.InputError, match="shape"):
-        cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="vector")
-    with pytest.raises(cr.InputError, match="loads"):
-        cr.shakedown(PAPER, loads=-P, force_amplitudes=SWING)

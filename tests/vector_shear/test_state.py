@@ -11,7 +11,6 @@ from friction_scenes import (
     pressed,
 )
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough import shear_vector
@@ -99,17 +98,3 @@ def test_gross_sliding() -> None:
     assert_allclose(finite.displacement[0], scalar.displacement, rtol=1e-13)
     assert_allclose(finite.slips[:, 0], scalar.slips, atol=1e-13 * scalar.displacement)
     assert finite.residual < 1e-13
-
-
-def test_bad_input() -> None:
-    contact = pressed("paper")
-    limit = FRICTION * contact.load
-    for force in (1.01 * limit, -1.01 * limit, (limit, 0.2 * limit)):
-        with pytest.raises(cr.InputError, match=r"force: found .*\(1\.0\d+ f P: gross sliding\)"):
-            shear_vector(contact, force=force)
-    for force in (float("nan"), (0.0, float("inf")), "much", None):
-        with pytest.raises(cr.InputError, match="force"):
-            shear_vector(contact, force=force)
-    frictionless = cr.press(paper(), approach=PAPER_APPROACH)
-    with pytest.raises(cr.InputError, match="coefficient of friction"):
-        shear_vector(frictionless, force=1e-9)
