@@ -1,4 +1,4 @@
-"""The smooth sphere: quadrature, 60 digits, one asperity in the whole package, dense arrays."""
+"""The smooth sphere and the smooth ellipsoid: quadrature, 60 digits, one asperity, dense arrays."""
 
 from typing import Any
 
@@ -7,54 +7,30 @@ import pytest
 from flint import arb, ctx
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper
+from scipy.integrate import quad
+from scipy.special import ellipe, ellipk
 
 import convexrough as cr
-from convexrough import fields
-from convexrough.sphere.smooth import SmoothSphere, smooth
+from convexrough.sphere.smooth import SmoothEllipsoid, SmoothSphere, smooth, smooth_reference
 
 R, RHO, FRICTION = 1.3, 0.4, 0.35
 RELATIVE = 1 / (1 / R + 1 / RHO)
+ALONE = cr.Asperities([(0.0, 0.0)], 1.0)  # of no consequence
 LOAD, NU = 2e-6, 0.3
-FRACTIONS = np.array([1e-12, 1e-6, 1e-3, 0.1, 0.37, 0.5, 0.9, 0.999, 1.0])
+PARTS = np.array([0.0, 0.25, 0.5, 0.95, 1.2])  # of the contact radius
 
 
 def sphere(friction: float | None = FRICTION, nu: float = NU) -> SmoothSphere:
-    asperities = cr.Asperities([(0.0, 0.0)], 1.0)  # of no consequence
-    return smooth(
-        cr.Scene(RELATIVE, asperities, cr.Material(3.0, nu), friction, geometry="summit"), load=LOAD
-    )
-
-
-def one_asperity(nu: float = NU) -> cr.Contact:
-    """A sphere pressed on one other: a smooth sphere of their relative radius."""
-    asperities = cr.Asperities([(0.0, 0.0)], RHO)
-    return cr.press(
-        cr.Scene(R, asperities, cr.Material(3.0, nu), FRICTION, geometry="summit"), load=LOAD
-    )
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-def test_one_asperity_is_a_smooth_sphere_under_shear(nu: float, sign: int) -> None:
-    contact, hertz = one_asperity(nu), sphere(nu=nu)
-    r = hertz.contact_radius * np.array([0.0, 0.2, 0.6, 0.95, 1.2])
-    for force in sign * FRACTIONS * hertz.largest_force:
-        state = cr.shear(contact, force=force)
-        assert state.displacement == pytest.approx(hertz.displacement(force), rel=1e-13)
-        # 1 - t is known to rounding only: near gross sliding the stick disc is not known better
-        error = hertz.contact_radius * 1e-15 ** (1 / 3)
-        assert state.stick_radii[0] == pytest.approx(hertz.stick_radius(force), rel=1e-9, abs=error)
-        assert_allclose(
-            fields.traction(state, np.column_stack((0.6 * r, 0.8 * r))),
-            hertz.traction(r, force),
-            rtol=1e-9,
-        )
+    scene = cr.Scene(RELATIVE, ALONE, cr.Material(3.0, nu), friction, geometry="summit")
+    return smooth(scene, load=LOAD)
 
 
 @pytest.mark.parametrize("t", [0.6, -0.6, 1.0])
 def test_branches_are_those_of_a_history(t: float) -> None:
-    contact, hertz = one_asperity(), sphere()
+    """Of one asperity, on which a sphere is pressed: a smooth sphere of their relative radius."""
+    hertz, asperities = sphere(), cr.Asperities([(0.0, 0.0)], RHO)
+    scene = cr.Scene(R, asperities, cr.Material(3.0, NU), FRICTION, geometry="summit")
+    contact = cr.press(scene, load=LOAD)
     turning = t * hertz.largest_force
     back = turning * np.linspace(1, -1, 9)
     past = cr.history(contact, forces=back)
@@ -76,7 +52,7 @@ def exact(t: Any, nu: Any) -> dict[str, Any]:
         loss = 1 - left**5 - 5 * t / 6 * (1 + left**2)
 
         def traction(r: float) -> Any:
-            whole = f * p0 * (1 - (arb(r) / a) ** 2).sqrt()
+            whole = f * p0 * (1 - (arb(r) / a) ** 2).sqrt() if arb(r) < a else arb(0)
             return whole - (f * p0 * left * (1 - (arb(r) / c) ** 2).sqrt() if arb(r) < c else 0)
 
         return {
@@ -84,7 +60,7 @@ def exact(t: Any, nu: Any) -> dict[str, Any]:
             "stick_radius": float(c),
             "energy": float(scale * loss),
             "energy_scale": float(scale),
-            "traction": [float(traction(float(a) * part)) for part in (0.0, 0.25, 0.5)],
+            "traction": [float(traction(float(a) * part)) for part in PARTS],
         }
 
 
@@ -99,38 +75,9 @@ def test_sixty_digits(t: float, nu: float) -> None:
     for name in ("displacement", "stick_radius", "energy"):
         value = float(getattr(hertz, name)(Q))
         assert value == pytest.approx(true[name], rel=tolerance), name
-    r = np.array([0, a / 4, a / 2])
-    assert_allclose(hertz.traction(r, Q), true["traction"], rtol=1e-13)
-
-
-def test_gross_sliding_is_refused() -> None:
-    hertz = sphere()
-    limit = hertz.largest_force
-    for law in (hertz.displacement, hertz.stick_radius, hertz.energy, lambda Q: hertz.branch(0, Q)):
-        with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding.*at most f P"):
-            law(1.01 * limit)
-    with pytest.raises(cr.InputError, match=r"force\[1\].*gross sliding"):
-        hertz.traction(0.0, [0.0, -1.01 * limit, 2 * limit])
-    with pytest.raises(cr.InputError, match=r"minimum: found.*gross sliding"):
-        hertz.energy(0.0, -2 * limit)
-
-
-def test_bad_input() -> None:
-    hertz = sphere()
-    Q = hertz.largest_force / 2
-    with pytest.raises(cr.InputError, match=r"maximum: found 0.*at least the minimum"):
-        hertz.energy(0.0, Q)
-    with pytest.raises(cr.InputError, match=r"maximum.*at least the minimum"):
-        hertz.energy([Q, -Q])
-    with pytest.raises(cr.InputError, match=r"force: found.*at most the turning force"):
-        hertz.branch([0.0, 1.1 * Q], Q)
-    with pytest.raises(cr.InputError, match=r"force: found nan"):
-        hertz.displacement(np.nan)
-    with pytest.raises(cr.InputError, match=r"force.*numbers"):
-        hertz.displacement("much")
-    for load in (0.0, -1.0, np.nan):
-        with pytest.raises(cr.InputError, match=r"load.*positive"):
-            smooth(paper(), load=load)
+    assert hertz.displacement(-Q) == -hertz.displacement(Q)
+    assert_allclose(hertz.traction(PARTS * a, Q), true["traction"], rtol=1e-13)
+    assert_allclose(hertz.traction(PARTS * a, -Q), -hertz.traction(PARTS * a, Q))
 
 
 def differences(spacing: float) -> list[float]:
@@ -164,3 +111,82 @@ def test_many_small_asperities_are_a_smooth_sphere() -> None:
     assert_allclose(rates, 1.0, atol=0.2)
     assert_allclose(rates[:2], 1.0, atol=0.1)
     assert_allclose(fine, [0.0453, 0.0126, 0.0316, 0.0412], rtol=0.01)  # softer, and so costlier
+
+
+HERTZ = sphere()
+LIMIT = HERTZ.largest_force
+BAD = [
+    *((lambda law=law: law(1.01 * LIMIT), r"1\.01 f P: gross sliding.*at most f P")
+      for law in (HERTZ.displacement, HERTZ.stick_radius, HERTZ.energy)),
+    (lambda: HERTZ.branch(0, 1.01 * LIMIT), r"1\.01 f P: gross sliding.*at most f P"),
+    (lambda: HERTZ.traction(0.0, [0.0, -1.01 * LIMIT, 2 * LIMIT]), r"force\[1\].*gross sliding"),
+    (lambda: HERTZ.energy(0.0, -2 * LIMIT), r"minimum: found.*gross sliding"),
+    (lambda: HERTZ.energy(0.0, LIMIT / 2), r"maximum: found 0.*at least the minimum"),
+    (lambda: HERTZ.energy([LIMIT / 2, -LIMIT / 2]), r"maximum.*at least the minimum"),
+    (lambda: HERTZ.branch([0.0, 0.55 * LIMIT], LIMIT / 2), r"found.*at most the turning force"),
+    (lambda: HERTZ.displacement(np.nan), r"force: found nan"),
+    (lambda: HERTZ.displacement("much"), r"force.*numbers"),
+    *((lambda load=load: smooth(paper(), load=load), r"load.*positive")
+      for load in (0.0, -1.0, np.nan)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "message"), BAD)
+def test_bad_input(call: Any, message: str) -> None:
+    with pytest.raises(cr.InputError, match=message):
+        call()
+
+
+def ellipsoid(radii: Any, load: float, nu: float = 0.3) -> SmoothEllipsoid:
+    found = cr.smooth(
+        cr.Scene(radii, ALONE, cr.Material(3.0, nu), friction=0.4, geometry="summit"), load=load
+    )
+    assert isinstance(found, SmoothEllipsoid)
+    return found
+
+
+@pytest.mark.parametrize("radii", [(1.0, 1.001), (2.0, 0.7), (0.1, 4.0), (1.0, 1e6)])
+def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float]) -> None:
+    """Johnson (3.26), with a the longer axis and e^2 = 1 - b^2/a^2."""
+    hertz = ellipsoid(radii, load=2e-6)
+    a, b = sorted(hertz.semi_axes, reverse=True)
+    assert (hertz.semi_axes[0] > hertz.semi_axes[1]) == (radii[0] > radii[1])
+    m = 1 - (b / a) ** 2
+    size = hertz.peak_pressure / 3.0 * b / (m * a**2)  # p0 / E* and so on
+    flatter, sharper = max(radii), min(radii)
+    near_round = {"rel": 1e-9} if m < 0.01 else {"rel": 1e-12}  # K - E cancels there
+    assert size * (ellipk(m) - ellipe(m)) == pytest.approx(1 / (2 * flatter), **near_round)
+    assert size * ((a / b) ** 2 * ellipe(m) - ellipk(m)) == pytest.approx(
+        1 / (2 * sharper), **near_round
+    )
+    assert hertz.approach == pytest.approx(hertz.peak_pressure / 3.0 * b * ellipk(m), rel=1e-12)
+    assert hertz.peak_pressure * 2 / 3 * np.pi * a * b == pytest.approx(2e-6, rel=1e-14)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_loss_is_eight_times_the_error_of_the_trapezoid(share: float) -> None:
+    """W = 8 c_t f^2 {V(P) - V(L) - (P - L) (D0(P) + D0(L)) / 2}, L = P - Q / f, V' = D0."""
+    load, radii, nu = 4e-6, (1.0, 3.0), 0.2
+    hertz = ellipsoid(radii, load, nu)
+
+    def approach(P: float) -> float:
+        return ellipsoid(radii, P).approach
+
+    left = (1 - share) * load
+    area = quad(approach, left, load, epsabs=0, epsrel=1e-12)[0]
+    trapezoid = (load - left) * (approach(load) + approach(left)) / 2
+    loss = 8 * (2 - nu) / (2 * (1 - nu)) * 0.4**2 * (area - trapezoid)
+    assert hertz.energy(share * hertz.largest_force) == pytest.approx(loss, rel=1e-6)
+    stick = hertz.stick_radius(share * hertz.largest_force) / hertz.contact_radius
+    assert stick == pytest.approx(np.cbrt(1 - share), rel=1e-14)
+
+
+@pytest.mark.parametrize(("base", "name"), [(np.inf, "a flat"), ((np.inf, 1.0), "a cylinder")])
+def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
+    scene = cr.Scene(base, ALONE, MATERIAL, friction=0.5, geometry="summit")
+    assert smooth_reference(scene, 1.0) is None
+    with pytest.raises(cr.InputError, match=f"scene: found {name}, expected a sphere or an"):
+        cr.smooth(scene, load=1.0)
+    cycle = cr.cycle(cr.press(scene, load=1e-6), maximum=1e-7)
+    assert cycle.loss > 0
+    assert np.isnan([cycle.loss_normalised, cycle.smooth_normalised]).all()

@@ -1,15 +1,16 @@
-"""Traction and displacement under shear: Cerruti's integral, and balance."""
+"""Surface displacements: Boussinesq's and Cerruti's integrals; tractions under shear balance."""
 
 from typing import Any
 
 import numpy as np
 import pytest
+from friction_scenes import FRICTION, pressed
 from numpy.testing import assert_allclose
-from scenes import NAMED
+from scipy.integrate import dblquad
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.sphere import surface_shear
+from convexrough.sphere import hertz, surface_shear
 
 A, PEAK, G = 0.7, 2.0, 3.0
 RATIOS = [0.0, 0.3, 0.5]
@@ -59,23 +60,12 @@ def test_displacement_is_cerrutis_integral(ratio: float, nu: float) -> None:
         assert displacement(r, angle, nu, 0.4) == pytest.approx(whole - stuck, rel=3e-6)
 
 
-# Whole scenes
-
-
-def sheared(name: str, fraction: float, nu: float = 0.3) -> cr.ShearState:
-    scene, approach = NAMED[name]
-    material = cr.Material(scene.material.contact_modulus, nu)
-    scene = cr.Scene(scene.sphere_radius, scene.asperities, material, 0.5, scene.geometry)
-    contact = cr.press(scene, approach=approach)
-    return cr.shear(contact, force=fraction * 0.5 * contact.load)
-
-
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("fraction", [0.01, 0.5, -0.5, 0.95, 1.0])
 @pytest.mark.parametrize("name", ["paper", "rough, closest", "steel"])
 def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fraction: float) -> None:
-    state = sheared(name, fraction)
-    contact = state.contact
+    contact = pressed(name)
+    state = cr.shear(contact, force=fraction * FRICTION * contact.load)
     touching = contact.loads > 0
     centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
     c = state.stick_radii[touching]
@@ -90,3 +80,19 @@ def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fracti
             forces += weight * 2 * np.pi * squared * np.cos(angle) * np.sin(angle) * traction
     assert_allclose(forces, state.forces[touching], rtol=1e-7)
     assert forces.sum() == pytest.approx(state.force, rel=1e-7)
+
+
+@pytest.mark.parametrize("distance", [1.2, 2.0, 7.0])
+def test_displacement_outside_is_boussinesqs_integral(distance: float) -> None:
+    modulus, radius = 3.0, 0.7
+    a = float(hertz.contact_radius(2e-5, modulus, radius))
+    r, peak = distance * a, float(hertz.peak_pressure(a, modulus, radius))
+
+    def kernel(angle: float, tilt: float) -> float:  # at a distance s = A sin(tilt) from the axis
+        s = a * np.sin(tilt)
+        apart = np.sqrt(r**2 + s**2 - 2 * r * s * np.cos(angle))
+        ring = hertz.pressure(s, a, peak) * s * a * np.cos(tilt)
+        return float(ring / (np.pi * modulus * apart))
+
+    integral = 2 * dblquad(kernel, 0, np.pi / 2, 0, np.pi, epsabs=0, epsrel=1e-10)[0]
+    assert hertz.surface_displacement(r, a, radius) == pytest.approx(integral, rel=1e-9)
