@@ -4,6 +4,7 @@ from typing import Any
 
 import multiprecision
 import numpy as np
+from flint import arb, ctx
 from numpy.typing import NDArray
 
 import convexrough as cr
@@ -22,6 +23,18 @@ def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None
     assert (gap_errors <= certificate.gap_errors).all()
     drift = abs(float(multiprecision.errors([certificate.approach], [exact.approach])[0]))
     assert drift <= certificate.approach_error
+
+
+def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None) -> float:
+    """The energy of loads, in many digits scaled to a prescribed total, above that of `exact`."""
+    with ctx.workdps(120):
+        given = [arb(float(load)) for load in loads]
+        if total is not None:
+            given = [arb(total) * each / sum(given) for each in given]
+        one, other = (
+            multiprecision.energy(scene, each, exact.approach) for each in (given, exact.loads)
+        )
+        return float((one - other).mid())
 
 
 def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:

@@ -1,25 +1,15 @@
 """Certificates under attack at the ends of arithmetic; judged in whole numbers and in 60 digits."""
 
 from fractions import Fraction
-from typing import Any
 
 import multiprecision
 import numpy as np
 import pytest
+from attacks import excess
 from flint import arb, ctx
 from scenes import MATERIAL, PAPER_APPROACH, STEEL, paper, reference
 
 import convexrough as cr
-
-
-def excess(scene: cr.Scene, loads: Any, exact: multiprecision.Reference) -> float:
-    """The energy of loads above that of the solution."""
-    with ctx.workdps(120):
-        given = [arb(float(load)) for load in loads]
-        one, other = (
-            multiprecision.energy(scene, each, exact.approach) for each in (given, exact.loads)
-        )
-        return float(one - other)
 
 
 @pytest.mark.parametrize("radius", [0.7, 1.3])

@@ -43,6 +43,12 @@ def square(**options: Any) -> cr.Asperities:
     return cr.Asperities.square(**({"spacing": 1, "tip_radius": 1, "within": 1} | options))
 
 
+def fine() -> cr.Scene:
+    """Memory is asked for so many before it is taken."""
+    asperities = cr.Asperities.hexagonal(spacing=2e-5, tip_radius=1e-4, within=0.0102)
+    return cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+
+
 def one(radius: float = 1.0, **options: Any) -> cr.Scene:
     return cr.Scene(radius, cr.Asperities([[0, 0]], 1), MATERIAL, **options)
 
@@ -50,7 +56,6 @@ def one(radius: float = 1.0, **options: Any) -> cr.Scene:
 BAD = [
     (lambda: cr.Material(0.0, 0.3), "contact_modulus: found 0.0, expected a positive number"),
     (lambda: cr.Material(1.0, 0.51), "poisson_ratio: found 0.51, expected a number from 0.0 to 0"),
-    # type: ignore[arg-type]
     (lambda: cr.Asperities([], 1.0), "positions: found no asperity"),
     (lambda: cr.Asperities([[0, 0, 0]], 1.0), r"positions: found shape \(1, 3\)"),
     (lambda: cr.Asperities([[0, 0], [0, np.nan]], 1.0), r"positions\[1\]: found"),
@@ -60,7 +65,6 @@ BAD = [
         r"asperities 0 and 2 \(from 0\) at a distance of 0",
     ),
     (lambda: square(height_std=1), "seed: found None"),
-    # type: ignore[arg-type]
     (lambda: cr.press(paper(), approach=1e-80), "choose other units"),
     (
         lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
@@ -74,10 +78,21 @@ BAD = [
     (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
     (lambda: cr.press(paper()), "approach, load: found neither"),
     (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),
+    (lambda: cr.press(fine(), approach=5e-5, influence="dense"), r"could touch: found 9\.07e\+05"),
+    (lambda: cr.certify(paper(), np.zeros(61)), "exactly one of the two"),
+    (
+        lambda: cr.certify(paper(), np.zeros(61), approach=1e-5, load=1e-7),
+        "exactly one of the two",
+    ),
+    (lambda: cr.certify(paper(), np.zeros(60), approach=5e-5), "expected 61 values"),
+    (lambda: cr.certify(paper(), -np.ones(61), approach=5e-5), r"loads\[0\]: found -1.0"),
+    (lambda: cr.certify(paper(), np.full(61, np.nan), approach=5e-5), r"loads\[0\]: found nan"),
+    (lambda: cr.certify(paper(), np.full(61, np.inf), approach=5e-5), r"loads\[0\]: found inf"),
+    (lambda: cr.certify(paper(), ["a"] * 61, approach=5e-5), "expected numbers"),
 ]
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(16)
 @pytest.mark.parametrize(("call", "message"), BAD)
 def test_bad_values(call: Any, message: str) -> None:
     with pytest.raises(cr.InputError, match=message) as caught:
