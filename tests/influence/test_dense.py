@@ -21,11 +21,10 @@ def shell_radii(points: np.ndarray) -> np.ndarray:
     return SCALE / shells(DenseInfluence.assemble(points, SCALE))
 
 
-def two_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[arb]:
-    """A P in 60 digits, of points taken as exact."""
-    ctx.dps = 60
-    places, forces = exact(points), exact(loads)
-    return [arb(scale) * inverse_sum(places, forces, i) for i in range(len(points))]
+def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
+    """sum_j P_j / r_ij in 120 digits."""
+    ctx.dps = 120
+    return inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
 
 
 @settings(max_examples=10, deadline=None)
@@ -36,19 +35,14 @@ def test_rounding_is_a_bound(seed: int, count: int) -> None:
     points = rng.uniform(-1, 1, (count, 2))
     loads = rng.random(count) ** 8 * (rng.choice([-1, 1], count) if seed % 2 else 1)
     operator = DenseInfluence.assemble(points, SCALE)
-    computed, exact = operator.apply(loads), two_product(points, SCALE, loads)
+    computed, pair = operator.apply(loads), Pair.exact(loads)
+    exact = [arb(SCALE) * sums(points, pair, i) for i in range(count)]
     assert operator.rounding(loads).each == 0
     # It is asked for with A |P| as computed, which is off itself.
     bounds = operator.rounding(loads).of(operator.apply(np.abs(loads))) * (1 + 1e-12)
     off = np.array([abs(float(v - t)) for v, t in zip(map(arb, computed), exact, strict=True)])
     assert (off <= bounds).all()
     assert bounds.max() <= 1e-14 * operator.apply(np.abs(loads)).max()
-
-
-def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
-    """sum_j P_j / r_ij in 120 digits."""
-    ctx.dps = 120
-    return inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
 
 
 @settings(max_examples=40, deadline=None)

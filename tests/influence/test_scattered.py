@@ -103,20 +103,6 @@ def test_among_and_onto() -> None:
         assert ((above >= exactly) & (above <= 1.05 * exactly + 0.01 * exactly.max())).all()
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_matrix_separations_and_crowding(layout: str) -> None:
-    rng = np.random.default_rng(7)
-    points = LAYOUTS[layout](rng)[rng.permutation(3000)]
-    dense = DenseInfluence.assemble(points, SCALE)
-    operator = ScatteredInfluence(points, SCALE)
-    assert_allclose(operator.separations(), dense.separations(), rtol=1e-14)
-    assert_allclose(operator.matrix, dense.matrix)
-    assert operator.entry_error == pytest.approx(dense.entry_error)
-    for radii in (rng.random(3000), 10.0 ** rng.uniform(-6, 0, 3000), np.zeros(3000)):
-        assert operator.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
-
-
 def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [-1.3, 0.0], [-2.2, 0.0]])
     operator = ScatteredInfluence(points, SCALE)
@@ -170,26 +156,6 @@ def test_presses_of_points_in_distant_clusters() -> None:
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
         scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
-
-
-@pytest.mark.parametrize("layout", ["disc", "clustered", "jittered"])
-@pytest.mark.parametrize("rough", [0.0, 1.0])
-def test_the_preconditioner(layout: str, rough: float) -> None:
-    """It is symmetric and positive definite, and makes I + W A W better conditioned."""
-    rng = np.random.default_rng(9)
-    points = LAYOUTS[layout](rng)[rng.permutation(3900)[:700]]
-    operator = ScatteredInfluence(points, SCALE)
-    root = np.sqrt(operator.separations() / (3 * SCALE))  # so that I + W A W is definite
-    root *= np.exp(-rough * rng.random(700))
-    smooth = operator.smoother(root)
-    M = np.stack([smooth(column)[0] for column in np.eye(700, dtype=np.float32)])
-    M = M.astype(np.float64)
-    assert_allclose(M, M.T, atol=1e-5)
-    assert np.linalg.eigvalsh(M)[0] > 0
-    whole = np.eye(700) + operator.matrix * root * root[:, None]
-    assert np.linalg.cond(np.linalg.cholesky(M).T @ np.linalg.cholesky(whole)) ** 2 < (
-        0.9 if layout == "clustered" else 0.4
-    ) * np.linalg.cond(whole)
 
 
 def test_slopes_on_a_mesh() -> None:
