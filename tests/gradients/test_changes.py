@@ -6,18 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRICTION, with_friction
+from friction_scenes import FRICTION, pressed
 from gradient_oracle import DIGITS, STEP, Setup, exact
 from levels_reference import of_setup
-from scenes import NAMED
 
 import convexrough as cr
-
-
-def pressed(name: str, control: str) -> cr.Contact:
-    scene, approach = NAMED[name]
-    contact = cr.press(with_friction(scene), approach=approach)
-    return contact if control == "approach" else cr.press(contact.scene, load=contact.load)
 
 
 def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) -> cr.Direction:
@@ -64,7 +57,7 @@ CASES = [
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
 def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
-    contact = pressed(name, holding)
+    contact = pressed(name, control=holding)
     force = fraction * FRICTION * contact.load
     along = direction(contact, holding, force)
     change = cr.shear(contact, force=force).change(along)
@@ -92,7 +85,7 @@ def test_everything_that_changes(name: str, holding: str, fraction: float) -> No
 
 
 def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
-    by_load, by_approach = pressed("rough", "load"), pressed("rough", "approach")
+    by_load, by_approach = pressed("rough", control="load"), pressed("rough")
     raised = cr.Direction(heights=1e-9)
     assert by_load.change(raised).approach == pytest.approx(-1e-9, rel=1e-12)
     assert abs(by_load.change(raised).load) < 1e-12 * by_approach.change(raised).load

@@ -2,14 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_scenes import (
-    FRICTION,
-    VECTOR_FRACTIONS,
-    VECTOR_NAMES,
-    found,
-    lengths,
-    pressed,
-)
+from friction_scenes import FRICTION, VECTOR_FRACTIONS, VECTOR_NAMES, found, lengths, pressed
 from numpy.testing import assert_allclose
 
 import convexrough as cr
