@@ -67,18 +67,3 @@ def found(name: str, nu: float, fraction: float, conic: bool = False) -> VectorS
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
     return np.hypot(*vectors.T)
-
-
-@cache
-def cerruti(scene: cr.Scene) -> np.ndarray:
-    """(n, n, 2, 2) C_ij for both bodies, entry by entry from physics."""
-    G, nu = scene.material.shear_modulus, scene.material.poisson_ratio
-    points = scene.contact_points
-    C = np.zeros((len(points), len(points), 2, 2))
-    for i, here in enumerate(points):
-        for j, there in enumerate(points):
-            if i != j:
-                r = float(np.hypot(*(here - there)))
-                d = (here - there) / r
-                C[i, j] = ((1 - nu) * np.eye(2) + nu * np.outer(d, d)) / (np.pi * G * r)
-    return C

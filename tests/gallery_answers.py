@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
-from multiprecision import NotProved
+from multiprecision import NotProved, slide
 from scenes import solve_exactly
 
 import convexrough as cr
@@ -56,22 +56,18 @@ def sheared(scene: cr.Scene, full: Any, force: float) -> dict[str, Any]:
     """Nothing where an asperity would be dragged along."""
     with ctx.workdps(DIGITS + 30):
         f, nu = arb(scene.friction), arb(scene.material.poisson_ratio)
-        travel = f * (2 - nu) / (2 * (1 - nu))
         left = full.load - arb(force) / f
         loads = np.array([float(load.mid()) for load in full.loads])
         start = loads * float((left / full.load).mid())
         contact = cr.press(scene, load=float(left.mid()), start=start)
         reduced = solve_exactly(scene, load=left, start=contact.loads, digits=DIGITS)
-        forces = [f * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
-        if any(each < 0 for each in forces):
+        slid = slide(f, nu, full, reduced)
+        if any(each < 0 for each in slid.forces):
             return {"forces": [], "slips": [], "displacement": ""}
-        touch = [load > 0 for load in full.loads]
-        pairs = zip(reduced.gaps, touch, strict=True)
-        slips = [travel * gap if touches else arb(0) for gap, touches in pairs]
         return {
-            "forces": [digits(each) for each in forces],
-            "slips": [digits(each) for each in slips],
-            "displacement": digits(travel * (full.approach - reduced.approach)),
+            "forces": [digits(each) for each in slid.forces],
+            "slips": [digits(each) for each in slid.slips],
+            "displacement": digits(slid.displacement),
         }
 
 

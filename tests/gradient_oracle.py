@@ -7,19 +7,17 @@ float64 and must not change within a step. `levels_reference` makes friction of 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx
+from flint import arb, ctx
+from multiprecision import Balls, NormalMap, assemble, coupling, cube_root, exact, mid, solve_linear
 
 import convexrough as cr
 from convexrough.arrays import Array
 
 DIGITS = 130
 STEP = "1e-25"  # of each parameter over its own size
-Balls: TypeAlias = Any  # an arb, or an object array of arb
-
-exact = np.vectorize(lambda value: arb(float(value)), otypes=[object])
 
 
 @dataclass(frozen=True)
@@ -60,65 +58,31 @@ class Setup:
 
 
 class Oracle:
-    """The state of a setup, solved from one near it, in multiprecision.
+    """The state of a setup, by Newton's steps from one near it, and not proved.
 
-    near : loads (n,) and the approach; of another oracle, or of a contact
+    loads, approach : (n,) and one number, of another oracle or of a contact
     """
 
     def __init__(self, setup: Setup, loads: Balls, approach: Balls, steps: int = 4) -> None:
         s = self.setup = setup
-        self.touching = np.flatnonzero([bool(load > 0) for load in loads])
-        rho, R, E = s.tip_radii, s.sphere_radius, s.contact_modulus
-        self.k = cube_root(arb(9) / 16 / (E * E) * (1 / R + 1 / rho))
-        r2 = (s.positions**2).sum(axis=1)
-        closest = s.geometry == "closest"
-        far = R + rho if closest else R + 0 * rho
-        points = s.positions * (R / (R + rho))[:, None] if closest else s.positions
-        self.offsets = s.heights - r2 / (2 * far)
-        apart = points[:, None, :] - points[None, :, :]
-        squares = (apart * apart).sum(axis=2)
-        np.fill_diagonal(squares, arb(1))
-        self.A = 1 / (arb.pi() * E * np.sqrt(squares))
-        np.fill_diagonal(self.A, arb(0))
-        on = self.touching
+        bends, modulus = np.array([1 / s.sphere_radius] * 2), s.contact_modulus
+        points, self.offsets, law = assemble(
+            s.positions, s.tip_radii, s.heights, bends, modulus, s.geometry
+        )
+        self.A = coupling(points, modulus)
+        on = self.touching = np.flatnonzero([bool(load > 0) for load in loads])
         self.inner = self.A[np.ix_(on, on)]
-        self.P, self.approach = self._press(mid(loads[on]), approach, steps)
-        self.thresholds = self.k[on] * cube_root(self.P) ** 2
-
-    def _press(self, P: Balls, approach: Balls, steps: int) -> tuple[Balls, Balls]:
-        k, d, s = self.k[self.touching], self.offsets[self.touching], self.setup
-        approach = approach if s.by_load else s.control
+        problem = NormalMap(self.inner, law[on], self.offsets[on], s.control, s.by_load, arb(1))
+        x = mid(np.append(law[on] * cube_root(loads[on]) ** 2, approach))
         for _ in range(steps):
-            root = cube_root(P)
-            defect = k * root**2 + self.inner @ P - d - approach
-            n = len(P)
-            matrix = np.full((n + 1, n + 1), arb(0))
-            matrix[:n, :n] = self.inner + np.diag(2 * k / (3 * root))
-            matrix[:n, n] = arb(-1)
-            matrix[n, :n], right = arb(1), np.append(defect, P.sum() - s.control)
-            if not s.by_load:
-                matrix, right = matrix[:n, :n], defect
-            step = solve(matrix, right)
-            P = mid(P - step[:n])
-            approach = (approach - step[n]).mid() if s.by_load else approach
-        return P, approach
-
-    @property
-    def loads(self) -> Balls:
-        full = np.full(len(self.offsets), arb(0))
-        full[self.touching] = self.P
-        return full
-
-    @property
-    def gaps(self) -> Balls:
-        gaps = self.A @ self.loads - self.offsets - self.approach
-        gaps[self.touching] = arb(0)
-        return gaps
-
-    @property
-    def ratio(self) -> Balls:
-        nu = self.setup.poisson_ratio
-        return (2 - nu) / (2 * (1 - nu))
+            x = mid(x - solve_linear(problem.jacobian(x), problem.residual(x), "approx"))
+        defect = max(abs(problem.residual(x)[:-1]), default=arb(0))
+        assert defect < abs(x[-1]) * arb(10) ** (15 - DIGITS)
+        self.P, self.approach = problem.loads(x), x[-1]
+        self.loads, self.thresholds = (np.full(len(law), arb(0)) for _ in range(2))
+        self.loads[on], self.thresholds[on] = self.P, x[:-1]
+        self.gaps = self.A @ self.loads - self.offsets - self.approach
+        self.gaps[on] = arb(0)
 
 
 class Judge:
@@ -143,19 +107,6 @@ def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
     if near is None:
         return Oracle(setup, exact(contact.loads), arb(contact.approach), 5)
     return Oracle(setup, near.loads, near.approach, 3)
-
-
-def cube_root(values: Balls) -> Balls:
-    return np.vectorize(lambda v: arb(0) if v == 0 else v.root(3), otypes=[object])(values)
-
-
-def mid(values: Balls) -> Balls:
-    return np.vectorize(lambda v: v.mid(), otypes=[object])(values)
-
-
-def solve(matrix: Balls, right: Balls) -> Balls:
-    column = arb_mat(len(right), 1, list(right))
-    return np.array(arb_mat(matrix.tolist()).solve(column, algorithm="approx").entries())
 
 
 #: Names of the bounds on derivatives.

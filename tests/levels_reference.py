@@ -1,24 +1,20 @@
 """Normal solutions at any load in 100 digits and all that friction makes of them: the reference.
 
 At a total load L: loads P_i, approach D0, gaps, energy V = sum (3/5) k P^(5/3) + P'AP/2 - d'P. Of
-two such levels, P above and L = P - Q/f:
-
-    Q_i = f (P_i(P) - P_i(L)),   X = c_t f (D0(P) - D0(L)),   slip_i = c_t f gap_i(L),
-    W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2],      T = Q / f,
-
-where every indentation grows with the load. Where one does not, `Bristles` follows the load in
-steps and remembers. Nothing of the package is used but float64 loads to begin Newton at.
+two such levels, P above and L = P - Q/f, `multiprecision.slide` makes friction states where every
+indentation grows with the load. Where one does not, `Bristles` follows the load in steps and
+remembers. Nothing of the package is used but float64 loads to begin Newton at.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cache, cached_property, wraps
+from dataclasses import replace
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
-from gradient_oracle import DIGITS, Balls, Oracle, Setup, cube_root, exact
+from gradient_oracle import DIGITS, Balls, Oracle, Setup, exact
+from multiprecision import cube_root, slide, travel_of
 from scenes import MATERIAL, NAMED
 
 import convexrough as cr
@@ -43,17 +39,6 @@ SCENES["dense"] = (
 )
 
 
-def in_digits(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, evaluated in DIGITS wherever it is called."""
-
-    @wraps(function)
-    def inside(*arguments: Any) -> Any:
-        with ctx.workdps(DIGITS):
-            return function(*arguments)
-
-    return inside
-
-
 class Level(Oracle):
     """The normal solution of a setup; who touches is taken from float64 and then proved by signs.
 
@@ -65,99 +50,26 @@ class Level(Oracle):
             super().__init__(setup, start.loads, start.approach, 3)
         else:
             super().__init__(setup, exact(start.loads), arb(start.approach), 7)
-        left = self.thresholds + self.inner @ self.P - self.offsets[self.touching] - self.approach
-        assert max(abs(left), default=arb(0)) < abs(self.approach) * arb(10) ** (15 - DIGITS)
         assert all(load > 0 for load in self.P)
         assert all(gap > 0 for gap in np.delete(self.gaps, self.touching))
-
-    @cached_property
-    @in_digits
-    def load(self) -> Balls:
-        return self.P.sum() if len(self.P) else arb(0)
-
-    @cached_property
-    @in_digits
-    def energy(self) -> Balls:
-        """V(L)."""
-        own = 3 * self.thresholds / 5 + self.inner @ self.P / 2 - self.offsets[self.touching]
-        return own @ self.P
-
-    def _spread(self, values: Balls) -> Balls:
-        full = np.full((len(self.offsets), *values.shape[1:]), arb(0))
-        full[self.touching] = values
-        return full
+        on = self.touching
+        self.load = self.P.sum() if len(self.P) else arb(0)
+        own = 3 * self.thresholds[on] / 5 + self.inner @ self.P / 2 - self.offsets[on]
+        self.energy = own @ self.P  # V(L)
 
 
-@dataclass(frozen=True)
 class Friction:
     """A friction state under the force Q = f T, and the cycle between +-Q, by two levels."""
 
-    pressed: Level
-    held: Level
-    T: Balls
-
-    @cached_property
-    @in_digits
-    def f(self) -> Balls:
-        return self.pressed.setup.friction
-
-    @cached_property
-    @in_digits
-    def travel(self) -> Balls:
-        """c_t f."""
-        return self.pressed.ratio * self.f
-
-    @cached_property
-    @in_digits
-    def loads(self) -> Balls:
-        return self.pressed.loads
-
-    @cached_property
-    @in_digits
-    def forces(self) -> Balls:
-        return self.f * (self.pressed.loads - self.held.loads)
-
-    @cached_property
-    @in_digits
-    def displacement(self) -> Balls:
-        return self.travel * (self.pressed.approach - self.held.approach)
-
-    @cached_property
-    @in_digits
-    def slips(self) -> Balls:
-        return np.where(self.pressed.loads > 0, self.travel * self.held.gaps, arb(0))
-
-    @cached_property
-    @in_digits
-    def stick_radii(self) -> Balls:
-        """Contact radii at the lower level."""
-        s = self.held.setup
+    def __init__(self, pressed: Level, held: Level, T: Balls) -> None:
+        s = held.setup
+        self.pressed, self.held, self.T, self.f = pressed, held, T, s.friction
+        self.loads = pressed.loads
+        found = slide(s.friction, s.poisson_ratio, pressed, held)
+        self.forces, self.slips, self.displacement, self.energies, self.energy = found
         relative = 1 / (1 / s.sphere_radius + 1 / s.tip_radii)
-        return cube_root(3 * self.held.loads * relative / (4 * s.contact_modulus))
-
-    @cached_property
-    @in_digits
-    def sticks(self) -> np.ndarray:
-        return np.array([bool(load > 0) for load in self.held.loads])
-
-    @cached_property
-    @in_digits
-    def energy(self) -> Balls:
-        """8 c_t f^2 times the error of the trapezoid rule."""
-        high, low = self.pressed, self.held
-        mean = (high.approach + low.approach) / 2
-        return 8 * self.travel * self.f * (high.energy - low.energy - self.T * mean)
-
-    @cached_property
-    @in_digits
-    def energies(self) -> Balls:
-        """By asperities: those of their annuli, and 4 f P_i slip_i."""
-        on = self.pressed.touching
-        P, slips = self.pressed.P, self.slips[on]
-        left = self.held.loads[on] / P
-        e = 1 - cube_root(left) ** 5 - 5 * (1 - left) / 6 * (1 + cube_root(left) ** 2)
-        own = arb(24) / 5 * self.travel * self.f * P * self.pressed.thresholds * e
-        return self.pressed._spread(own + 4 * self.f * P * slips)
+        self.stick_radii = cube_root(3 * held.loads * relative / (4 * s.contact_modulus))
+        self.sticks = np.array([bool(load > 0) for load in held.loads])
 
 
 def of_setup(setup: Setup, contact: cr.Contact, near: Friction | None = None) -> Friction:
@@ -173,7 +85,8 @@ def displaced(contact: cr.Contact, displacement: float, holding: Holding = "load
     """Moved by X [length]: the level at the approach D0(P) - X / (c_t f)."""
     with ctx.workdps(DIGITS):
         upper = Level(Setup.of(contact, holding), contact)
-        left = (upper.approach - arb(displacement) / (upper.ratio * upper.setup.friction)).mid()
+        travel = travel_of(upper.setup.friction, upper.setup.poisson_ratio)
+        left = (upper.approach - arb(displacement) / travel).mid()
         start = cr.press(contact.scene, approach=float(left))
         lower = Level(replace(upper.setup, control=left, by_load=False), start)
         return Friction(upper, lower, upper.load - lower.load)

@@ -17,7 +17,7 @@ arithmetic, proves it. The oracle shares no code with the package that it judges
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log2
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -32,8 +32,8 @@ ZERO: Balls = arb(0)
 ONE: Balls = arb(1)
 
 exact = np.vectorize(arb, otypes=[object])
-_mid = np.vectorize(arb.mid, otypes=[object])
-_cube_root = np.vectorize(lambda ball: ball.root(3), otypes=[object])
+mid = np.vectorize(arb.mid, otypes=[object])
+cube_root = np.vectorize(lambda ball: ZERO if ball == 0 else ball.root(3), otypes=[object])
 
 
 class NotProved(ArithmeticError):
@@ -47,12 +47,14 @@ class Reference:
     loads : n normal loads [force]; exactly zero where the asperity is open
     gaps : n gaps max(0, (A P)_i - D_i) [length]; exactly zero where the asperity touches
     approach : D0, both bodies together [length];  load : the total, sum P [force]
+    thresholds : k P^(2/3) [length], which friction multiplies
     """
 
     loads: tuple[arb, ...]
     gaps: tuple[arb, ...]
     approach: arb
     load: arb
+    thresholds: tuple[arb, ...]
 
 
 def solve(
@@ -85,13 +87,13 @@ def solve(
         raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
-        bends = _curvatures(sphere_radius)
+        bends = curvatures(sphere_radius)
         modulus = arb(float(contact_modulus))
         control, tips = arb(approach if load is None else load), exact(tip_radii)
-        points, descents = _contact_points(exact(positions), tips, bends, geometry)
-        shape = exact(heights) - descents  # d_i = D_i - D0
-        influence = _influence(points, modulus)
-        law = _cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))  # k_i
+        points, shape, law = assemble(
+            exact(positions), tips, exact(heights), bends, modulus, geometry
+        )
+        influence = coupling(points, modulus)
 
         # A P >= 0, so an asperity with D_i <= 0 cannot touch: it is left out of the equations.
         able = np.full(len(shape), True) if by_load else ~(shape + control <= 0)
@@ -115,14 +117,8 @@ def solve(
         if any(ball.rel_accuracy_bits() < digits * log2(10) for ball in (*loads, *gaps)):
             raise NotProved("an asperity nearly grazes and lost significance: ask for more digits")
         total = control if by_load else loads.sum(initial=ZERO)
-        return Reference(tuple(loads), tuple(gaps), depth, total)
-
-
-class Map(Protocol):
-    """A map of balls with its derivative, whose zero is asked for."""
-
-    def residual(self, x: Balls) -> Balls: ...
-    def jacobian(self, x: Balls) -> Balls: ...
+        thresholds = law * cube_root(loads * loads)
+        return Reference(tuple(loads), tuple(gaps), depth, total, tuple(thresholds))
 
 
 @dataclass(frozen=True)
@@ -146,12 +142,12 @@ class NormalMap:
         if loads is None and self.by_load:
             loads = np.full(len(self.law), self.control / len(self.law))
         elif loads is None:
-            loads = self.loads(np.append(_mid(self.shape + self.control), self.control))
-        delta = self.law * _cube_root(loads * loads)
+            loads = self.loads(np.append(mid(self.shape + self.control), self.control))
+        delta = self.law * cube_root(loads * loads)
         below = self.influence @ loads - self.shape  # D0 - delta of a solution
         depth = loads @ (delta + below) / loads.sum() if self.by_load else self.control
-        opened = np.minimum(_mid(depth - below), ZERO)
-        return _mid(np.append(np.where(loads > 0, delta, opened), depth))
+        opened = np.minimum(mid(depth - below), ZERO)
+        return mid(np.append(np.where(loads > 0, delta, opened), depth))
 
     def loads(self, x: Balls) -> Balls:
         """P = (max(delta, 0) / k)^(3/2)."""
@@ -178,17 +174,17 @@ class NormalMap:
         return matrix
 
 
-def newton(problem: Map, x: Balls, *, tolerance: arb) -> Balls:
+def newton(problem: Any, x: Balls, *, tolerance: arb) -> Balls:
     """The point x with sum |F(x)| <= tolerance [length], by Newton steps that shrink this sum."""
-    residual = _mid(problem.residual(x))
+    residual = mid(problem.residual(x))
     for _ in range(NEWTON_STEPS):
         size = np.abs(residual).sum()
         if size <= tolerance:
             return x
-        step = _solve(problem.jacobian(x), residual, "approx")
+        step = solve_linear(problem.jacobian(x), residual, "approx")
         for share in (ONE / 2**halvings for halvings in range(HALVINGS)):
-            trial = _mid(x - share * step)
-            after = _mid(problem.residual(trial))
+            trial = mid(x - share * step)
+            after = mid(problem.residual(trial))
             if np.abs(after).sum() <= (1 - share / 1000) * size:
                 break
         else:
@@ -197,14 +193,14 @@ def newton(problem: Map, x: Balls, *, tolerance: arb) -> Balls:
     raise NotProved("Newton did not arrive")
 
 
-def prove(problem: Map, x: Balls, *, radius: arb) -> Balls:
+def prove(problem: Any, x: Balls, *, radius: arb) -> Balls:
     """Balls that hold a zero of F, the only one in the box X = x +/- radius [length].
 
     Interval Newton: if x - J^-1 F(x) lies inside X for every matrix J with entries in dF/dx(X),
     then (mean value and Brouwer) F has one zero in X, and it is among those x - J^-1 F(x).
     """
     box = np.array([arb(centre, radius) for centre in x])
-    inside = x - _solve(problem.jacobian(box), problem.residual(x))
+    inside = x - solve_linear(problem.jacobian(box), problem.residual(x))
     if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
         raise NotProved("the interval Newton step leaves its box")
     return inside
@@ -236,53 +232,88 @@ def _terms(
     scene: Any, loads: Sequence[arb], rows: Iterable[int]
 ) -> Iterator[tuple[arb, arb, arb, arb]]:
     """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
-    modulus, bends = arb(float(scene.material.contact_modulus)), _curvatures(scene.sphere_radius)
-    tips, heights = exact(scene.asperities.tip_radii), exact(scene.asperities.heights)
-    positions, bend = exact(scene.asperities.positions), bends.sum() / 2
-    points, descents = _contact_points(positions, tips, bends, scene.geometry)
+    modulus = arb(float(scene.material.contact_modulus))
+    points, shape, law = of_scene(scene)
     for i in rows:
-        law = (9 * (bend + 1 / tips[i]) / (16 * modulus**2)).root(3)
         sunk = inverse_sum(points, loads, i) / (arb.pi() * modulus)
-        local = law * loads[i].root(3) ** 2 if loads[i] > 0 else ZERO
-        yield loads[i], local, sunk, heights[i] - descents[i]
+        yield loads[i], law[i] * cube_root(loads[i])[()] ** 2, sunk, shape[i]
 
 
 def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
     """values - reference, subtracted in multiprecision [the unit of both]."""
-    with ctx.workprec(EXACT_BITS):
-        return np.array([float(v - r) for v, r in _pairs(values, reference)])
-
-
-def relative_errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
-    """(values - reference) / reference; if the reference is zero: 0 if the value is, else inf."""
+    balls = [reference] if isinstance(reference, arb) else reference
     with ctx.workprec(EXACT_BITS):
         return np.array(
-            [
-                float((v - r) / r) if r != 0 else 0.0 if v == 0 else inf
-                for v, r in _pairs(values, reference)
-            ]
+            [float(v - r) for v, r in zip(np.atleast_1d(exact(values)), balls, strict=True)]
         )
 
 
-def _curvatures(sphere_radius: float | tuple[float, float]) -> Balls:
+def travel_of(f: arb, nu: arb) -> arb:
+    """f c_t, the tangential over the normal approach: c_t = (2 - nu) / (2 (1 - nu))."""
+    return f * (2 - nu) / (2 * (1 - nu))
+
+
+class Friction(NamedTuple):
+    """A friction state of first loading, and the cycle of this amplitude: balls.
+
+    forces, slips, displacement : Q_i [force], slip_i and X [length]
+    energies : lost in a cycle, by asperities [force length];  energy : their sum
+    """
+
+    forces: Balls
+    slips: Balls
+    displacement: Balls
+    energies: Balls
+    energy: Balls
+
+
+def slide(f: arb, nu: arb, full: Any, held: Any) -> Friction:
+    """By Ciavarella and Jaeger's theorem, of the normal states at P and at P - Q / f:
+
+    Q_i = f (P_i - p_i), slip_i = f c_t gap_i, X = f c_t (D0 - d0), and
+    W_i = (24/5) c_t f^2 P_i k P_i^(2/3) e_i + 4 f P_i slip_i.
+    """
+    travel = travel_of(f, nu)
+    above, below = np.array(full.loads), np.array(held.loads)
+    slips = np.where(above > 0, travel * np.array(held.gaps), ZERO)
+    left = np.where(above > 0, below, ZERO) / np.where(above > 0, above, ONE)
+    e = 1 - cube_root(left) ** 5 - 5 * (1 - left) / 6 * (1 + cube_root(left) ** 2)
+    energies = (24 * travel / 5 * np.array(full.thresholds) * e + 4 * slips) * f * above
+    moved = travel * (full.approach - held.approach)
+    return Friction(f * (above - below), slips, moved, energies, energies.sum(initial=ZERO))
+
+
+def curvatures(sphere_radius: float | tuple[float, float]) -> Balls:
     """1 / Rx and 1 / Ry."""
     radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
     return np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
 
 
-def _contact_points(
-    summits: Balls, tips: Balls, bends: Balls, geometry: str
-) -> tuple[Balls, Balls]:
-    """Where the asperities touch, (n, 2) [length], and how far below the apex, (n,) [length]."""
-    if geometry == "summit":
-        return summits, (summits * summits * bends).sum(axis=1) / 2
-    if geometry == "closest":  # r R / (R + rho), with 1 / R
-        points = summits / (1 + tips[:, None] * bends)
-        return points, (summits * points * bends).sum(axis=1) / 2
-    raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
+def of_scene(scene: Any) -> tuple[Balls, Balls, Balls]:
+    """As `assemble`, of a scene."""
+    return assemble(
+        exact(scene.asperities.positions),
+        exact(scene.asperities.tip_radii),
+        exact(scene.asperities.heights),
+        curvatures(scene.sphere_radius),
+        arb(float(scene.material.contact_modulus)),
+        scene.geometry,
+    )
 
 
-def _influence(points: Balls, modulus: arb) -> Balls:
+def assemble(
+    summits: Balls, tips: Balls, heights: Balls, bends: Balls, modulus: arb, geometry: str
+) -> tuple[Balls, Balls, Balls]:
+    """Where asperities touch, (n, 2) [length], d_i = D_i - D0 and k_i, both (n,)."""
+    if geometry not in ("summit", "closest"):
+        raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
+    # r R / (R + rho), with 1 / R
+    points = summits if geometry == "summit" else summits / (1 + tips[:, None] * bends)
+    law = cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))
+    return points, heights - (summits * points * bends).sum(axis=1) / 2, law
+
+
+def coupling(points: Balls, modulus: arb) -> Balls:
     """A_ij = 1 / (pi E* r_ij), A_ii = 0 [length / force]."""
     offsets = points[:, None, :] - points[None, :, :]
     squares = (offsets * offsets).sum(axis=2)
@@ -301,7 +332,7 @@ def _positive_part(delta: Balls) -> Balls:
     return np.where(delta > 0, delta, ZERO)
 
 
-def _solve(matrix: Balls, right: Balls, algorithm: Literal["approx"] | None = None) -> Balls:
+def solve_linear(matrix: Balls, right: Balls, algorithm: Literal["approx"] | None = None) -> Balls:
     """matrix^-1 right, in balls that hold it; "approx" is quicker and only near it."""
     try:
         column = arb_mat(len(right), 1, list(right))
@@ -309,8 +340,3 @@ def _solve(matrix: Balls, right: Balls, algorithm: Literal["approx"] | None = No
         return np.array(solution)
     except ZeroDivisionError as error:
         raise NotProved("the Jacobian may be singular") from error
-
-
-def _pairs(values: ArrayLike, reference: Sequence[arb] | arb) -> Iterator[tuple[arb, arb]]:
-    balls = [reference] if isinstance(reference, arb) else reference
-    return zip(np.atleast_1d(exact(values)), balls, strict=True)

@@ -162,9 +162,11 @@ def _pressed(
 
 
 @st.composite
-def random_scenes(draw: st.DrawFn, crowding: float = 0.8, most: int = 24) -> tuple[cr.Scene, float]:
+def random_scenes(
+    draw: st.DrawFn, crowding: float = 0.8, most: int = 24, make: Any = scattered
+) -> tuple[cr.Scene, float]:
     """Scattered asperities of any scale, with and without random heights."""
-    return scattered(
+    return make(
         draw(st.integers(0, 2**32 - 1)),
         draw(st.integers(1, most)),
         draw(st.floats(0.05, crowding)),
@@ -178,11 +180,6 @@ def random_cases(
 ) -> tuple[cr.Scene, float, Kind]:
     """Scattered asperities or some on a lattice, and one of the operators that they allow."""
     make = draw(st.sampled_from([scattered, on_lattice]))
-    scene, approach = make(
-        draw(st.integers(0, 2**32 - 1)),
-        draw(st.integers(1, most)),
-        draw(st.floats(0.05, crowding)),
-        draw(st.sampled_from([0.0, 0.1, 0.5, 2.0])),
-    )
+    scene, approach = draw(random_scenes(crowding, most, make))
     # The last one first: hypothesis begins with it, and where there is a choice it is not dense.
     return scene, approach, draw(st.sampled_from(operators(scene)[::-1]))

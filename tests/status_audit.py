@@ -10,11 +10,12 @@ in exact arithmetic, so that a bound too small by a roundoff is found too.
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import multiprecision
 import numpy as np
 from flint import arb, ctx
+from multiprecision import Friction, slide, travel_of
 from scenes import on_lattice, operators, scattered, solve_exactly
 from vector_oracle import solve_vectors
 
@@ -64,7 +65,7 @@ class Tally:
                 pairs = zip(np.atleast_1d(value), balls, strict=True)
                 off = [arb(float(v)) - each for v, each in pairs]
                 square = sum((each * each for each in off), arb(0))
-                if np.isfinite(bound):
+                if bound != np.inf:
                     require(square <= arb(float(bound)) ** 2, f"{stage} bound {bound} of {value}")
                 errors.append(float(square.mid().sqrt()))
         if len(errors) and np.isfinite(bounds).all() and max(errors) > 0:
@@ -155,67 +156,43 @@ def _audit_scene(seed: int, tally: Tally) -> None:
         contact = cr.press(scene, **given, influence=operator)
     exact = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
     proof = contact.certificate
+    tally.count(kind, operator, "press", proof.status)
     if proof.scope == "none":
         require((proof.status == "undecided").all(), "a status without a proof")
-        tally.count(kind, operator, "press", proof.status)
         return
-    for status, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
-        require(status != "contact" or load > 0, "contact of an open asperity")
-        require(status != "open" or gap > 0, "open of one that touches")
-    tally.count(kind, operator, "press", proof.status)
-    tally.compare(operator, "load", proof.load_errors, contact.loads, exact.loads)
-    tally.compare(operator, "gap", proof.gap_errors, proof.gaps, exact.gaps)
-    tally.compare(operator, "approach", [proof.approach_error], [proof.approach], [exact.approach])
+    audit_pressed(operator, proof, contact.loads, exact, tally)
     _audit_shear(kind, operator, contact, exact, float(rng.choice(FRACTIONS)), tally)
 
 
-class Slid(NamedTuple):
-    """An exact state of first loading: balls, forces over f P as the theorem has them."""
+def audit_pressed(
+    operator: str, proof: cr.Certificate, loads: Any, exact: Any, tally: Tally
+) -> None:
+    """What a certificate says of loads, the solution being `exact`."""
+    for status, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
+        require(status in ("contact", "open", "undecided"), f"the status {status}")
+        require(status != "contact" or load > 0, "contact of an open asperity")
+        require(status != "open" or gap > 0, "open of one that touches")
+    tally.compare(operator, "load", proof.load_errors, loads, exact.loads)
+    tally.compare(operator, "gap", proof.gap_errors, proof.gaps, exact.gaps)
+    tally.compare(operator, "approach", [proof.approach_error], [proof.approach], [exact.approach])
 
-    forces: list[Any]
-    slips: list[Any]
-    displacement: Any
-    loss: Any  # of the cycle of this amplitude
 
-
-def _slid(contact: cr.Contact, full: Any, force: Any) -> Slid | None:
-    """By Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i.
+def _slid(contact: cr.Contact, full: Any, force: Any) -> Friction | None:
+    """The exact state of first loading.
 
     None beyond the limit of the true loads, where all slide and how far is not determined. Raises
     Dragged where an asperity is, which the theorem is not for.
     """
-    nu = arb(contact.scene.material.poisson_ratio)
-    travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
     left = full.load - arb(force) / arb(FRICTION)
     if not left > 0:
         return None
     found = cr.shear(contact, force=float(force)).forces
     start = np.maximum(contact.loads - found / FRICTION, 0.0) + 1e-30 * contact.load
     reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
-    forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
-    if any(q < 0 for q in forces):
+    slid = slide(arb(FRICTION), arb(contact.scene.material.poisson_ratio), full, reduced)
+    if any(q < 0 for q in slid.forces):
         raise Dragged
-    slips = [
-        travel * gap if load > 0 else arb(0)
-        for gap, load in zip(reduced.gaps, full.loads, strict=True)
-    ]
-    displacement = travel * (full.approach - reduced.approach)
-    return Slid(forces, slips, displacement, _loss(contact.scene, full.loads, reduced.loads, slips))
-
-
-def _loss(scene: cr.Scene, loads: Any, left: Any, slips: Any) -> Any:
-    """Of the cycle: (24/5) c_t f^2 P ceiling e + 4 f P s, ceiling = (9 P^2 / (16 E*^2 R))^(1/3)."""
-    nu, E = arb(scene.material.poisson_ratio), arb(scene.material.contact_modulus)
-    loss, f, ct = arb(0), arb(FRICTION), (2 - nu) / (2 * (1 - nu))
-    tips = scene.asperities.tip_radii
-    for P, p, slip, tip in zip(loads, left, slips, tips, strict=True):
-        if P > 0:
-            t, s = 1 - p / P, (p / P).root(3) if p > 0 else arb(0)
-            e = 1 - s**5 - 5 * t / 6 * (1 + s**2)
-            R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(tip)))
-            threshold = (9 * P**2 / (16 * E**2 * R)).root(3)
-            loss += 24 * ct * f**2 * P * threshold * e / 5 + 4 * f * P * slip
-    return loss
+    return slid
 
 
 def _audit_shear(
@@ -251,13 +228,13 @@ def _audit_shear(
         tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
         displacement, error = [state.displacement], [proof.displacement_error]
         tally.compare(operator, "displacement", error, displacement, [exact.displacement])
-        tally.compare(operator, "loss", [cycle.loss_error], [cycle.loss], [exact.loss])
+        tally.compare(operator, "loss", [cycle.loss_error], [cycle.loss], [exact.energy])
         if force < FRICTION * contact.load:
             _audit_history(operator, contact, full, force, exact, tally)
 
 
 def _audit_history(
-    operator: str, contact: cr.Contact, full: Any, force: float, there: Slid, tally: Tally
+    operator: str, contact: cr.Contact, full: Any, force: float, there: Friction, tally: Tally
 ) -> None:
     """To Q and back, and half of the way back and there again, which is forgotten."""
     past = cr.history(contact, forces=[force, -0.25 * force, force, -force])
@@ -273,9 +250,9 @@ def _audit_history(
             there.displacement,
             -there.displacement,
         ]
-        once, back = there.loss / 4, inner.loss / 2
-        losses = [once, once + back, once + 2 * back, once + 2 * back + there.loss / 2]
-        forces = [a - 2 * b for a, b in zip(there.forces, inner.forces, strict=True)]
+        once, back = there.energy / 4, inner.energy / 2
+        losses = [once, once + back, once + 2 * back, once + 2 * back + there.energy / 2]
+        forces = there.forces - 2 * inner.forces
     tally.compare(
         operator, "past displacement", past.displacement_errors, past.displacements, rises
     )
@@ -320,7 +297,7 @@ def audit_vectors(
         require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: status of {i}")
     nu = arb(tilted.scene.material.poisson_ratio)
     with ctx.workdps(DIGITS + 30):
-        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+        travel = travel_of(arb(FRICTION), nu)
         forces, slips, displacement = (
             FRICTION * true.forces,
             travel * true.slips,

@@ -21,12 +21,14 @@ from multiprecision import (
     GUARD_DIGITS,
     Balls,
     NotProved,
-    _contact_points,
-    _influence,
-    _mid,
+    coupling,
+    cube_root,
     exact,
+    mid,
     newton,
+    of_scene,
     prove,
+    travel_of,
 )
 
 import convexrough as cr
@@ -123,30 +125,20 @@ def _problem(
     touching = [i for i, load in enumerate(loads) if load > 0]
     P = np.array([loads[i] for i in touching])
     E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
-    tips, radius = exact(scene.asperities.tip_radii[touching]), arb(scene.sphere_radius)
-    points, _ = _contact_points(
-        exact(scene.asperities.positions[touching]),
-        tips,
-        np.array([1 / radius, 1 / radius]),
-        scene.geometry,
-    )
-    relative = 1 / (1 / radius + 1 / tips)
-    thresholds = np.array(
-        [(9 * p * p / (16 * E * E * R)).root(3) for p, R in zip(P, relative, strict=True)]
-    )
+    points, _, law = (each[touching] for each in of_scene(scene))
+    thresholds = law * cube_root(P * P)
     friction = arb(scene.friction)
-    travel = friction * (2 - nu) / (2 * (1 - nu))
-    kernel = _kernel(points, _influence(points, E), nu / (2 - nu))
+    kernel = _kernel(points, coupling(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
     q = exact(np.asarray(start)[touching].reshape(-1)) / friction
     X = (
-        exact(displacement) / travel
+        exact(displacement) / travel_of(friction, nu)
         if np.isfinite(displacement).all()
         else _near_the_limit(P, kernel, total)
     )
     eta = np.tile(X, len(P)) - kernel @ q
     unit = (X @ X).sqrt() / (total @ total).sqrt()
-    return VectorMap(P, thresholds, kernel, total, _mid(unit)), _mid(np.concatenate((eta, X)))
+    return VectorMap(P, thresholds, kernel, total, mid(unit)), mid(np.concatenate((eta, X)))
 
 
 def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
