@@ -51,46 +51,42 @@ def few() -> Any:
     return proof_of(*scenes.scattered(1, 6, 0.7, 0.3))
 
 
-def alone(path: Path) -> subprocess.CompletedProcess[str]:
-    """Without site packages, without environment: as on a stranger's machine."""
-    copy = path.parent / "checker.py"
-    copy.write_bytes(SOURCE.read_bytes())
-    command = [sys.executable, "-I", "-S", str(copy), str(path)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def quiet(line: str) -> None:
+    """Progress is not shown."""
+
+
+def said(program: Path, path: Path, *options: str) -> tuple[int, str, str]:
+    """Status and what the checker says of a file, in a process of its own."""
+    command = [sys.executable, *options, str(program), str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
 
 
 def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
-    path = tmp_path / "proof.json"
-    path.write_text(json.dumps(document))
-    said = alone(path)
-    assert (said.returncode, said.stderr) == (0, "")
-    assert said.stdout.startswith(
-        "proved: under the approach 5e-05 there is a solution, the only one"
-    )
-    assert "37 contact, 24 open, 0 undecided" in said.stdout
-    assert said.stdout.count("\n") == 3 + len(document["sheared"])
+    """Without site packages, without environment: as on a stranger's machine."""
+    path, copy = tmp_path / "proof.json", tmp_path / "checker.py"
+    copy.write_bytes(SOURCE.read_bytes())
+
+    def alone(contents: str) -> tuple[int, str, str]:
+        path.write_text(contents)
+        return said(copy, path, "-I", "-S")
+
+    status, out, err = alone(json.dumps(document))
+    assert (status, err) == (0, "")
+    assert out.startswith("proved: under the approach 5e-05 there is a solution, the only one")
+    assert "37 contact, 24 open, 0 undecided" in out
+    assert out.count("\n") == 3 + len(document["sheared"])
     # Where it is, beside folders that could hide modules of Python; the path is no proof.
-    here = subprocess.run(
-        [sys.executable, str(SOURCE), str(tmp_path)], capture_output=True, text=True, check=False
-    )
-    assert here.returncode == 2
-    assert here.stderr.startswith("unreadable: ")
+    status, _, err = said(SOURCE, tmp_path)
+    assert (status, err[:12]) == (2, "unreadable: ")
 
-    document = deepcopy(document)
-    document["claims"]["status"][60] = "contact"
-    path.write_text(json.dumps(document))
-    said = alone(path)
-    assert (said.returncode, said.stdout) == (1, "")
-    assert said.stderr == "refused: claims status [60]: claimed 'contact', proved 'open'\n"
-
-    path.write_text(json.dumps(document)[:-1])
-    said = alone(path)
-    assert (said.returncode, said.stdout) == (2, "")
-    assert said.stderr.startswith("unreadable: ")
+    wrong = deepcopy(document)
+    wrong["claims"]["status"][60] = "contact"
+    refusal = "refused: claims status [60]: claimed 'contact', proved 'open'\n"
+    assert alone(json.dumps(wrong)) == (1, "", refusal)
     none = tmp_path / "none.json"
-    said = alone(none)
-    assert said.returncode == 2
-    assert said.stderr == f"unreadable: {none}: No such file or directory\n"
+    missing = f"unreadable: {none}: No such file or directory\n"
+    assert said(copy, none, "-I", "-S") == (2, "", missing)
 
 
 @pytest.mark.parametrize(
@@ -122,21 +118,6 @@ def test_more_than_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> No
     assert "usage" in capsys.readouterr().err
 
 
-def test_larger_scenes_are_refused(document: Any) -> None:
-    scene = deepcopy(document["scene"])
-    for name in ("x", "y", "heights", "tip_radii"):
-        scene[name] = [scene[name][0]] * (checker.MOST_ASPERITIES + 1)
-    with pytest.raises(Refused, match="3001 asperities"):
-        checker.read_scene(scene)
-
-
-def test_a_hash_that_was_kept_is_refused(document: Any) -> None:
-    document = deepcopy(document)
-    document["scene"]["heights"][0] = (1e-30).hex()
-    with pytest.raises(Refused, match="sha256"):
-        checker.check(document, lambda line: None)
-
-
 def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
     return json.loads(json.dumps(cr.press(scene, approach=approach).proof(**more).document))
 
@@ -145,8 +126,13 @@ def scaled(values: list[str], factor: float) -> list[str]:
     return [(factor * float.fromhex(text)).hex() for text in values]
 
 
-def refused(document: Any, reason: str, **changes: Any) -> None:
-    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason."""
+def wrong(
+    document: Any, reason: str, error: type[Exception] = Refused, sha256: str = "", **changes: Any
+) -> None:
+    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason.
+
+    sha256 : "fits" where the hash is that of the changed scene
+    """
     document = deepcopy(document)
     for keys, value in changes.items():
         *path, last = (int(key) if key.isdigit() else key for key in keys.split("__"))
@@ -154,31 +140,46 @@ def refused(document: Any, reason: str, **changes: Any) -> None:
         for key in path:
             place = place[key]
         place[last] = value
-    with pytest.raises(Refused, match=reason):
-        checker.check(document, lambda line: None)
+    if sha256:
+        document["sha256"] = checker.digest(document["scene"], document["prescribed"])
+    with pytest.raises(error, match=reason):
+        checker.check(document, quiet)
+
+
+def test_scenes_that_are_too_large_impossible_or_of_another_hash_are_refused(document: Any) -> None:
+    wrong(document, "sha256", scene__heights__0=(1e-30).hex())
+    many = checker.MOST_ASPERITIES + 1
+    columns = {
+        f"scene__{name}": [document["scene"][name][0]] * many
+        for name in ("x", "y", "heights", "tip_radii")
+    }
+    wrong(document, "3001 asperities", sha256="fits", **columns)
+    negative = (-1.0).hex()
+    wrong(document, "is not positive", sha256="fits", scene__sphere_radius=negative)
+    wrong(document, "is not positive", sha256="fits", scene__sphere_radius=["inf", negative])
 
 
 def test_boxes_and_shells_that_prove_nothing_are_refused(document: Any) -> None:
     argument, radii = document["argument"], document["pressed"]["radii"]
-    refused(document, "outside the box", argument__box__0=radii[0][0])
-    refused(document, "outside the box", argument__box__0=(0.0).hex())
-    refused(document, "too small for its box", argument__shells=scaled(argument["shells"], 0.9))
-    refused(document, "overlaps others", argument__shells=scaled(argument["shells"], 3.0))
-    refused(document, "not positive", argument__shells__0=(0.0).hex())
-    refused(document, "convexity number", argument__convexity_number=(1.0).hex())
+    wrong(document, "outside the box", argument__box__0=radii[0][0])
+    wrong(document, "outside the box", argument__box__0=(0.0).hex())
+    wrong(document, "too small for its box", argument__shells=scaled(argument["shells"], 0.9))
+    wrong(document, "overlaps others", argument__shells=scaled(argument["shells"], 3.0))
+    wrong(document, "not positive", argument__shells__0=(0.0).hex())
+    wrong(document, "convexity number", argument__convexity_number=(1.0).hex())
     wide = {"argument__box": scaled(argument["box"], 4.0), "argument__shells": None}
-    refused(document, "breaks down", **wide, argument__convexity_number=(0.999).hex())
-    refused(document, "not the one prescribed", pressed__approach=[(5.0001e-5).hex()])
+    wrong(document, "breaks down", **wide, argument__convexity_number=(0.999).hex())
+    wrong(document, "not the one prescribed", pressed__approach=[(5.0001e-5).hex()])
 
 
 def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     scene, approach = scenes.scattered(1, 6, 0.7, 0.3)
     document = proof_of(scene, approach)
     assert document["claims"]["status"][5] == "open"
-    refused(document, "claimed 'global', proved 'local'", argument__box__5=(0.0).hex())
+    wrong(document, "claimed 'global', proved 'local'", argument__box__5=(0.0).hex())
     held = deepcopy(document)
     held["argument"]["box"][5], held["claims"]["scope"] = (0.0).hex(), "local"
-    assert checker.check(held, lambda line: None).startswith("proved")
+    assert checker.check(held, quiet).startswith("proved")
 
     def pair(*which: int) -> cr.Scene:
         asperities = cr.Asperities(np.array([[0.0, 0.0], [0.002, 0.0]])[[*which]], 0.02)
@@ -186,69 +187,46 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
 
     alone, both = proof_of(pair(1), 1e-5), proof_of(pair(0, 1), 1e-5)
     radii = [[(0.0).hex()], *alone["pressed"]["radii"]]
-    refused(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
+    wrong(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
 
 
 def test_a_local_proof_is_not_a_global_one() -> None:
     document = proof_of(*scenes.scattered(9, 6, 2.2, 0.1))
-    refused(document, "claimed 'global', proved 'local'", claims__scope="global")
+    wrong(document, "claimed 'global', proved 'local'", claims__scope="global")
 
 
-def test_each_end_of_each_bound_counts(few: Any) -> None:
-    claims = few["claims"]
-    for key in ("load", "loads__1", "gaps__5"):
-        name, *place = key.split("__")
-        low, high = (
-            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
-        )
-        above, below = np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
-        for bounds in ((above, high), (low, below), (high, low)):
-            ends = [float(bound).hex() for bound in bounds]
-            refused(few, "not proved to be within", **{f"claims__{key}": ends})
+@pytest.mark.parametrize("place", [("load",), ("loads", 1), ("gaps", 5)])
+def test_each_end_of_each_bound_counts(few: Any, place: tuple[Any, ...]) -> None:
+    claimed = few["claims"][place[0]]
+    low, high = map(float.fromhex, claimed[place[1]] if place[1:] else claimed)
+    above, below = float(np.nextafter(low, np.inf)), float(np.nextafter(high, -np.inf))
+    for bounds in ((above, high), (low, below), (high, low)):
+        key = "__".join(map(str, ("claims", *place)))
+        wrong(few, "not proved to be within", **{key: [bound.hex() for bound in bounds]})
+
+
+NUMBERS = ("0x1p+1", "0x1.8p-1", " 0x1.0000000000000p+0", "1.0", "nan", "inf", "0x1p99999", None)
 
 
 def test_numbers_are_written_one_way_and_nothing_is_left_unread(few: Any) -> None:
-    for text in (
-        "0x1p+1",
-        "0x1.8p-1",
-        " 0x1.0000000000000p+0",
-        "1.0",
-        "nan",
-        "inf",
-        "0x1p99999",
-        None,
-    ):
-        changed = deepcopy(few)
-        changed["pressed"]["radii"][0] = [text]
-        with pytest.raises(checker.Unreadable, match=r"radii \[0\] \[0\]: .* not a finite float64"):
-            checker.check(changed, lambda line: None)
-    for where in (few, few["claims"], few["argument"], few["pressed"]):
-        changed = deepcopy(where) | {"note": "believe me"}
-        with pytest.raises(checker.Unreadable, match="expected a table"):
-            checker.table(changed, *where)
+    for text in NUMBERS:
+        reason = r"radii \[0\] \[0\]: .* not a finite float64"
+        wrong(few, reason, checker.Unreadable, pressed__radii__0=[text])
+    for where in ((), ("claims",), ("argument",), ("pressed",)):
+        key = "__".join((*where, "note"))
+        wrong(few, "expected a table", checker.Unreadable, **{key: "believe me"})
 
 
 @pytest.mark.parametrize(
-    ("place", "what"),
+    "place",
     [
-        (("scene", "tip_radii"), "tip_radii"),
-        (("scene", "contact_modulus"), "contact_modulus"),
-        (("argument", "box"), "box"),
-        (("argument", "convexity_number"), "convexity_number"),
-        (("argument", "shells"), "shells"),
-        (("pressed", "radii"), "radii"),
-        (("sheared",), "sheared"),
-        (("claims", "gaps"), "claims gaps"),
+        *("scene__tip_radii", "scene__contact_modulus", "argument__box", "argument__shells"),
+        *("argument__convexity_number", "pressed__radii", "sheared", "claims__gaps"),
     ],
 )
-def test_what_is_damaged_is_named(few: Any, place: tuple[str, ...], what: str) -> None:
-    changed = deepcopy(few)
-    *outer, key = place
-    damaged = changed[outer[0]] if outer else changed
-    damaged[key] = "0x1.8"
-    changed["sha256"] = checker.digest(changed["scene"], changed["prescribed"])
-    with pytest.raises(checker.Unreadable, match=f"^{what}: "):
-        checker.check(changed, lambda line: None)
+def test_what_is_damaged_is_named(few: Any, place: str) -> None:
+    name = place.replace("__", " ") if "claims" in place else place.split("__")[-1]
+    wrong(few, f"^{name}: ", checker.Unreadable, sha256="fits", **{place: "0x1.8"})
 
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:
@@ -280,13 +258,13 @@ def test_a_loss_is_claimed_in_order_alone() -> None:
     document = json.loads(json.dumps(proof.document))
     claim = document["claims"]["shear"][0]
     assert (claim["order"], claim["loss"]) == ("proved for one step", None)
-    refused(document, "proved 'proved for one step'", claims__shear__0__order="proved")
+    wrong(document, "proved 'proved for one step'", claims__shear__0__order="proved")
     ordered = cr.press(replace(scenes.paper(), friction=0.5), approach=5e-5)
     state = cr.shear(ordered, force=0.4 * 0.5 * ordered.load)
     weaker = json.loads(json.dumps(ordered.proof(sheared=[state]).document))
     weaker["claims"]["shear"][0] |= {"order": "proved for one step", "loss": None}
     assert "(proved for one step)" in checker.check(weaker, print)
-    refused(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
+    wrong(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
 
 
 def test_shells_prove_what_eigenvalues_show() -> None:
@@ -307,34 +285,13 @@ def test_shells_prove_what_eigenvalues_show() -> None:
         given_shells, given_radii = (list(map(Fraction, each.tolist())) for each in (shells, radii))
         try:
             everyone = list(range(8))
-            checker.prove_by_shells(read, given_shells, given_radii, everyone, lambda line: None)
+            checker.prove_by_shells(read, given_shells, given_radii, everyone, quiet)
         except Refused:
             continue
         accepted += 1
         overlapping += bool((shells[:, None] + shells > apart).any())
         assert np.linalg.eigvalsh(1 / (np.pi * apart) + np.diag(1 / (2 * radii))).min() > 0
     assert accepted > overlapping > 8
-
-
-def test_a_base_with_two_radii(document: Any) -> None:
-    scene = deepcopy(document["scene"])
-    x, y, tip = (Fraction(float.fromhex(scene[key][7])) for key in ("x", "y", "tip_radii"))
-    scene |= {"sphere_radius": [(0.5).hex(), "inf"], "geometry": "closest"}
-    read = checker.read_scene(scene)
-    assert read.radii[7] == 1 / (1 + 1 / tip)
-    drop = x * x / (2 * (Fraction(1, 2) + tip))
-    assert read.offsets[7].low <= -drop <= read.offsets[7].high
-    place = x / 2 / (Fraction(1, 2) + tip) * read.grid, y * read.grid
-    assert read.points[7] == tuple(map(math.floor, place))
-    for wrong in ("0x1.0000000000000p+0", "-0x1.0000000000000p+0", "-inf", "nan"):
-        with pytest.raises((Refused, checker.Unreadable)):
-            checker.read_scene(
-                scene | {"sphere_radius": [wrong, wrong, wrong][: 2 + (wrong[0] == "0")]}
-            )
-    both = deepcopy(document)
-    both["scene"]["sphere_radius"] = [document["scene"]["sphere_radius"]] * 2
-    both["sha256"] = checker.digest(both["scene"], both["prescribed"])
-    assert checker.check(both, lambda line: None).startswith("proved")
 
 
 def exact(x: Fraction) -> arb:
@@ -379,7 +336,7 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
     for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
         given = [Fraction(float(radius * end * factor)) for radius in radii]
         try:
-            checker.prove_definite(read, given, list(range(12)), lambda line: None)
+            checker.prove_definite(read, given, list(range(12)), quiet)
             assert definite
         except Refused:
             assert not definite
@@ -404,10 +361,10 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
             "pressed": {"radii": [[first.hex()], [second.hex()]], "approach": [depth.hex()]},
         }
         document["sha256"] = checker.digest(document["scene"], document["prescribed"])
-        proved = checker.prove(document, lambda line: None)
+        proved = checker.prove(document, quiet)
         assert proved["scope"] == "local"
         assert proved["status"] == ["contact" if x else "open" for x in (first, second)]
         wide = [(1.01 * a).hex()] * 2
         document["argument"] |= {"box": wide}
         with pytest.raises(Refused, match="breaks down"):
-            checker.prove(document, lambda line: None)
+            checker.prove(document, quiet)
