@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scenes import PAPER_APPROACH, paper
+from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
 
@@ -42,8 +42,9 @@ def wrong(call: str) -> Any:
     scene = replace(paper(), friction=0.5)
     contact = cr.press(scene, approach=PAPER_APPROACH)
     two = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "z": 0.0})
-    named = {"cr": cr, "np": np, "pd": pd, "TWO": two, "scene": scene, "contact": contact}
-    return eval(call, named)
+    other = cr.press(cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), MATERIAL), approach=1e-4)
+    given = {"TWO": two, "OTHER": other, "scene": scene, "contact": contact}
+    return eval(call, {"cr": cr, "np": np, "pd": pd, **given})
 
 
 @pytest.mark.parametrize(
@@ -88,6 +89,20 @@ def wrong(call: str) -> Any:
         ("cr.Asperities(pd.DataFrame({'x': [0.0], 'height': [1.0]}), 1.0)", "columns x, height"),
         ("cr.Asperities(TWO[['x', 'y']], 1.0, TWO['z'][::-1])", "heights: found another index"),
         ("cr.certify(scene, pd.Series(np.ones(61))[::-1], load=1.0)", "index in another order"),
+        ("cr.compare.compare(scene)", "approach, load: found neither"),
+        ("cr.compare.compare(scene, load=-1.0)", "load: found -1"),
+        ("cr.testing.assert_agree(contact, contact.loads)", "scene: found none"),
+        ("cr.testing.assert_agree(contact, OTHER)", "second: found 1, expected as many"),
+        ("cr.testing.assert_agree(contact, contact, within=5)", "within: found 5, expected a frac"),
+        (
+            "cr.testing.assert_agree(contact, cr.press(scene, load=contact.load))",
+            "second: found prescribed load .*, as in the first",
+        ),
+        (
+            "cr.testing.assert_shear_certified(contact, np.zeros(61), force=0.0, sliding=[1])",
+            r"sliding: found shape \(1,\) of int64, expected",
+        ),
+        ("cr.testing.assert_certified(scene, -1.0, approach=5e-5)", r"loads\[0\]: found -1"),
     ],
 )
 def test_wrong_types_are_said(call: str, said: str) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import PAPER_APPROACH, paper, scattered, twins
+from scenes import MATERIAL, PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
@@ -117,34 +117,26 @@ def test_totals_in_another_unit() -> None:
     assert cr.verify(paper(), contact.loads * (1 + 2e-2), load=contact.load, within=0.05).holds
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("wrong", ["mirrored", "turned", "too high"])
+@pytest.mark.parametrize("wrong", ["turned", "too high"])
 def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     """Their set is right, and proved from these loads alone."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025, tip_radius=0.02, within=0.0051, height_std=1e-6, seed=3
     )
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3))
+    scene = cr.Scene(1.0, asperities, MATERIAL)
     contact = cr.press(scene, load=4e-7)
-    x, y = asperities.positions.T
-    c, s = np.cos(np.pi / 3), np.sin(np.pi / 3)
-    places = {"mirrored": [-x, y], "turned": [c * x - s * y, s * x + c * y], "too high": [x, y]}
-    apart = np.hypot(*(places[wrong][k][:, None] - (x, y)[k] for k in (0, 1)))
-    loads = contact.loads[apart.argmin(axis=1)] * (1.2 if wrong == "too high" else 1.0)
-    control = {"approach": contact.approach} if wrong == "too high" else {"load": 4e-7}
+    loads, control = 1.2 * contact.loads, {"approach": contact.approach}
+    if wrong == "turned":
+        x, y = asperities.positions.T
+        c, s = np.cos(np.pi / 3), np.sin(np.pi / 3)
+        apart = np.hypot((c * x - s * y)[:, None] - x, (s * x + c * y)[:, None] - y)
+        loads, control = contact.loads[apart.argmin(axis=1)], {"load": 4e-7}
     verdict = cr.verify(scene, loads, **control)
     assert not verdict.holds
     assert not len(verdict.wrongly_claimed)
-    assert ("the loads are right with the other sign of x" in verdict.hints()) == (
-        wrong == "mirrored"
-    )
     assert cr.verify(scene, loads, **control, within=1.0).holds
-
-
-def test_loads_a_thousand_times_too_large_do_not_hold_with_any_tolerance() -> None:
-    """Errors are fractions of the solution's largest load, where the given loads are larger."""
-    loads = 1e3 * cr.press(paper(), approach=PAPER_APPROACH).loads
-    verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, within=1.0)
+    # Errors are fractions of the solution's largest load, where the given loads are larger.
+    verdict = cr.verify(scene, 1e3 * contact.loads, approach=contact.approach, within=1.0)
     assert not verdict.holds
     assert verdict.error == pytest.approx(999, rel=1e-6)
 
@@ -186,7 +178,7 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
     asperities = cr.Asperities.square(
         spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-6, seed=3
     )
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    scene = cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit")
     contact = cr.press(scene, approach=PAPER_APPROACH)
     points = asperities.positions
     partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved(points)]
