@@ -18,7 +18,6 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -229,18 +228,12 @@ def undisturbed(names: set[str]) -> tuple[dict[str, float], dict[str, dict[str, 
     return durations, finished
 
 
-def main(seeds: Iterable[int]) -> Iterator[Trial]:
-    """Trials by number."""
-    matplotlib.use("agg")
-    seeds = list(seeds)
-    durations, finished = undisturbed({_command(seed) for seed in seeds})
-    for seed in seeds:
-        yield trial(seed, durations, finished)
-
-
 if __name__ == "__main__":
+    matplotlib.use("agg")
+    seeds = list(map(int, sys.argv[1:]))
+    durations, finished = undisturbed({_command(seed) for seed in seeds})
     seen: Counter[str] = Counter()
-    for done in main(map(int, sys.argv[1:])):
+    for done in (trial(seed, durations, finished) for seed in seeds):
         seen[f"{done.how.split(', ', 1)[1].replace(', --force', '')}: {done.status}"] += 1
         if done.fault:
             print(json.dumps(done._asdict()), flush=True)

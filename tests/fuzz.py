@@ -2,13 +2,15 @@
 
     PYTHONPATH=tests python tests/fuzz.py 0 3000        mutants by number; prints those that fall
 
-One process runs many `mutants`, under limits of its own: processor time and memory for each,
-address space for all. A warning counts as a traceback.
+Scenes, summits, loads, shear forces and proofs are spoiled, each as a number says. One process runs
+many, under limits of its own: processor time and memory for each, address space for all. A warning
+counts as a traceback.
 """
 
 import contextlib
 import io
 import json
+import random
 import re
 import resource
 import signal
@@ -17,13 +19,17 @@ import tempfile
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 import psutil
-from mutants import LONG, Mutant, mutant
+import pyarrow
+from pyarrow import parquet
+from scene_files import scene_text
 
 import convexrough as cr
 from convexrough import cli
@@ -41,6 +47,232 @@ WARRANTED = 40
 
 #: Scenes of more asperities are read and not computed.
 MOST_ASPERITIES = 400
+
+#: Of a line that is far too long.
+LONG = 100_000_000
+
+POINTS = [(0.0, 0.0), (0.0025, 0.0), (-0.0025, 0.0), (0.0, 0.003), (0.001, -0.003)]
+X, Y = map(list, zip(*POINTS, strict=True))
+FRICTION = "[friction]\ncoefficient = 0.5\n"
+STAGES = """
+[shear]
+fractions = [0.25, 0.5]
+[cycle]
+maximum_fraction = [0.3]
+loop_points = 8
+[history]
+fractions = [0.3, -0.3, 0.1]
+"""
+PATHS = """
+[path]
+loads = [1.0, 0.5]
+forces = [0.0, 0.1]
+reference = 1e-8
+[steady]
+ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}
+reference = 1e-8
+[shakedown]
+loads = 1e-8
+force_amplitudes = [1e-9]
+kind = "elastic"
+"""
+UNITS = '[units]\nlength = "mm"\nforce = "N"\n[solver]\nname = "newton"\n'
+SUMMITS = 'pattern = "file"\npath = "{}"\ntip_radius = 0.02'
+
+#: The columns of each kind of table.
+TABLES: dict[str, dict[str, list[Any]]] = {
+    "summits": {"x": X, "y": Y, "height": [0.0, 1e-7, 0.0, -1e-7, 0.0]},
+    "loads": {"x": X, "y": Y, "load": [2e-9] * 5},
+    "forces": {"force": [1e-10] * 5, "status": ["partial"] * 5},
+}
+
+#: What a number becomes, and a word.
+NUMBERS = (
+    *("1e308", "-1e308", "1e400", "1e-308", "5e-324", "1e60", "1e-60", "1e61", "1e-61", "nan"),
+    *("inf", "-inf", "-0.0", "0", "-1", "1", "1_000", "0x1F", "0b1", "1.", ".5", "1,5", "1d-3"),
+    *("9" * 4000, "9" * 5000, "1" + "0" * 30, "2147483648", "9223372036854775808", "true"),
+    *("1979-05-27", '"0.02"', "[]", "[[0.02]]", "{}", "0.02 mm", "", "1e-15", "1e15", "1e5", "7"),
+    *("[0.5, 0.5]", f"[{'1e-9, ' * 2000}]", "null", "NaN"),
+)
+WORDS = (
+    *("\0", "\x1b[31m", "\u202e", "\U0001f600", '"', "'''", "\\", "=", "../..", ",", ".", "\ud800"),
+    *("/dev/null", "x" * 5000, "%s%n", "{0.__class__}", "true", "nan", "-", "none.csv"),
+)
+
+
+class Mutant(NamedTuple):
+    """How it was made, the files of its folder, and the command."""
+
+    how: str
+    files: dict[str, bytes]
+    arguments: list[str]
+
+
+def mutant(seed: int) -> Mutant:
+    """The one of this number."""
+    rng = random.Random(seed)
+    kind = ("scene", "scene", "table", "table", "arrays", "proof")[seed % 6]
+    if kind == "proof":
+        how, contents = _spoiled(rng, _honest_proof(), TEXTS)
+        return Mutant(f"proof {how}", {"proof.json": contents}, ["check", "proof.json"])
+    files = {"a.toml": _scene(rng, "summits.csv"), "summits.csv": _text(rng, "summits")}
+    if kind == "scene":
+        how, files["a.toml"] = _spoiled(rng, files["a.toml"], TEXTS)
+        return Mutant(f"scene {how}", files, _run(rng))
+    table = rng.choice(["summits", "loads", "forces"] if kind == "table" else ["summits", "loads"])
+    form = "csv" if kind == "table" else rng.choice(["npy", "npz", "parquet"])
+    name = f"{table}.{form}"
+    made = _text(rng, table) if form == "csv" else _array_file(rng, table, form)
+    how, contents = _spoiled(rng, made, TEXTS if form == "csv" else BYTES)
+    if table == "summits":
+        files = {"a.toml": _scene(rng, name), name: contents}
+        return Mutant(f"{name} {how}", files, _run(rng))
+    files |= {"loads.csv": _text(random.Random(0), "loads"), name: contents}
+    arguments = ["verify", "a.toml", "loads.csv" if table == "forces" else name]
+    if table == "forces":
+        arguments += ["--shear", name, "--shear-force", "1e-10"]
+    return Mutant(f"{name} {how}", files, [*arguments, *rng.choice([[], ["--json"], ["--proof"]])])
+
+
+def _scene(rng: random.Random, summits: str) -> bytes:
+    stages = rng.choice([FRICTION, FRICTION + STAGES, FRICTION + PATHS, UNITS + FRICTION])
+    normal = rng.choice(["approach = 5e-5", "load = 1e-8"])
+    return scene_text(SUMMITS.format(summits), normal, stages).encode()
+
+
+def _run(rng: random.Random) -> list[str]:
+    more = rng.choice([[], ["--json"], ["--proof"], ["--html"]])
+    return ["run", "a.toml", "--no-figures", "--force", *more]
+
+
+def _text(rng: random.Random, table: str) -> bytes:
+    separator, columns = rng.choice([",", ";", "\t", " "]), TABLES[table]
+    rows = [columns, *zip(*columns.values(), strict=True)]
+    return ("\n".join(separator.join(map(str, row)) for row in rows) + "\n").encode()
+
+
+def _array_file(rng: random.Random, table: str, form: str) -> bytes:
+    """Mostly as it should be; else of a type or shape that is unexpected."""
+    columns, out = TABLES[table], io.BytesIO()
+    if form == "parquet":
+        parquet.write_table(pyarrow.table(columns), out)
+    elif form == "npz":
+        np.savez(out, **{name: _odd(rng, np.array(each)) for name, each in columns.items()})
+    else:
+        np.save(out, _odd(rng, np.array(list(columns.values())).T), allow_pickle=True)
+    return out.getvalue()
+
+
+def _odd(rng: random.Random, values: Any) -> Any:
+    with np.errstate(all="ignore"):
+        kinds = ("f2", "f4", "i8", "c16", "?", "U9", "S3", "O", ">f8")
+        return rng.choice([
+            *[values] * 12, *map(values.astype, kinds), values[..., None, None], values[:0],
+            values * np.nan, values.ravel()[0], -values, np.asfortranarray(values),
+            np.broadcast_to(np.zeros(1), (5, 1)), np.zeros(5, [("x", "f8"), ("load", "f8")]),
+            np.zeros(5, "M8[s]"),
+        ])  # fmt: skip
+
+
+@cache
+def _honest_proof() -> bytes:
+    scene = cr.Scene(1.0, cr.Asperities(POINTS, 0.02), cr.Material(1.0, 0.3), 0.5, "summit")
+    contact = cr.press(scene, approach=2e-5)
+    proof = contact.proof(sheared=[cr.shear(contact, force=0.1 * contact.load)])
+    return json.dumps(proof.document).encode()
+
+
+# How they are spoiled -----------------------------------------------------------------------------
+
+Spoil = Callable[[random.Random, bytes], bytes]
+
+
+def _spoiled(rng: random.Random, contents: bytes, ways: tuple[Spoil, ...]) -> tuple[str, bytes]:
+    chosen = [rng.choice(ways) for _ in range(rng.choice([1, 1, 2]))]
+    for way in chosen:
+        contents = way(rng, contents)
+    return "+".join(way.__name__ for way in chosen), contents
+
+
+def truncated(rng: random.Random, contents: bytes) -> bytes:
+    return contents[: rng.randrange(len(contents) + 1)]
+
+
+def some_bytes(rng: random.Random, contents: bytes) -> bytes:
+    """As a disk loses them: a block that is zero, random, or of elsewhere in the file."""
+    place, size = rng.randrange(len(contents) + 1), rng.choice([1, 1, 8, 64, 512])
+    source = rng.randrange(len(contents) + 1)
+    block = rng.choice([bytes(size), rng.randbytes(size), contents[source : source + size]])
+    return contents[:place] + block + contents[place + rng.choice([0, size]) :]
+
+
+def binary(rng: random.Random, contents: bytes) -> bytes:
+    heads = [b"", b"PK\x03\x04", b"\x89HDF", b"\x1f\x8b\x08", b"%PDF-1.4", b"PAR1", b"\x93NUMPY"]
+    return rng.choice(heads) + rng.randbytes(rng.choice([0, 1, 10, 1000, 100_000]))
+
+
+def encoded(rng: random.Random, contents: bytes) -> bytes:
+    """In another encoding, or with other ends of lines."""
+    ends = ["\r\n", "\r", "\n\r", "\n\n", "\x0b", "\x0c", "\u0085", "\u2028", "\0"]
+    codes = ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-7", "cp1252", "utf-8-sig"]
+    text = contents.decode("latin-1") + rng.choice(["", "# \u00e9\u03bc", "\u2212", "\u3000"])
+    text = text.replace("\n", rng.choice(ends)) if rng.random() < 0.5 else text
+    return text.encode(rng.choice(codes), "replace")
+
+
+def lines_moved(rng: random.Random, contents: bytes) -> bytes:
+    """Lines twice, gone, or in another order."""
+    lines = contents.split(b"\n")
+    place, other = rng.randrange(len(lines)), rng.randrange(len(lines))
+    lines[place], lines[other] = lines[other], rng.choice([lines[place], lines[other], b""])
+    return b"\n".join(rng.choice([1, 1, 2]) * lines)
+
+
+def wide(rng: random.Random, contents: bytes) -> bytes:
+    """Longer lines, or a quotation that does not end."""
+    end = rng.choice([b",", b";1", b"\t", b" 1.5", b'"', b'"a"b,'])
+    count = rng.choice([1, 100, 20_000])
+    return contents.replace(b"\n", end * count + b"\n", rng.choice([1, -1]))
+
+
+def other_number(rng: random.Random, contents: bytes) -> bytes:
+    return _replaced(rng, contents, rb"-?\d[\d.]*(?:e-?\d+)?", rng.choice(NUMBERS))
+
+
+def other_word(rng: random.Random, contents: bytes) -> bytes:
+    """Control characters, other alphabets, quotes, no characters at all."""
+    return _replaced(rng, contents, rb"[A-Za-z_]{2,}", rng.choice(WORDS))
+
+
+def _replaced(rng: random.Random, contents: bytes, pattern: bytes, new: str) -> bytes:
+    found = list(re.finditer(pattern, contents))
+    if not found:
+        return contents
+    place = rng.choice(found)
+    inserted = new.encode("utf-8", "surrogatepass")
+    return contents[: place.start()] + inserted + contents[place.end() :]
+
+
+def deep(rng: random.Random, contents: bytes) -> bytes:
+    depth = rng.choice([50, 500, 5_000, 50_000])
+    opened, closed = rng.choice([(b"[", b"]"), (b"{a=", b"}"), (b'{"a":', b"}"), (b"(", b")")])
+    nested = opened * depth + rng.choice([b"", b"1" + closed * depth])
+    return rng.choice([nested, b"a = " + nested, contents + b"\n[deep]\na = " + nested])
+
+
+def long_line(rng: random.Random, contents: bytes) -> bytes:
+    """Of 100 MB, now and then; mostly of 100 kB."""
+    size = LONG if rng.random() < 0.03 else 100_000
+    piece = rng.choice([b"x", b"1.5,", b"1.5 ", b"[", b'"', b" ", b"#", b"1", b"a.", b"\xff"])
+    line = (piece * (size // len(piece) + 1))[:size]
+    return rng.choice([line, contents + b"\n" + line, b"a = " + line, b"# " + line + b"\n"])
+
+
+BYTES: tuple[Spoil, ...] = (truncated, some_bytes, some_bytes, binary)
+TEXTS: tuple[Spoil, ...] = (
+    *(truncated, some_bytes, binary, encoded, lines_moved, wide, deep, long_line),
+    *(other_number, other_number, other_number, other_word, other_word),
+)
 
 
 class Hang(BaseException):
@@ -69,15 +301,12 @@ def run(seed: int) -> Ran:
         status, said, fault = _called(made, size)
     if not fault and status == 2 and not re.search(r"(error|unreadable|Error): \S", said):
         fault = f"no reason: {said[:200]!r}"
-    if not fault and status not in _statuses(made.arguments[0]):
+    allowed = (0, 1, 2) if made.arguments[0] == "check" else (0, 2, 3, 4)
+    if not fault and status not in allowed:
         fault = f"status {status}: {said[:200]!r}"
     if not fault and len(said) > 20_000 and "--json" not in made.arguments:
         fault = f"{len(said)} characters: {said[:200]!r}"
     return Ran(seed, made.how, status, fault)
-
-
-def _statuses(command: str) -> tuple[int, ...]:
-    return (0, 1, 2) if command == "check" else (0, 2, 3, 4)
 
 
 def _called(made: Mutant, size: int) -> tuple[int | None, str, str]:
@@ -129,15 +358,10 @@ def limited() -> None:
     psutil.virtual_memory = lambda: SimpleNamespace(available=AVAILABLE)  # type: ignore
 
 
-def main(first: int, last: int) -> Iterator[Ran]:
-    limited()
-    for seed in range(first, last):
-        yield run(seed)
-
-
 if __name__ == "__main__":
+    limited()
     seen: Counter[str] = Counter()
-    for ran in main(int(sys.argv[1]), int(sys.argv[2])):
+    for ran in map(run, range(int(sys.argv[1]), int(sys.argv[2]))):
         seen[f"status {ran.status}"] += 1
         if ran.fault:
             print(json.dumps(ran._asdict()), flush=True)

@@ -53,19 +53,14 @@ def toml(contents: dict[str, Any]) -> str:
     """Of tables, of values and of inline tables."""
     lines = []
     for name, table in contents.items():
-        lines.append(f"[{name}]")
-        for key, value in table.items():
-            if isinstance(value, dict):
-                inside = ", ".join(f'"{each}" = {_toml(it)}' for each, it in value.items())
-                lines.append(f"{key} = {{{inside}}}")
-            else:
-                lines.append(f"{key} = {_toml(value)}")
+        lines += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
     return "\n".join(lines) + "\n"
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key} = {_toml(it)}" for key, it in value.items()) + "}"
+        pairs = (f"{json.dumps(key)} = {_toml(it)}" for key, it in value.items())
+        return "{" + ", ".join(pairs) + "}"
     return json.dumps(value)
 
 
