@@ -1,6 +1,5 @@
 """The benchmark: its reference, and what it writes. No time is tested."""
 
-import csv
 import json
 from functools import cache
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
+from scene_files import rows
 
 from convexrough.bench import measure, suite
 from convexrough.bench.measure import reference
@@ -31,9 +31,6 @@ def tiny() -> Bench:
         return suite.run(quick=True)
 
 
-# The reference.
-
-
 @pytest.mark.parametrize("family", ["lattice", "rough"])
 def test_reference_against_50_digits(family: Any) -> None:
     each = scene(family, 1.0)
@@ -52,12 +49,6 @@ def test_reference_against_50_digits(family: Any) -> None:
     assert found.error(found.loads * 1.001) == pytest.approx(1e-3, rel=1e-6)
 
 
-# What is measured, and what is said of it.
-
-
-# What it writes.
-
-
 @pytest.fixture
 def command(command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The command line, which finds a run that was made before."""
@@ -73,9 +64,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {
         *("files.json", "bench.json", "rows.csv", "work-precision.png", "cost.png"),
     }
-    with (folder / "rows.csv").open() as file:
-        table = list(csv.DictReader(file))
-    assert len(table) == len(tiny().rows)
+    assert len(rows(folder / "rows.csv")) == len(tiny().rows)
     summary = json.loads(ran.out)
     assert summary == json.loads((folder / "bench.json").read_text())
     assert {"schema", "version", "machine", "seconds", "exponents", "verdicts"} < set(summary)

@@ -1,19 +1,18 @@
 """The stage of docs/architecture.md: one file and one registration give all that a stage has."""
 
-import csv
 import json
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import scene_text
+from scene_files import FRICTION, rows, scene_text
 
 import convexrough as cr
 from convexrough.run.stages import STAGES
 
 PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
-MORE = "[friction]\ncoefficient = 0.5\n[onset]\n"
+MORE = FRICTION + "[onset]\n"
 
 
 @pytest.fixture(autouse=True)
@@ -28,16 +27,15 @@ def test_it_is_computed_written_and_printed(command: Any, tmp_path: Path) -> Non
     (tmp_path / "a.toml").write_text(scene_text(more=MORE))
     ran = command("run", "a.toml", "--no-figures")
     assert (ran.status, ran.err) == (0, "")
-    rows = json.loads((tmp_path / "a-results" / "summary.json").read_text())["onset"]
-    assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{rows[0]['onset']:.7g}$",
+    said = json.loads((tmp_path / "a-results" / "summary.json").read_text())["onset"]
+    assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{said[0]['onset']:.7g}$",
                      ran.out, re.M)  # fmt: skip
     file = cr.read_scene("a.toml")
     contact = file.press()
     onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
-    with (tmp_path / "a-results" / "onset.csv").open() as table:
-        written = [float(row["onset"]) for row in csv.DictReader(table)]
+    written = [float(row["onset"]) for row in rows("a-results/onset.csv")]
     assert written == pytest.approx(onsets, nan_ok=True)
-    assert rows[0] == {"quantile": 0.0, "onset": min(written)}
+    assert said[0] == {"quantile": 0.0, "onset": min(written)}
     (*_, result) = file.compute(contact)
     assert result.certified
     assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)

@@ -5,32 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, TWO_BODIES, WITHIN, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
 
 INF = float("inf")
-WITHIN = f"{HEXAGONAL}within = 0.0102\n"
-ONE = "contact_modulus = 1.0\npoisson_ratio = 0.3\n"
-TWO = """[material.sphere]
-youngs_modulus = 210e3
-poisson_ratio = 0.3
-hardness = 8e3
-[material.base]
-youngs_modulus = 70e3
-poisson_ratio = 0.33
-"""
 
 
-def text(radius: str = "1.0", material: str = ONE, asperities: str = WITHIN, **more: str) -> str:
-    written = scene_text(asperities, **more).replace("radius = 1.0", f"radius = {radius}", 1)
-    return written.replace(ONE, material)
-
-
-def read(tmp_path: Path, *args: Any, **more: Any) -> cr.SceneFile:
+def read(tmp_path: Path, **given: str) -> cr.SceneFile:
     path = tmp_path / "scene.toml"
-    path.write_text(text(*args, **more), encoding="utf-8")
+    path.write_text(scene_text(WITHIN, **given), encoding="utf-8")
     return read_scene(path)
 
 
@@ -45,17 +30,15 @@ def read(tmp_path: Path, *args: Any, **more: Any) -> cr.SceneFile:
     ],
 )
 def test_bases(tmp_path: Path, radius: str, expected: Any) -> None:
-    assert read(tmp_path, radius).scene.sphere_radius == expected
+    assert read(tmp_path, radius=radius).scene.sphere_radius == expected
 
 
 def test_two_bodies(tmp_path: Path) -> None:
     steel, soft = cr.Material.from_youngs(210e3, 0.3, 8e3), cr.Material.from_youngs(70e3, 0.33)
-    assert read(tmp_path, material=TWO).scene.material == cr.Material.pair(steel, soft)
+    assert read(tmp_path, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)
 
 
-STAGES = """[friction]
-coefficient = 0.5
-[shear]
+STAGES = """[shear]
 fractions = [0.3]
 [cycle]
 maximum_fraction = [0.1, 0.4]
@@ -71,7 +54,9 @@ fraction = 0.2
 @pytest.mark.parametrize("radius", ["inf", "[1.0, 2.5]", "[1.0, inf]"])
 def test_a_whole_run(command: Any, tmp_path: Path, radius: str) -> None:
     """With a proof that the checker accepts."""
-    (tmp_path / "scene.toml").write_text(text(radius, TWO, normal="load = 0.02", more=STAGES))
+    more = FRICTION + STAGES
+    text = scene_text(WITHIN, "load = 0.02", more, radius=radius, material=TWO_BODIES)
+    (tmp_path / "scene.toml").write_text(text)
     outcome = command("run", "scene.toml", "--out", "found", "--proof", "--no-figures")
     assert outcome.status == 0, outcome.err
     assert "Dundurs' beta = -0.117, neglected" in outcome.out
@@ -87,7 +72,8 @@ def test_a_whole_run(command: Any, tmp_path: Path, radius: str) -> None:
 
 
 def test_the_slider_page_is_of_spheres(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(text("inf", normal="load = 1e-7", more=STAGES))
+    text = scene_text(WITHIN, "load = 1e-7", FRICTION + STAGES, radius="inf")
+    (tmp_path / "scene.toml").write_text(text)
     outcome = command("run", "scene.toml", "--no-figures", "--html")
     assert "slider page: found a flat, expected a sphere" in outcome.err
     assert outcome.status == 2

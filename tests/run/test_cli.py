@@ -1,6 +1,5 @@
 """The command line as its users meet it: output, files, exit status; processes in test_process."""
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -8,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
-from convexrough import plots
-from convexrough.run import results
 from convexrough.run.scene_file import read_scene
 
 
@@ -26,7 +23,7 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
 
 
 def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102"))
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN))
     ran = command("run", "a.toml", "--json", "--no-figures", "--out", "deep/er")
     assert (ran.status, ran.err) == (0, "")
     summary = json.loads(ran.out)
@@ -123,10 +120,7 @@ def test_without_a_certificate(command: Any, tmp_path: Path) -> None:
     assert "warning: not certified" in verified.err
 
 
-SHEAR = """
-[friction]
-coefficient = 0.5
-[shear]
+SHEAR = """[shear]
 fractions = [0.1, 0.37, 0.5]
 [cycle]
 maximum_fraction = [0.37, 0.5]
@@ -136,26 +130,9 @@ fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
 """
 
 
-PATHS = """
-[path]
-loads = [3e-7, 3e-7]
-forces = [0.0, 1e-7]
-[steady]
-ellipse = { load = 3e-7, load_amplitude = 5e-8, force_amplitude = 5e-8, chords = 6 }
-[shakedown]
-loads = 3e-7
-force_amplitudes = [1e-7, -1e-7]
-"""
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     """Every table of the scene is computed, and every file says what the package says."""
-    (tmp_path / "a.toml").write_text(scene_text(more=SHEAR))
+    (tmp_path / "a.toml").write_text(scene_text(more=FRICTION + SHEAR))
     outcome = command("run", "a.toml", "--no-figures", "--json")
     assert (outcome.status, outcome.err) == (0, "")
     summary, folder = json.loads(outcome.out), tmp_path / "a-results"
@@ -209,29 +186,6 @@ def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
     assert refused.status == 2
     assert "of one scene, not of a sweep" in refused.err
     assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
-
-
-def test_nothing_is_solved_while_writing_or_drawing(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """All presses, levels and states are found when the first table is written."""
-    (tmp_path / "a.toml").write_text(scene_text(more=SHEAR + PATHS))
-    write = results.write_results
-
-    def after(*given: Any, **options: Any) -> Any:
-        for solves in ("normal.problem.NormalProblem.assemble", "normal.level.Levels.at",
-                       "friction.levels.FrictionLevels.rows"):  # fmt: skip
-            monkeypatch.setattr(f"convexrough.{solves}", never)
-        return write(*given, **options)
-
-    def never(*_: Any, **__: Any) -> None:
-        raise AssertionError("solved")
-
-    monkeypatch.setattr(results, "write_results", after)
-    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
-    ran = command("run", "a.toml")
-    assert (ran.status, ran.err) == (0, "")
-    assert (tmp_path / "a-results" / "hysteresis.png").exists()
 
 
 # Bad input

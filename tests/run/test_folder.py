@@ -6,16 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, WITHIN, scene_text
 
 from convexrough import plots
+from convexrough.run import results
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
 #: Every table that a scene file may have.
 EVERYTHING = """
-[friction]
-coefficient = 0.5
 [shear]
 fractions = [0.1, 0.5]
 [cycle]
@@ -48,9 +47,25 @@ def keys(value: Any) -> Any:
 def test_names_columns_and_keys(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After a deliberate change the folder of the test holds what to pin, as found.json."""
+    """All is solved before the first file is written.
+
+    After a deliberate change the folder of the test holds what to pin, as found.json.
+    """
+    write = results.write_results
+
+    def after(*given: Any, **options: Any) -> Any:
+        with monkeypatch.context() as patch:
+            for solves in ("normal.problem.NormalProblem.assemble", "normal.level.Levels.at",
+                           "friction.levels.FrictionLevels.rows"):  # fmt: skip
+                patch.setattr(f"convexrough.{solves}", never)
+            return write(*given, **options)
+
+    def never(*_: Any, **__: Any) -> None:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr(results, "write_results", after)
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
-    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102", more=EVERYTHING))
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=FRICTION + EVERYTHING))
     ran = command("run", "a.toml", "--out", "out", "--html")
     assert (ran.status, ran.err) == (0, "")
     found: dict[str, Any] = {"files": sorted(path.name for path in (tmp_path / "out").iterdir())}

@@ -1,28 +1,17 @@
 """[gradient] in scene files: its table, numbers, words, figure, and mistakes."""
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
 
-SCENE = scene_text(
-    HEXAGONAL + "within = 0.0102", "load = 3.60853389e-7", "[friction]\ncoefficient = 0.5\n"
-)
 
-
-def write(table: str, scene: str = SCENE) -> None:
-    Path("scene.toml").write_text(scene + table)
-
-
-def read(name: str) -> dict[str, Any]:
-    with Path(f"out/{name}.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
+def write(table: str) -> None:
+    Path("scene.toml").write_text(scene_text(WITHIN, "load = 3.60853389e-7", FRICTION + table))
 
 
 def printed(out: str) -> dict[str, str]:
@@ -40,7 +29,8 @@ def test_what_is_written_and_printed(command: Any) -> None:
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
     contact = cr.read_scene("scene.toml").press()
     gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
-    table = read("gradient")
+    found = rows("out/gradient.csv")
+    table = {key: np.array([float(row[key]) for row in found]) for key in found[0]}
     np.testing.assert_array_equal(table["by_height"], gradient.heights)
     np.testing.assert_array_equal(table["by_height_error"], gradient.height_errors)
     np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])

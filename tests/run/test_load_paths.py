@@ -1,6 +1,5 @@
 """Load paths in scene files: tables, files, and what is not proved."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -8,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, HEXAGONAL, WITHIN, rows, scene_text
 
 import convexrough as cr
 from convexrough.friction import general_step
 
-FRICTION = "[friction]\ncoefficient = 0.5\n"
-SCENE = scene_text(HEXAGONAL + "within = 0.0102", more=FRICTION)
+SCENE = scene_text(WITHIN, more=FRICTION)
 PATHS = """
 [path]
 loads = [0.6, 0.6, 1.0, 1.0]
@@ -44,20 +42,16 @@ def test_a_run(command: Any) -> None:
     assert summary["path"]["sliding"] == [0, 12, 0, 6]
     assert summary["steady"]["undecided"] == 0
     assert summary["shakedown"]["factor"] == pytest.approx(0.351719571750, rel=1e-10)
-    with Path("out/path.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["loss"]) for row in rows] == summary["path"]["loss"]
-    with Path("out/path_asperities.csv").open() as file:
-        statuses = [row["status"] for row in csv.DictReader(file)]
+    assert [float(row["loss"]) for row in rows("out/path.csv")] == summary["path"]["loss"]
+    statuses = [row["status"] for row in rows("out/path_asperities.csv")]
     assert (len(statuses), statuses.count("sliding")) == (4 * 61, 18)
     for name in ("steady", "shakedown"):
-        with Path(f"out/{name}.csv").open() as file:
-            assert len(list(csv.DictReader(file))) == 61
+        assert len(rows(f"out/{name}.csv")) == 61
 
 
 SHADED = scene_text(
-    'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION
-).replace("radius = 1.0", "radius = 1e6")
+    'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION, "1e6"
+)
 STAGES = """
 [shear]
 fractions = [0.3]
@@ -89,8 +83,9 @@ def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.M
     for name in ("SETTLED", "SETTLED_MOTION"):
         monkeypatch.setattr(general_step, name, np.inf)
     turn = 2 * np.pi * np.arange(5) / 5
-    rows = ["0,0,-0.06,0.05", *(f"{np.cos(t)},{np.sin(t)},0,1" for t in turn)]
-    Path("shaded.csv").write_text("\n".join(["x,y,height,tip_radius", *rows]))
+    around = [f"{np.cos(t)},{np.sin(t)},0,1" for t in turn]
+    lines = ["x,y,height,tip_radius", "0,0,-0.06,0.05", *around]
+    Path("shaded.csv").write_text("\n".join(lines))
     Path("scene.toml").write_text(SHADED)
     pressed = json.loads(command("run", "scene.toml", "--no-figures", "--json").out)["normal"]
     Path("scene.toml").write_text(SHADED + STAGES.replace("LOAD", repr(pressed["load"])))

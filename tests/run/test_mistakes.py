@@ -4,20 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, TWO_BODIES, WITHIN, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
-
-ONE = "contact_modulus = 1.0\npoisson_ratio = 0.3\n"
-TWO = """[material.sphere]
-youngs_modulus = 210e3
-poisson_ratio = 0.3
-hardness = 8e3
-[material.base]
-youngs_modulus = 70e3
-poisson_ratio = 0.33
-"""
 
 
 def layout(keys: str, normal: str = "approach = 5e-5", more: str = "") -> str:
@@ -28,16 +18,7 @@ def layout(keys: str, normal: str = "approach = 5e-5", more: str = "") -> str:
 
 def stage(table: str) -> str:
     """A scene with friction and this table."""
-    within = HEXAGONAL + "within = 0.0102"
-    return scene_text(within, "load = 3.6e-7", f"[friction]\ncoefficient = 0.5\n{table}")
-
-
-def sphere(radius: str) -> str:
-    return scene_text().replace("radius = 1.0", f"radius = {radius}", 1)
-
-
-def bodies(material: str) -> str:
-    return scene_text().replace(ONE, material)
+    return scene_text(WITHIN, "load = 3.6e-7", FRICTION + table)
 
 
 VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
@@ -62,11 +43,11 @@ MISTAKES = [
     (layout("spacing = 0.0025\ntip_radius = 1", "approach = 0.1", '[solver]\ninfluence = "dense"'),
      "asperities that could touch"),
     # [sphere] and [material]
-    (sphere("[1.0, -2.0]"), "[sphere] radius[1]: found -2.0, expected a positive number, or"),
-    (sphere("inf"), "[asperities] within: missing, needed with a flat"),
-    (bodies(f"contact_modulus = 1.0\n{TWO}"),
+    (scene_text(radius="[1.0, -2.0]"), "[sphere] radius[1]: found -2.0, expected a positive num"),
+    (scene_text(radius="inf"), "[asperities] within: missing, needed with a flat"),
+    (scene_text(material=f"contact_modulus = 1.0\n{TWO_BODIES}"),
      "[material] contact_modulus: not used with two bodies"),
-    (bodies(TWO.replace("70e3", "-70e3")),
+    (scene_text(material=TWO_BODIES.replace("70e3", "-70e3")),
      "[material] base.youngs_modulus: found -70000.0, expected a positive number"),
     (layout("spacing = 1\ntip_radius = [1, 2]", "load = 1"),
      "[asperities] within: missing, needed with a list of tip radii under a given load"),

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene_files import HEXAGONAL, scene_text
+from scene_files import FRICTION, HEXAGONAL, WITHIN, scene_text
 
 import convexrough as cr
-
-FRICTION = "[friction]\ncoefficient = 0.5\n"
 
 
 def named(folder: Path) -> set[str]:
@@ -99,7 +97,6 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
 
 def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
     """A radius in the wrong unit, of a sphere or along one axis; a flat base has no such limit."""
-    array = HEXAGONAL + "within = 0.0102"
     said = "contact reaches the rim of the array, which ends at 0."
     for radius, warns in (
         ("1.0", False),
@@ -108,10 +105,10 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
         ("[1.0, 2.0]", False),
         ("inf", False),
     ):
-        text = scene_text(array).replace("radius = 1.0", f"radius = {radius}", 1)
+        text = scene_text(WITHIN, radius=radius)
         assert (said in warned(command, tmp_path, text).err) == warns, radius
     for within, warns in (("0.004", True), ("0.002", False)):  # 7 asperities, and one
-        few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", within)
+        few = scene_text(WITHIN.replace("0.0102", within), radius="1e3")
         assert (said in warned(command, tmp_path, few).err) == warns
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import scene_text
+from scene_files import FRICTION, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -62,7 +62,7 @@ def test_a_key_of_many_parts(tmp_path: Path, text: str) -> None:
     assert "line 1" in said
 
 
-STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
+STEADY = FRICTION + "[steady]\nreference = 1e60\n"
 STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 
 

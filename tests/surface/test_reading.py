@@ -127,6 +127,7 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
 
 
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
+ONE = {"pixel": 1.0}
 
 
 #: Heights of about 1000, with a comma between groups of three digits.
@@ -150,63 +151,43 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "options", "message"),
     [
-        (
-            "Height [nm]\n" + matrix(),
-            {"pixel": 1.0},
-            r"row 1: text: found 'Height \[nm\]', expected a co",
-        ),
+        ("Height [nm]\n" + matrix(), ONE, r"row 1: text: found 'Height \[nm\]', expected a co"),
         (matrix(), {}, "pixel: found none, expected its size, which the file does not state"),
-        (matrix(HOLED), {"pixel": 1.0}, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
-        (matrix(np.full((7, 9), np.nan)), {"pixel": 1.0, "fill": True}, "expected some heights"),
-        (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
-        (matrix(1e9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
-        (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
+        (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
+        (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
+        (matrix(np.ones((7, 9))), ONE, "found 1 everywhere, expected a rough surface"),
+        (matrix(1e9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
+        (matrix(1e-9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
         (
             matrix(HEIGHTS),
-            {"pixel": 1.0, "unit": "nm", "height_unit": "um"},
+            ONE | {"unit": "nm", "height_unit": "um"},
             "rms slope .* check height_unit, µm, and unit",
         ),
         (matrix(), {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
-        (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
-        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of"),
-        (
-            "# Width: 9 µm\n# Height: 7 µm\n" + matrix(),
-            {"unit": "nm"},
-            "unit: found nm, expected ",
-        ),
+        (matrix(), ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
+        (matrix(), ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
+        ("# Width: 9 µm\n# Height: 7 µm\n" + matrix(), {"unit": "nm"}, "unit: found nm, expected "),
         ("# Width: 9 µm\n# Height: 7 nm\n" + matrix(), {}, "units: found µm and nm, expected one"),
         ("# Width: 9,0 µm\n# Height: 7,0 µm\n" + matrix(), {"unit": "mm"}, "found mm, expected µm"),
         ("# Width: 9 by 9 µm\n# Height: 7 µm\n" + matrix(), {}, "units: found by 9 µm and µm"),
-        ("# Height: 7 µm\n" + matrix(), {"pixel": 1.0, "unit": "mm"}, "comments: found only a hei"),
+        ("# Height: 7 µm\n" + matrix(), ONE | {"unit": "mm"}, "comments: found only a hei"),
         ("# Width: 9 m\n# Height: 7 m\n" + matrix(), {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
         ("# Breite: 9 mm\n# Werte: nm\n" + matrix(), {}, "comments: found # Breite: 9 mm, exp"),
-        ("# z unit: nm\n" + matrix(), {"pixel": 1.0, "unit": "mm"}, "comments: found # z unit"),
-        ("# Pixel = 0.5\n" + matrix(), {"pixel": 1.0}, "comments: found # Pixel = 0.5"),
-        ("# Value units: V\n" + matrix(), {"pixel": 1.0, "unit": "m"}, "height_unit: found 'V'"),
-        (
-            matrix().replace("\n", "\nx", 1),
-            {"pixel": 1.0},
-            "row 2, column 1: found 'x",
-        ),
-        (
-            matrix() + "1 2\n",
-            {"pixel": 1.0},
-            "row 8: found 2 cells, expected 9, as in most rows: 1 2",
-        ),
-        ("a b c\n" + matrix(), {"pixel": 1.0}, "columns: found a, b, c, expected a column 'x'"),
-        (
-            "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
-            {},
-            "x, y: found the point 1, 1 2 times, expected each",
-        ),
+        ("# z unit: nm\n" + matrix(), ONE | {"unit": "mm"}, "comments: found # z unit"),
+        ("# Pixel = 0.5\n" + matrix(), ONE, "comments: found # Pixel = 0.5"),
+        ("# Value units: V\n" + matrix(), ONE | {"unit": "m"}, "height_unit: found 'V'"),
+        (matrix().replace("\n", "\nx", 1), ONE, "row 2, column 1: found 'x"),
+        (matrix() + "1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
+        ("a b c\n" + matrix(), ONE, "columns: found a, b, c, expected a column 'x'"),
+        ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
         ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
         ("", {}, "empty"),
         ("x,y,z\n", {}, "rows: found none below the header"),
-        ("1 2 3 4\n", {"pixel": 1.0}, "shape"),
-        ("0 1 2 3 4 5 6 7 8\n" + matrix(), {"pixel": 1.0}, "row 1: found numbers 1, 2, 3, ..."),
+        ("1 2 3 4\n", ONE, "shape"),
+        ("0 1 2 3 4 5 6 7 8\n" + matrix(), ONE, "row 1: found numbers 1, 2, 3, ..."),
         (
             "0 .2 .4 .6 .8 1 1.2 1.4 1.6\n" + matrix(),
             {"pixel": 0.2},
@@ -219,14 +200,14 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         ),
         (
             "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
-            {"pixel": 1.0},
+            ONE,
             "column 1: found numbers 1, 2, 3, ...",
         ),
-        (THOUSANDS, {"pixel": 1.0}, "row 1: found 1,021, and 990 in row 11, expected .* thousands"),
-        (THOUSANDS.replace(",", "."), {"pixel": 1.0}, "found 1.021, and 990 in row 11"),
-        (THOUSANDS.replace("1,0", "1,000,0"), {"pixel": 1.0}, "row 1: found 1,000,003, expected"),
-        (THOUSANDS.replace(",", "'"), {"pixel": 1.0}, "row 1: found 1'003, expected numbers w"),
-        (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), {"pixel": 1.0}, "found '-1.#IND'"),
+        (THOUSANDS, ONE, "row 1: found 1,021, and 990 in row 11, expected .* thousands"),
+        (THOUSANDS.replace(",", "."), ONE, "found 1.021, and 990 in row 11"),
+        (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
+        (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
+        (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
     ],
 )
 def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:

@@ -357,8 +357,3 @@ def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
     book.save(tmp_path / "loads.xlsx")
     note = read_loads(tmp_path / "loads.xlsx", small()).note
     assert 'loads.xlsx: sheet "Run 2", not "Run 3", matched by position' in note
-
-
-def test_a_column_z_holds_heights(tmp_path: Path) -> None:
-    path = written(tmp_path, "x,y,z,tip_radius\n0,0,0.5,1\n1,0,-0.5,1\n")
-    assert read_summits(path, tip_radius=None).heights.tolist() == [0.5, -0.5]

@@ -1,6 +1,5 @@
 """`verify` on the command line: what it says, in which order, and its exit status."""
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -9,23 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import fits, texts
-from scene_files import HEXAGONAL, scene_text, write_loads
+from scene_files import FRICTION, WITHIN, rows, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
 from convexrough.plots.verdict import verdict_figures
 from convexrough.run.scene_file import read_scene
 
-MORE = '[units]\nlength = "mm"\nforce = "N"\n[friction]\ncoefficient = 0.5\n'
+MORE = '[units]\nlength = "mm"\nforce = "N"\n' + FRICTION
 
 
 @pytest.fixture
 def contact(tmp_path: Path) -> cr.Contact:
     """The paper's, whose scene is a.toml by its approach, and b.toml by its load."""
-    within = HEXAGONAL + "within = 0.0102"
-    (tmp_path / "a.toml").write_text(scene_text(within, more=MORE))
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=MORE))
     contact = cr.press(read_scene(tmp_path / "a.toml").scene, approach=5e-5)
-    (tmp_path / "b.toml").write_text(scene_text(within, f"load = {contact.load!r}", MORE))
+    (tmp_path / "b.toml").write_text(scene_text(WITHIN, f"load = {contact.load!r}", MORE))
     return contact
 
 
@@ -96,9 +94,8 @@ def test_json_and_files(command: Any, contact: cr.Contact, tmp_path: Path) -> No
         "files.json", "verdict.csv", "verdict.json", "verdict.png",
     }  # fmt: skip
     assert found == json.loads((folder / "verdict.json").read_text())
-    with (folder / "verdict.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert (rows[36]["claimed"], rows[36]["suspect"]) == ("open", "1")
+    written = rows(folder / "verdict.csv")[36]
+    assert (written["claimed"], written["suspect"]) == ("open", "1")
     again = command(*asked)
     assert again.status == 2
     assert "found: not empty; --force replaces its results; or name another folder" in again.err
