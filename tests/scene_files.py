@@ -1,10 +1,15 @@
 """Scene files and files of loads that several tests write, and tables that they read."""
 
 import csv
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import convexrough as cr
+
+Columns = Mapping[str, Iterable[Any]]
 
 HEXAGONAL = """
 pattern = "hexagonal"
@@ -50,8 +55,20 @@ def rows(path: Path | str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def cells(columns: Columns) -> list[list[Any]]:
+    """Rows of a table, the first of names."""
+    below = zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    return [list(columns), *map(list, below)]
+
+
+def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bool = True) -> str:
+    """A table of text, as any program writes it."""
+    names, *below = cells(columns)
+    written = [[str(cell).replace(".", decimal) for cell in row] for row in below]
+    return "".join(separator.join(row) + "\n" for row in [*([names] if header else []), *written])
+
+
 def write_loads(path: Path, scene: cr.Scene, loads: Any, order: Any) -> Path:
-    points = scene.asperities.positions
-    rows = [f"{float(points[i, 0])},{float(loads[i])},{float(points[i, 1])}" for i in order]
-    path.write_text("\n".join(["x,load,y", *rows]))
+    x, y = scene.asperities.positions[order].T
+    path.write_text(lines({"x": x, "load": loads[order], "y": y}))
     return path

@@ -3,12 +3,13 @@
 import gzip
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scene_files import Columns, cells, lines
 from scipy.io import savemat
 
 import convexrough as cr
@@ -41,19 +42,6 @@ approach = 4e-7
 BODIES = """sphere = {youngs_modulus = 210e9, poisson_ratio = 0.3}
 base = {youngs_modulus = 70, poisson_ratio = 0.3}"""
 STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
-Columns = Mapping[str, Iterable[Any]]
-
-
-def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bool = True) -> str:
-    """A table of text, as any program writes it."""
-    names, *cells = rows(columns)
-    written = [[str(cell).replace(".", decimal) for cell in row] for row in cells]
-    return "".join(separator.join(row) + "\n" for row in [*([names] if header else []), *written])
-
-
-def rows(columns: Columns) -> list[list[Any]]:
-    cells = zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
-    return [list(columns), *map(list, cells)]
 
 
 def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
@@ -210,12 +198,12 @@ READ: dict[str, tuple[Any, ...]] = {
     "MATLAB's structure": (lambda case: {"result": case.table()}, "a.mat"),
     "MATLAB's row of loads": (lambda case: {"load": case.loads, "more": "a note"}, "a.mat"),
     "workbook with a title": (lambda case: [
-        [["Run 7"], [], *rows(case.table("x\xa0[m] y\xa0[m] load\xa0[N]"))]], "a.xlsx"),
+        [["Run 7"], [], *cells(case.table("x\xa0[m] y\xa0[m] load\xa0[N]"))]], "a.xlsx"),
     "workbook of text": (lambda case: [
-        [[str(cell).replace(".", ",") for cell in row] for row in rows(case.table())]], "a.xlsx"),
-    "workbook's second sheet": (lambda case: [[["notes"]], rows(case.table())], "a.xlsx"),
+        [[str(cell).replace(".", ",") for cell in row] for row in cells(case.table())]], "a.xlsx"),
+    "workbook's second sheet": (lambda case: [[["notes"]], cells(case.table())], "a.xlsx"),
     "workbook's sheet of loads": (
-        lambda case: [[["x", "y"], [0.0, 1.0]], rows(case.table())], "a.xlsx"),
+        lambda case: [[["x", "y"], [0.0, 1.0]], cells(case.table())], "a.xlsx"),
     "index from 0": (shuffled,),
     "numbers of nodes": (lambda case: lines(shuffled(case, 1, "Node"), "\t"),),
     "a permutation of any name": (lambda case: shuffled(case, 1, "Element Nr."),),
@@ -385,7 +373,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: {"res": case.table(), "other": case.table()}, "a.mat",
         "a.mat: found res, other, expected vectors by name, or only one matrix or structure\n"),
     "the wrong sheet": (
-        lambda case: [[["load", "E"], [3.0, 70e9]], rows(case.table())], "a.xlsx",
+        lambda case: [[["load", "E"], [3.0, 70e9]], cells(case.table())], "a.xlsx",
         'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
     "sheets without loads": (
         lambda _: [[["x", "y"], [0.0, 0.0]], [["y"], [0.0]]], "a.xlsx",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import scene_text, write_loads
+from scene_files import lines, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -50,9 +50,9 @@ def refused(
     path = written(folder, content)
     with pytest.raises(cr.ConvexroughError) as caught:
         read_loads(path, small(), **options)
-    lines = str(caught.value).splitlines()
-    assert all(line.startswith(f"{path}: ") for line in lines)
-    return [line.removeprefix(f"{path}: ") for line in lines]
+    said = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in said)
+    return [line.removeprefix(f"{path}: ") for line in said]
 
 
 # As people have them
@@ -109,8 +109,7 @@ def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
 )
 def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: str) -> None:
     """The loads decide; a user sees what her code calls what."""
-    lines = "".join(f"{it},{word}\n" for it, word in zip(LOADS, words, strict=True))
-    found = read_loads(written(tmp_path, "load,status\n" + lines), small())
+    found = read_loads(written(tmp_path, lines({"load": LOADS, "status": list(words)})), small())
     assert said in found.note
     assert any(said in line for line in found.explained)
     assert ("not compared" in found.note) == bool(said)
@@ -129,8 +128,7 @@ def test_heights_and_radii_of_another_scene_are_told(
     tmp_path: Path, column: str, cells: Sequence[float], same: bool
 ) -> None:
     """A unit is not converted here: such a column is not compared."""
-    lines = "".join(f"{it},{cell}\n" for it, cell in zip(LOADS, cells, strict=True))
-    found = read_loads(written(tmp_path, f"load,{column}\n{lines}"), small())
+    found = read_loads(written(tmp_path, lines({"load": LOADS, column: cells})), small())
     said = f"column {column.lower()} differs from the scene's: loads of another scene?"
     assert (said in found.note) == (not same)
 
@@ -293,8 +291,8 @@ def test_an_endless_line_is_refused(tmp_path: Path, unit: bytes) -> None:
 def test_summits(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
-    lines = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
-    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + lines.encode())
+    content = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
+    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + content.encode())
     # The path is relative to the scene file, wherever the command runs.
     (tmp_path / "scene.toml").write_text(scene_text('pattern = "file"\npath = "data/summits.csv"'))
     asperities = read_scene(tmp_path / "scene.toml").scene.asperities
@@ -345,10 +343,7 @@ def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
     book = pytest.importorskip("openpyxl").Workbook()
     book.active.append(["notes"])
     page = book.create_sheet("Run 2")
-    for row in [
-        ("x", "y", "load"),
-        *((*place, load) for place, load in zip(PLACES, LOADS, strict=True)),
-    ]:
+    for row in (["x", "y", "load"], *np.column_stack((PLACES, LOADS)).tolist()):
         page.append(row)
     book.save(tmp_path / "loads.xlsx")
     note = read_loads(tmp_path / "loads.xlsx", small()).note

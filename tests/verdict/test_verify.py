@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import fits, texts
-from scene_files import FRICTION, WITHIN, rows, scene_text, write_loads
+from scene_files import FRICTION, WITHIN, lines, rows, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
@@ -40,14 +40,14 @@ def claim(contact: cr.Contact, changes: dict[int, float] | None = None, factor: 
 def test_what_is_right(command: Any, contact: cr.Contact, scene: str) -> None:
     outcome = command("verify", scene, claim(contact), "--within", "1e-10")
     assert (outcome.status, outcome.err) == (0, "")
-    lines = [line for line in outcome.out.splitlines() if line]
-    assert " ".join(line[:18].strip() for line in lines[1:8]) == (
+    said = [line for line in outcome.out.splitlines() if line]
+    assert " ".join(line[:18].strip() for line in said[1:8]) == (
         "geometry contact modulus result wrong statuses undecided load error total load"
     )
-    assert re.search(r" proved; loads correct to within \S+e-1\d of the largest load$", lines[3])
-    assert [line[18:] for line in lines[4:6]] == ["none"] * 2
-    assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", lines[6][18:])
-    assert lines[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
+    assert re.search(r" proved; loads correct to within \S+e-1\d of the largest load$", said[3])
+    assert [line[18:] for line in said[4:6]] == ["none"] * 2
+    assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", said[6][18:])
+    assert said[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
 
 
 def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
@@ -55,8 +55,8 @@ def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
     outcome = command("verify", "a.toml", loads)
     assert outcome.status == 3
     assert "warning: not certified: wrong statuses (2)" in outcome.err
-    lines = [line.split() for line in outcome.out.splitlines()]
-    heads = [" ".join(line) for line in lines]
+    words = [line.split() for line in outcome.out.splitlines()]
+    heads = [" ".join(line) for line in words]
     places = [
         next(i for i, line in enumerate(heads) if line.startswith(each))
         for each in ("result contact set wrong", "wrong statuses 2",
@@ -66,12 +66,12 @@ def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
     ]  # fmt: skip
     assert places == sorted(places)
     x, y = contact.scene.asperities.positions[36]
-    row = lines[places[2] + 2]
+    row = words[places[2] + 2]
     assert row[:5] == ["36", f"{x:.6g}", f"{y:.6g}", "0", f"{contact.loads[36]:.6g}"]
     assert float(row[5]) >= contact.loads[36]
     assert row[6] == "contact"
-    assert (lines[places[3] + 2][0], lines[places[3] + 2][-1]) == ("50", "open")
-    assert [line[0] for line in lines[places[7] + 2 :][:2]] == ["36", "50"]
+    assert (words[places[3] + 2][0], words[places[3] + 2][-1]) == ("50", "open")
+    assert [line[0] for line in words[places[7] + 2 :][:2]] == ["36", "50"]
 
 
 def test_json_and_files(command: Any, contact: cr.Contact, tmp_path: Path) -> None:
@@ -151,11 +151,7 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
         wrong = said.copy()
         wrong[asperity] = word
         for statuses, status in ((said, 0), (wrong, 2)):
-            lines = [
-                f"{load!r},{each}"
-                for load, each in zip(contact.loads.tolist(), statuses, strict=True)
-            ]
-            Path("loads.csv").write_text("\n".join([f"load,{column}", *lines]))
+            Path("loads.csv").write_text(lines({"load": contact.loads, column: statuses}))
             outcome = command("verify", "a.toml", "loads.csv")
             assert outcome.status == status
             place = f"row {1 + shown[asperity]}, column {column.lower()}"
@@ -163,8 +159,8 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
             assert (told in outcome.err) == (status == 2), outcome.err
 
 
-def shear_file(forces: Any) -> str:
-    Path("forces.csv").write_text("\n".join(["force", *map(repr, np.asarray(forces).tolist())]))
+def shear_file(forces: Any, **more: Any) -> str:
+    Path("forces.csv").write_text(lines({"force": forces} | more))
     return "forces.csv"
 
 
@@ -175,23 +171,17 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     outcome = command(*asked, shear_file(state.forces))
     assert (outcome.status, outcome.err) == (0, "")
     assert "shear forces      statuses proved; shear forces correct to within " in outcome.out
-    for asperity, word in ((0, "open"), (60, "sliding")):
-        wrong = np.array(state.status)
-        wrong[asperity] = word
-        lines = [f"{Q!r},{each}" for Q, each in zip(state.forces.tolist(), wrong, strict=True)]
-        Path("forces.csv").write_text("\n".join(["force,status", *lines]))
-        refused = command(*asked, "forces.csv")
-        assert refused.status == 2
-        assert f'column status: found "{word}" at asperity {asperity}, which is' in refused.err
-    words = [f"{Q!r},{each}" for Q, each in zip(state.forces.tolist(), state.status, strict=True)]
-    for header, cells, expected in (
-        ("state", words, "column state: found statuses, expected them in a column called st"),
-        ("slip", [f"{Q!r},0" for Q in state.forces.tolist()], "column slip: found flags, expected"),
+    opened, slid = np.array(state.status), np.array(state.status)
+    opened[0], slid[60] = "open", "sliding"
+    for column, values, expected in (
+        ("status", opened, 'found "open" at asperity 0, which is'),
+        ("status", slid, 'found "sliding" at asperity 60, which is'),
+        ("state", state.status, "found statuses, expected them in a column called st"),
+        ("slip", np.zeros(61, int), "found flags, expected"),
     ):
-        Path("forces.csv").write_text("\n".join([f"force,{header}", *cells]))
-        refused = command(*asked, "forces.csv")
+        refused = command(*asked, shear_file(state.forces, **{column: values}))
         assert refused.status == 2
-        assert expected in refused.err
+        assert f"column {column}: {expected}" in refused.err
     rounded = command(*asked, shear_file(0.998 * state.forces))
     assert "below f P, but not within 0.01 %: without a column status" in rounded.err
     for factor, said in ((-1, "have the other sign than"), (-1e3, "total and are 10^3"),
