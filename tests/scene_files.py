@@ -19,15 +19,14 @@ geometry = "summit"
 """
 WITHIN = f"{HEXAGONAL}within = 0.0102\n"
 FRICTION = "[friction]\ncoefficient = 0.5\n"
-ONE_BODY = "contact_modulus = 1.0\npoisson_ratio = 0.3\n"
+ONE_BODY = "contact_modulus = 1.0\npoisson_ratio = 0.3"
 TWO_BODIES = """[material.sphere]
 youngs_modulus = 210e3
 poisson_ratio = 0.3
 hardness = 8e3
 [material.base]
 youngs_modulus = 70e3
-poisson_ratio = 0.33
-"""
+poisson_ratio = 0.33"""
 
 
 def scene_text(

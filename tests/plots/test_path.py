@@ -13,8 +13,7 @@ from convexrough import plots
 from convexrough.plots.asperity_map import LOOKS
 
 P = LARGEST["paper"]
-UNITS = ("µm", "mN")
-NAMED = replace(PAPER, units=UNITS)
+NAMED = replace(PAPER, units=("µm", "mN"))
 
 
 def test_the_path_and_its_memory_are_drawn() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough
 
@@ -18,22 +17,20 @@ from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import SLIDING
 from convexrough.sphere.smooth import smooth
 
-UNITS = ("µm", "mN")
+SCENES = {
+    "paper": paper(),
+    "rough": rough(),
+    "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
+    "nothing": paper(),
+}
 
 
-def pressed(name: str) -> cr.Contact:
-    scenes = {
-        "paper": paper(),
-        "rough": rough(),
-        "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
-        "nothing": paper(),
-    }
-    bare, *units = name.split(" in ")
-    scene = dataclasses.replace(scenes[bare], friction=0.5, units=UNITS if units else ("", ""))
+@cache
+def contact(name: str) -> cr.Contact:
+    bare, *named = name.split(" in ")
+    units = ("µm", "mN") if named else ("", "")
+    scene = dataclasses.replace(SCENES[bare], friction=0.5, units=units)
     return cr.press(scene, approach=-1e-6 if bare == "nothing" else PAPER_APPROACH)
-
-
-contact = cache(pressed)
 
 
 def limit(name: str) -> float:
@@ -44,21 +41,8 @@ def states(name: str, shares: list[float]) -> list[cr.ShearState]:
     return [cr.shear(contact(name), force=share * limit(name)) for share in shares]
 
 
-def steady(name: str, maximum: Any, minimum: Any = None) -> list[cr.Cycle]:
-    lower = None if minimum is None else np.multiply(minimum, limit(name))
-    return cr.cycles(contact(name), np.multiply(maximum, limit(name)), lower)
-
-
 def past(name: str, shares: Any) -> cr.LoadPath:
     return cr.history(contact(name), forces=np.multiply(shares, limit(name)))
-
-
-@cache
-def of_paper(name: str) -> dict[str, Figure]:
-    return paper_figures(contact(f"{name} in units"))
-
-
-# --- nothing collides -----------------------------------------------------------------------------
 
 
 @pytest.mark.sample(1)
@@ -71,19 +55,16 @@ def test_fit_to_print(name: str, shares: list[float]) -> None:
     name = f"{name} in units"
     fits(plots.shear_figures(states(name, shares))["stick_slip"])
     fits(plots.path_figures(past(name, shares))["history"])
-    many = steady(name, np.abs(shares), np.minimum(shares, -np.abs(shares) / 9))
-    for figure in plots.cycle_figures(many).values():
+    ends = limit(name) * np.array([np.abs(shares), np.minimum(shares, -np.abs(shares) / 9)])
+    for figure in plots.cycle_figures(cr.cycles(contact(name), *ends)).values():
         fits(figure)
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["one", "paper"])
 def test_figures_of_the_paper_fit_to_print(name: str) -> None:
-    for figure in of_paper(name).values():
+    for figure in paper_figures(contact(f"{name} in units")).values():
         fits(figure)
-
-
-# --- stick-slip map -------------------------------------------------------------------------------
 
 
 def test_discs_have_the_radii_of_the_state() -> None:
@@ -116,12 +97,6 @@ def test_doubt_is_marked(scope: str, count: int) -> None:
     fits(plots.shear_figures([state] * 3)["stick_slip"])
 
 
-# --- cycles ---------------------------------------------------------------------------------------
-
-
-# --- histories ------------------------------------------------------------------------------------
-
-
 def test_the_path_passes_through_every_step() -> None:
     done = past("paper", [0.6, -0.2, 0.3, -0.6, 0.6])
     path, cost = plots.path_figures(done)["history"].axes
@@ -136,12 +111,6 @@ def test_the_path_passes_through_every_step() -> None:
     assert all(np.abs(curve - end).sum(axis=1).min() < 1e-9 for end in ends)
     numbers = {text.get_text() for text in path.texts}
     assert numbers == {"1, 5", "2", "3", "4"}  # the loop closes on its first point
-
-
-# --- the paper's figures --------------------------------------------------------------------------
-
-
-# --- nothing touches ------------------------------------------------------------------------------
 
 
 def test_no_contact_is_said() -> None:

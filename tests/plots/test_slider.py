@@ -13,9 +13,8 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 import convexrough as cr
 from convexrough.paper import example
-from convexrough.plots import slider
 from convexrough.run.results import slider_page
-from convexrough.run.stages.normal import NormalResult, NormalStage
+from convexrough.run.stages.normal import NormalStage
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
@@ -24,49 +23,25 @@ in_browser = pytest.mark.skipif(
 )
 
 
-def pressed(scene: cr.Scene, approach: float = example.APPROACH) -> cr.Contact:
-    return cr.press(scene, approach=approach)
-
-
-def page_of(contact: cr.Contact) -> str:
-    return slider_page(pressed_result(contact))
-
-
-def pressed_result(contact: cr.Contact) -> NormalResult:
-    return NormalStage(approach=contact.approach).compute(contact)
-
-
-def said(contact: cr.Contact) -> list[str]:
-    """What a run says of the contact."""
-    return pressed_result(contact).lines()
-
-
-def inside(text: str) -> Any:
-    """The data that a page carries."""
-    (found,) = re.findall(r'id="data">(.*?)</script>', text, re.S)
-    return json.loads(found)
-
-
-def data_of(contact: cr.Contact) -> Any:
-    return slider.slider_data(slider.Slides.of(contact), said(contact))
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return cr.press(example.scene(), approach=example.APPROACH)
 
 
 @pytest.fixture(scope="module")
-def contact() -> cr.Contact:
-    return pressed(example.scene())
+def page(contact: cr.Contact) -> str:
+    return slider_page(NormalStage(approach=contact.approach).compute(contact))
 
 
-# What is in the file.
+def test_the_file_needs_nothing_else_and_is_small(page: str) -> None:
+    assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", page)
+    assert len(page.encode()) < 200_000  # of 1 MB
 
 
-def test_the_file_needs_nothing_else_and_is_small(contact: cr.Contact) -> None:
-    text = page_of(contact)
-    assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", text)
-    assert len(text.encode()) < 200_000  # of 1 MB
-
-
-def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
-    data, limit = data_of(contact), 0.5 * contact.load
+def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> None:
+    """In the data that the page carries."""
+    (found,) = re.findall(r'id="data">(.*?)</script>', page, re.S)
+    data, limit = json.loads(found), 0.5 * contact.load
     states, discs = data["states"], data["discs"]
     assert states["fraction"] == [round(k / 100, 2) for k in range(101)]
     a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
@@ -91,12 +66,6 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
 
 
-# What the command line writes.
-
-
-# In a browser.
-
-
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     with sync_playwright() as player:
@@ -108,8 +77,8 @@ def browser() -> Iterator[Browser]:
 class Opened:
     """A page in the browser, which must ask for nothing and complain of nothing."""
 
-    def __init__(self, browser: Browser, file: Path, **options: Any) -> None:
-        self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
+    def __init__(self, browser: Browser, file: Path) -> None:
+        self.context = browser.new_context(viewport={"width": 1400, "height": 900})
         self.context.set_default_timeout(5000)
         self.page: Page = self.context.new_page()
         self.asked: list[str] = []
@@ -138,18 +107,15 @@ class Opened:
 
 
 @pytest.fixture
-def opened(browser: Browser, contact: cr.Contact, tmp_path: Path) -> Iterator[Opened]:
-    (tmp_path / "slider.html").write_text(page_of(contact), encoding="utf-8")
+def opened(browser: Browser, page: str, tmp_path: Path) -> Iterator[Opened]:
+    """The page, which follows asperity 36."""
+    (tmp_path / "slider.html").write_text(page, encoding="utf-8")
     shown = Opened(browser, tmp_path / "slider.html")
-    follow(shown, 36)
+    options = shown.page.locator("#follow option").all_inner_texts()
+    (label,) = [option for option in options if option.startswith("36:")]
+    shown.page.locator("#follow").select_option(label=label)
     yield shown
     shown.close()
-
-
-def follow(shown: Opened, index: int) -> None:
-    options = shown.page.locator("#follow option").all_inner_texts()
-    (label,) = [option for option in options if option.startswith(f"{index}:")]
-    shown.page.locator("#follow").select_option(label=label)
 
 
 def near(values: Any) -> Any:

@@ -114,33 +114,24 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     """Every asperity touches; on a flat base that is meant. Corners of a square may be open."""
-    inner = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     wide, few = (
         cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
         for within in (0.0102, 0.0045)
     )
-    material = cr.Material(1.0, 0.3)
-    for base, approach, told in (
-        (1.0, 9e-5, "100% of the asperities at the rim of the array touch: those that are"),
-        (1.0, 5e-5, ""),
-        (np.inf, 1e-6, ""),
-        (1.0, -1e-6, "no asperity carries a load: check the sign and the unit of the approach"),
+    sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
+    square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
+    for array, base, control, told in (
+        (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch: th"),
+        (wide, 1.0, {"approach": 5e-5}, ""),
+        (wide, np.inf, {"approach": 1e-6}, ""),
+        (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and the unit"),
+        (few, 1.0, {"approach": 1e-5}, ""),
+        (few, 1.0, {"approach": 1.5e-5}, "100% of the asperities at the rim"),
+        (square, 1.0, {"approach": 7e-5}, "75% of the asperities at the rim"),
+        (corner, 1.0, {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),
+        (corner, (1.0, np.inf), {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),
+        (corner, np.inf, {"load": 3.6e-7}, ""),
     ):
-        contact = cr.press(cr.Scene(base, wide, material), approach=approach)
-        assert (
-            any(each.startswith(told) for each in contact.warnings)
-            if told
-            else (not contact.warnings)
-        )
-    for approach, touching in ((1e-5, 7), (1.5e-5, 13)):
-        contact = cr.press(cr.Scene(1.0, few, material), approach=approach)
-        assert np.count_nonzero(contact.loads) == touching
-        said = any("100% of the asperities at the rim" in each for each in contact.warnings)
-        assert said == (touching == len(few))
-    contact = cr.press(cr.Scene(1.0, cr.Asperities(inner, 0.02), material), approach=7e-5)
-    assert contact.loads[np.argmax(inner @ [1, 1])] == 0
-    assert any("75% of the asperities at the rim" in each for each in contact.warnings)
-    corner = cr.Asperities(wide.positions + 0.0102, wide.tip_radii)
-    for base, outside in ((1.0, True), ((1.0, np.inf), True), (np.inf, False)):
-        warnings = cr.press(cr.Scene(base, corner, material), load=3.6e-7).warnings
-        assert any("axis of the sphere, at x = 0 and y = 0" in each for each in warnings) == outside
+        contact = cr.press(cr.Scene(base, array, cr.Material(1.0, 0.3)), **control)
+        assert bool(contact.warnings) == bool(told)
+        assert told in " ".join(contact.warnings)
