@@ -78,6 +78,10 @@ class Outcome(NamedTuple):
     out: str
     err: str
 
+    def refuses(self, reason: str) -> bool:
+        """Exit status 2, and nothing but messages, this one among them."""
+        return (self.status, self.out) == (2, "") and reason in self.err
+
 
 @pytest.fixture
 def command(

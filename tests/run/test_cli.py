@@ -15,9 +15,7 @@ from convexrough.run.scene_file import read_scene
 
 def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("precious")
-    outcome = command("new", "mine.toml")
-    assert outcome.status == 2
-    assert "mine.toml: exists already; name another" in outcome.err
+    assert command("new", "mine.toml").refuses("mine.toml: exists already; name another")
     assert (tmp_path / "mine.toml").read_text() == "precious"
     assert command("new", "no/such/folder.toml").status == 2
 
@@ -182,9 +180,7 @@ def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
     found = cr.open_sweep(tmp_path / "a-sweep").read()["load"]
     (tmp_path / "one.toml").write_text(scene_text())
     assert found[1] == read_scene(tmp_path / "one.toml").press().load
-    refused = command("run", "a.toml", "--html")
-    assert refused.status == 2
-    assert "of one scene, not of a sweep" in refused.err
+    assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
     assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
 
 

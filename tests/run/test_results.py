@@ -24,16 +24,18 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     assert {"history.csv", "scene.toml", "files.json"} < named(folder)
     (folder / "notes.txt").write_text("mine")
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    refused = command("run", "b.toml", "--out", "out", "--no-figures")
-    assert (refused.status, "out: not empty; --force replaces" in refused.err) == (2, True)
+    assert command("run", "b.toml", "--out", "out", "--no-figures").refuses(
+        "out: not empty; --force replaces"
+    )
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
     for inputs in (
         ("run", "a.toml"),
         ("export", "a.toml"),
         ("verify", "a.toml", "out/asperities.csv"),
     ):
-        refused = command(*inputs, "--out", "out" if "verify" in inputs else ".", "--force")
-        assert (refused.status, "an input; name another folder" in refused.err) == (2, True)
+        assert command(*inputs, "--out", "out" if "verify" in inputs else ".", "--force").refuses(
+            "an input; name another folder"
+        )
     ran = command("run", "b.toml", "--out", "out", "--no-figures", "--force")
     expected = {"summary.json", "asperities.csv", "scene.toml", "files.json", "notes.txt"}
     assert (ran.status, named(folder)) == (0, expected)
