@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -28,10 +29,9 @@ SCENE = """
 radius = 0.01
 [material]
 {modulus}
-poisson_ratio = 0.3
 [asperities]
 pattern = "file"
-path = "{summits}"
+path = "summits.csv"
 geometry = "closest"
 tip_radius = 2e-4
 [normal]
@@ -70,10 +70,21 @@ def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
 
 
 class Case(NamedTuple):
-    """A scene, what it was solved for, and its table of x, y and load in a shuffled order."""
+    """A scene, its solution, a shuffled order, and a folder with its files."""
 
     contact: cr.Contact
     order: Any
+    folder: Path
+    command: Any
+
+    def verify(self, made: Any, *options: str, name: str = "loads.csv") -> Any:
+        return self.command("verify", "scene.toml", put(self.folder, made, name), *options)
+
+    def read(self, columns: Any = None) -> cr.SceneFile:
+        """The scene, with another table of summits if one is given."""
+        if columns is not None:
+            put(self.folder, columns, "summits.csv")
+        return cr.read_scene(self.folder / "scene.toml")
 
     @property
     def loads(self) -> Any:
@@ -97,21 +108,18 @@ class Case(NamedTuple):
 
 
 @pytest.fixture
-def case(tmp_path: Path) -> Case:
+def case(tmp_path: Path, command: Any) -> Case:
     """In scene.toml, in metres and newtons, with its summits in summits.csv."""
-    write_scene(tmp_path)
-    (tmp_path / "summits.csv").write_text(lines(SUMMITS))
-    file = cr.read_scene(tmp_path / "scene.toml")
-    contact = cr.press(file.scene, approach=file.approach)
+    write_scene()
+    put(tmp_path, SUMMITS, "summits.csv")
+    contact = cr.read_scene("scene.toml").press()
     assert 3 < (contact.loads > 0).sum() < COUNT - 3
-    return Case(contact, np.random.default_rng(1).permutation(COUNT))
+    return Case(contact, np.random.default_rng(1).permutation(COUNT), tmp_path, command)
 
 
-def write_scene(
-    folder: Path, modulus: str = STEEL, units: str = METRES, summits: str = "summits.csv"
-) -> None:
-    text = SCENE.format(modulus=modulus, units=units, summits=summits)
-    (folder / "scene.toml").write_text(text)
+def write_scene(modulus: str = STEEL, units: str = METRES) -> None:
+    ratio = "" if modulus is BODIES else "\npoisson_ratio = 0.3"
+    Path("scene.toml").write_text(SCENE.format(modulus=modulus + ratio, units=units))
 
 
 def matrix(columns: Columns) -> Any:
@@ -426,11 +434,10 @@ SEVERAL = ("x in mm", "x in µm", "rounded places of loaded nodes", "a row twice
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("name", READ)
-def test_read_right(tmp_path: Path, command: Any, case: Case, name: str) -> None:
+def test_read_right(case: Case, name: str) -> None:
     make, *where = READ[name]
     file, options = (*where, *["loads.csv", ""][len(where) :])
-    claimed = put(tmp_path, make(case), file)
-    outcome = command("verify", "scene.toml", claimed, "--json", *options.split())
+    outcome = case.verify(make(case), "--json", *options.split(), name=file)
     assert (outcome.status, outcome.err) == (0, "")
     found = [row["load"] for row in json.loads(outcome.out)["asperities"]]
     np.testing.assert_allclose(found, case.loads, rtol=1e-13)
@@ -438,10 +445,10 @@ def test_read_right(tmp_path: Path, command: Any, case: Case, name: str) -> None
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("name", REFUSED)
-def test_refused_with_the_cause(tmp_path: Path, command: Any, case: Case, name: str) -> None:
+def test_refused_with_the_cause(case: Case, name: str) -> None:
     make, read, *causes = REFUSED[name]
     file, *options = (read or "loads.csv").split()
-    outcome = command("verify", "scene.toml", put(tmp_path, make(case), file), *options)
+    outcome = case.verify(make(case), *options, name=file)
     assert (outcome.status, outcome.out) == (2, "")
     assert all(cause in outcome.err for cause in causes), outcome.err
     assert len(outcome.err.splitlines()) <= (11 if name in SEVERAL else 1)
@@ -482,11 +489,11 @@ def followed_by(total: Any) -> dict[str, Any]:
     return {name: np.round([*each, total(each)], 12) for name, each in SUMMITS.items()}
 
 
-def test_units_of_a_pressure(tmp_path: Path, command: Any, case: Case) -> None:
+def test_units_of_a_pressure(case: Case) -> None:
     pixels = case.pixels("x y pressure\xa0[MPa]")
     pixels["pressure\xa0[MPa]"] = 1e-6 * pixels["pressure\xa0[MPa]"]
-    write_scene(tmp_path, units=CONVERT)
-    assert command("verify", "scene.toml", put(tmp_path, pixels)).status == 0
+    write_scene(units=CONVERT)
+    assert case.verify(pixels).status == 0
 
 
 @pytest.mark.parametrize(
@@ -498,22 +505,21 @@ def test_units_of_a_pressure(tmp_path: Path, command: Any, case: Case) -> None:
     ],
 )  # fmt: skip
 def test_advice_where_headers_name_units(
-    tmp_path: Path, command: Any, case: Case, factors: tuple[float, float], said: str
+    case: Case, factors: tuple[float, float], said: str
 ) -> None:
-    write_scene(tmp_path, units=CONVERT)
+    write_scene(units=CONVERT)
     x, y = (PLACES[case.order] * factors).T
-    made = put(tmp_path, {"x [mm]": x, "y [mm]": y, "load": case.loads[case.order]})
-    assert command("verify", "scene.toml", made).refuses(said)
+    columns = {"x [mm]": x, "y [mm]": y, "load": case.loads[case.order]}
+    assert case.verify(columns).refuses(said)
     if "--scale" in said:
-        assert command("verify", "scene.toml", made, *said.split()[-2:]).status == 0
+        assert case.verify(columns, *said.split()[-2:]).status == 0
 
 
-def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None:
-    (tmp_path / "summits.csv").write_text(lines(UM | NM, ";", ","))
-    write_scene(tmp_path, units=CONVERT)
-    scene = cr.read_scene(tmp_path / "scene.toml").scene
-    np.testing.assert_allclose(scene.asperities.positions, PLACES, rtol=1e-15)
-    np.testing.assert_allclose(scene.asperities.heights, HEIGHTS, rtol=1e-15)
+def test_units_of_summits_convert_when_asked(case: Case) -> None:
+    write_scene(units=CONVERT)
+    asperities = case.read(german(UM | NM)).scene.asperities
+    np.testing.assert_allclose(asperities.positions, PLACES, rtol=1e-15)
+    np.testing.assert_allclose(asperities.heights, HEIGHTS, rtol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -533,24 +539,19 @@ def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None
         (followed_by(np.sum), METRES, "row 14: found the sums of the other rows, expected an"),
     ],
 )
-def test_wrong_columns_of_summits(
-    tmp_path: Path, case: Case, columns: Columns, units: str, said: str
-) -> None:
-    write_scene(tmp_path, units=units)
-    (tmp_path / "summits.csv").write_text(lines(columns))
+def test_wrong_columns_of_summits(case: Case, columns: Columns, units: str, said: str) -> None:
+    write_scene(units=units)
     with pytest.raises(cr.InputError) as refused:
-        cr.read_scene(tmp_path / "scene.toml")
+        case.read(columns)
     assert said in str(refused.value)
     assert ("convert = true" in str(refused.value)) == ("the scene's unit;" in said)
 
 
 @pytest.mark.parametrize("named", ["", 'height = "z"', 'z = "height"'])
-def test_summits_by_other_names(tmp_path: Path, case: Case, named: str) -> None:
-    (tmp_path / "summits.csv").write_text(lines(XY | {"z": HEIGHTS}))
-    scene = (tmp_path / "scene.toml").read_text()
-    named_scene = scene.replace('path = "', f'columns = {{ {named} }}\npath = "')
-    (tmp_path / "scene.toml").write_text(named_scene)
-    heights = cr.read_scene(tmp_path / "scene.toml").scene.asperities.heights
+def test_summits_by_other_names(case: Case, named: str) -> None:
+    path = case.folder / "scene.toml"
+    path.write_text(path.read_text().replace("path =", f"columns = {{ {named} }}\npath ="))
+    heights = case.read(XY | {"z": HEIGHTS}).scene.asperities.heights
     np.testing.assert_array_equal(heights, HEIGHTS)
 
 
@@ -572,23 +573,16 @@ def test_summits_by_other_names(tmp_path: Path, case: Case, named: str) -> None:
         ("E = 210e9", METRES, 'E: unknown key, did you mean "youngs_modulus"?'),
     ],
 )
-def test_units_of_scenes(
-    tmp_path: Path, command: Any, case: Case, modulus: str, units: str, said: str
-) -> None:
-    write_scene(tmp_path, modulus, units)
-    if modulus is BODIES:
-        path = tmp_path / "scene.toml"
-        path.write_text(path.read_text().replace("poisson_ratio = 0.3\n[asp", "[asp"))
-    assert command("run", "scene.toml", "--no-figures").refuses(said)
+def test_units_of_scenes(case: Case, modulus: str, units: str, said: str) -> None:
+    write_scene(modulus, units)
+    assert case.command("run", "scene.toml", "--no-figures").refuses(said)
 
 
-def test_the_modulus_is_said(tmp_path: Path, command: Any, case: Case) -> None:
-    units = 'length = "um"\npressure = "GPa"'
-    write_scene(tmp_path, "youngs_modulus = 210", units)
-    outcome = command("run", "scene.toml", "--no-figures")
+def test_the_modulus_is_said(case: Case) -> None:
+    write_scene("youngs_modulus = 210", 'length = "um"\npressure = "GPa"')
+    outcome = case.command("run", "scene.toml", "--no-figures")
     assert "contact modulus   115.3846154 mN/um²  (1.154e+11 Pa)" in outcome.out
     assert " mN/um²  (no hardness given: yield is not checked)" in outcome.out
-    assert "load" in outcome.out
     assert " mN\n" in outcome.out
 
 
@@ -602,19 +596,17 @@ def test_the_modulus_is_said(tmp_path: Path, command: Any, case: Case) -> None:
     ],
 )  # fmt: skip
 def test_what_is_unlikely_is_told(
-    tmp_path: Path, command: Any, case: Case, modulus: str, more: str, said: tuple[str, ...]
+    case: Case, modulus: str, more: str, said: tuple[str, ...]
 ) -> None:
-    write_scene(tmp_path, f"youngs_modulus = {modulus}", METRES + more)
-    outcome = command("run", "scene.toml", "--no-figures")
+    write_scene(f"youngs_modulus = {modulus}", METRES + more)
+    outcome = case.command("run", "scene.toml", "--no-figures")
     assert outcome.status == 0
     assert all(each in outcome.err for each in said)
 
 
-def test_an_unlikely_modulus_is_told_before_loads_are_blamed(
-    tmp_path: Path, command: Any, case: Case
-) -> None:
-    write_scene(tmp_path, "youngs_modulus = 210e3")
-    outcome = command("verify", "scene.toml", put(tmp_path, case.table()))
+def test_an_unlikely_modulus_is_told_before_loads_are_blamed(case: Case) -> None:
+    write_scene("youngs_modulus = 210e3")
+    outcome = case.verify(case.table())
     assert outcome.status == 3
     blamed = "10^6 times what they should be: another unit, as µN for N, or of the modulus?"
     assert 0 < outcome.err.index("softer than rubber") < outcome.err.index(blamed)
@@ -623,58 +615,50 @@ def test_an_unlikely_modulus_is_told_before_loads_are_blamed(
 # What else is read, and said
 
 
-def test_explain_reads_and_judges_nothing(tmp_path: Path, command: Any, case: Case) -> None:
-    name = put(tmp_path, german(case.table("x\xa0[m] y\xa0[m] P", gap=case.loads)))
-    outcome = command("verify", "scene.toml", name, "--explain", "--column", "load=P")
+def test_explain_reads_and_judges_nothing(case: Case) -> None:
+    table = german(case.table("x\xa0[m] y\xa0[m] P", gap=case.loads))
+    asked = ("--explain", "--column", "load=P")
+    outcome = case.verify(table, *asked)
     assert (outcome.status, outcome.err) == (0, "")
     for said in ("separated by semicolons, decimal comma", "x: column x in m", "load: column P",
                  "matched by position", "not looked at: gap", "closest"):  # fmt: skip
         assert said in outcome.out
     assert "certificate" not in outcome.out
-    shown = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
+    shown = case.verify(table, *asked, "--json")
     assert json.loads(shown.out)["read"] == outcome.out.removesuffix("\n").split("\n")
-    assert command("verify", "scene.toml", name, "--explain", "--junit", "found.xml").refuses(
-        "--explain checks nothing"
-    )
+    assert case.verify(table, *asked, "--junit", "a.xml").refuses("--explain checks nothing")
 
 
-def test_loads_beside_pressures(tmp_path: Path, command: Any, case: Case) -> None:
-    name = put(tmp_path, case.table(**{"pressure [Pa]": np.ones(COUNT)}))
-    outcome = command("verify", "scene.toml", name)
+def test_loads_beside_pressures(case: Case) -> None:
+    outcome = case.verify(case.table(**{"pressure [Pa]": np.ones(COUNT)}))
     assert (outcome.status, outcome.err) == (0, "")
     assert "loads.csv: separated by commas, column load, not pressure, matched" in outcome.out
 
 
-def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
-    from xml.etree import ElementTree
+def test_findings_as_junit(case: Case) -> None:
+    def suite(name: str) -> Any:
+        (found,) = ElementTree.parse(case.folder / name).getroot().iter("testsuite")
+        return found
 
     wrong = case.loads.copy()
     wrong[np.argmax(wrong)] = 0.0
-    name = put(tmp_path, {"load": wrong})
-    outcome = command("verify", "scene.toml", name, "--junit", "found.xml")
-    assert outcome.status == 3
-    (suite,) = ElementTree.parse(tmp_path / "found.xml").getroot().iter("testsuite")
-    cases = {each.get("name"): each for each in suite}
+    assert case.verify({"load": wrong}, "--junit", "a.xml").status == 3
+    cases = {each.get("name"): each for each in suite("a.xml")}
     assert list(cases) == ["loads: contact set", "loads: undecided", "loads: off", "loads: total"]
-    assert suite.get("failures") == str(sum(len(each) for each in cases.values()))
+    assert suite("a.xml").get("failures") == str(sum(len(each) for each in cases.values()))
     assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
-    assert command("verify", "scene.toml", name, "--junit", "found.xml").refuses(
-        "found.xml: exists already"
-    )
-    name = put(tmp_path, {"load": case.loads[1:]})
-    outcome = command("verify", "scene.toml", name, "--junit", "refused.xml")
-    (suite,) = ElementTree.parse(tmp_path / "refused.xml").getroot().iter("testsuite")
-    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "0", "1")
-    said = str(suite[0][0].text)
+    again = case.verify({"load": case.loads[1:]}, "--junit", "a.xml")
+    assert again.refuses("a.xml: exists already")
+    outcome = case.verify({"load": case.loads[1:]}, "--junit", "b.xml")
+    assert [suite("b.xml").get(each) for each in ("tests", "failures", "errors")] == [*"101"]
+    said = str(suite("b.xml")[0][0].text)
     assert f"rows: found {len(case.loads) - 1}" in said
     assert said in outcome.err
 
 
-def test_bytes_of_every_kind_end_in_a_reason(tmp_path: Path, command: Any, case: Case) -> None:
+def test_bytes_of_every_kind_end_in_a_reason(case: Case) -> None:
     held = io.BytesIO()
     savemat(held, {"load": case.loads})
     for name in ("a.mat", "a.xlsx", "a.csv.gz"):
         for content in (b"", b"\x00" * 200, held.getvalue()[:150], b"PK\x03\x04" + b"x" * 99):
-            assert command("verify", "scene.toml", put(tmp_path, content, name)).refuses(
-                f"{name}: "
-            )
+            assert case.verify(content, name=name).refuses(f"{name}: ")
