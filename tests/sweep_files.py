@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -62,6 +63,12 @@ def _toml(value: Any) -> str:
         pairs = (f"{json.dumps(key)} = {_toml(it)}" for key, it in value.items())
         return "{" + ", ".join(pairs) + "}"
     return json.dumps(value)
+
+
+def swept(contents: Any, **options: Any) -> cr.SweepTable:
+    """Computed in this process."""
+    with ThreadPoolExecutor(1) as here:
+        return cr.sweep(contents, executor=here, **options)
 
 
 def same(one: cr.SweepTable, other: cr.SweepTable) -> bool:

@@ -9,13 +9,12 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
 import psutil
 import pytest
-from sweep_files import reported_to, same, tables, toml
+from sweep_files import reported_to, same, swept, tables, toml
 
 import convexrough as cr
 from convexrough.sweeps.folder import open_folder
@@ -26,8 +25,7 @@ SCENES, PARTS = 64, 32
 
 @pytest.fixture(scope="module")
 def whole() -> cr.SweepTable:
-    with ThreadPoolExecutor(1) as here:
-        return cr.sweep(CONTENTS, executor=here)
+    return swept(CONTENTS)
 
 
 @pytest.fixture
@@ -47,8 +45,7 @@ def rows(folder: Path) -> int:
 
 
 def resumed(folder: Path) -> cr.SweepTable:
-    with ThreadPoolExecutor(1) as here:
-        return cr.sweep(folder / "a.toml", executor=here, out=folder / "a-sweep", resume=True)
+    return swept(folder / "a.toml", out=folder / "a-sweep", resume=True)
 
 
 def scripted(folder: Path, script: str, *arguments: str) -> subprocess.Popen[str]:
@@ -160,15 +157,14 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> Non
 #: A file that may not grow fails as one on a full disk does: in the middle of what is written.
 FULL = """
 import resource
-from concurrent.futures import ThreadPoolExecutor
 import convexrough as cr
-from sweep_files import reported_to
+from sweep_files import reported_to, swept
 def fill(news):
     if "of 64 scenes" in news:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
 try:
-    with reported_to(fill), ThreadPoolExecutor(1) as here:
-        cr.sweep("a.toml", executor=here, out="a-sweep")
+    with reported_to(fill):
+        swept("a.toml", out="a-sweep")
 except cr.FileError as error:
     print(error)
 """

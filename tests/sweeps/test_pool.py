@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sweep_files import Deadly, reported_to, same, sweeping, tables
+from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
 
 import convexrough as cr
 from convexrough.sweeps import plan
@@ -26,7 +26,7 @@ SPAWN = multiprocessing.get_context("spawn")
 
 MANY = tables(sweep={"seeds": 10, "measure": ["contact", "load"]})
 PLAN = plan_of(MANY, Path("sweep"))
-WHOLE = cr.sweep(MANY, executor=ThreadPoolExecutor(1))
+WHOLE = swept(MANY)
 
 
 class Shuffled(Executor):
@@ -60,8 +60,7 @@ def test_executors(executor: Any) -> None:
 @pytest.mark.parametrize("most", [1, 3, 7, 1000])
 def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "MOST_SCENES", most)
-    with ThreadPoolExecutor(1) as here:
-        assert same(cr.sweep(MANY, executor=here), WHOLE)
+    assert same(swept(MANY), WHOLE)
 
 
 def deadly(whole: Plan, worst: int) -> Plan:
@@ -79,7 +78,7 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
     assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
     with ThreadPoolExecutor(1) as here:
         table = run(whole, here, out=tmp_path / "a", resume=True).table
-        assert same(table, cr.sweep(contents, executor=here))
+    assert same(table, swept(contents))
 
 
 @pytest.mark.sample(0)
@@ -104,8 +103,8 @@ def test_threads_of_linear_algebra_do_not_matter() -> None:
     )  # fmt: skip
     found = []
     for threads in (1, 2):
-        with threadpool_limits(threads), ThreadPoolExecutor(1) as here:
-            found.append(cr.sweep(many, executor=here))
+        with threadpool_limits(threads):
+            found.append(swept(many))
     assert same(*found)
 
 
@@ -137,8 +136,7 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
     with dask(cluster.scheduler_address) as engine, reported_to(kill):
         table = run(plan, engine, out=tmp_path / "a").table
     assert killed
-    with ThreadPoolExecutor(1) as here:
-        assert same(table, cr.sweep(contents, executor=here))
+    assert same(table, swept(contents))
     assert set(table.read(["status"])["status"]) == {"certified"}
 
 
@@ -164,7 +162,6 @@ def test_sharing_changes_no_bit(influence: str, monkeypatch: pytest.MonkeyPatch)
     measured = {"seeds": 2, "measure": ["load", "approach", "load_error", "loss"]}
     over = {"over": {"asperities.height_std": [1e-7]}}
     contents = tables(solver={"influence": influence}, sweep=measured | over)
-    with ThreadPoolExecutor(1) as here:
-        shared = cr.sweep(contents, executor=here)
-        monkeypatch.setattr(plan, "MOST_SCENES", 1)
-        assert same(shared, cr.sweep(contents, executor=here))
+    shared = swept(contents)
+    monkeypatch.setattr(plan, "MOST_SCENES", 1)
+    assert same(shared, swept(contents))

@@ -2,30 +2,21 @@
 
 import logging
 import shutil
-from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scenes import MATERIAL
-from sweep_files import SMALL, numbers, same, sweeping, tables, toml
+from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
 
 
 @pytest.fixture(scope="module")
-def here() -> Iterator[Executor]:
-    """Computes in this process."""
-    with ThreadPoolExecutor(1) as executor:
-        yield executor
-
-
-@pytest.fixture(scope="module")
-def whole(here: Executor, tmp_path_factory: pytest.TempPathFactory) -> cr.SweepTable:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> cr.SweepTable:
     """The table of SMALL, in a folder that no test changes."""
-    return cr.sweep(SMALL, executor=here, out=tmp_path_factory.mktemp("whole") / "a")
+    return swept(SMALL, out=tmp_path_factory.mktemp("whole") / "a")
 
 
 @pytest.fixture
@@ -53,8 +44,8 @@ ALL = tables(
 )
 
 
-def test_rows_are_those_of_single_scenes(here: Executor) -> None:
-    table = cr.sweep(ALL, executor=here)
+def test_rows_are_those_of_single_scenes() -> None:
+    table = swept(ALL)
     rows = table.read()
     assert list(rows) == table.columns
     assert rows["scene"].tolist() == list(range(4))
@@ -98,11 +89,11 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
             assert rows[name][i] == value, name
 
 
-def test_scenes_made_in_python(here: Executor) -> None:
+def test_scenes_made_in_python() -> None:
     base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scenes = [cr.Scene(R, base, MATERIAL, 0.5, geometry="summit") for R in (0.9, 1.0, 1.1)]
     loads = [1e-7, 2e-7, 3e-7]
-    table = cr.sweep(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"], executor=here)
+    table = swept(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"])
     assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]
     assert numbers(table, "normal.load", "seed") == [loads, [-1, -1, -1]]
     for i, scene in enumerate(scenes):
@@ -112,11 +103,11 @@ def test_scenes_made_in_python(here: Executor) -> None:
         assert row == {"approach": contact.approach, "loss_0.3": loss}
 
 
-def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
+def test_a_scene_that_fails_has_a_row_that_says_why() -> None:
     both = sweeping(over={"normal.load": [1e-7, 1e-30, 3e-7]}, together={})
     both["asperities"] = {**both["asperities"], "tip_radius": [0.02] * 61}
     both["sweep"]["over"]["asperities.within"] = [0.0102, 0.0052]  # of 61 and of 19 asperities
-    table = cr.sweep(both, executor=here)
+    table = swept(both)
     status, message, contact = numbers(table, "status", "message", "contact")
     assert status == ["certified", "failed"] * 3
     assert "tip_radius: found shape (61,), expected 19 values" in message[1]
@@ -124,10 +115,10 @@ def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
     assert not np.isnan(contact[::2]).any()
 
 
-def test_what_is_not_proved_is_said(here: Executor) -> None:
+def test_what_is_not_proved_is_said() -> None:
     graze = sweeping(over={"normal.approach": [0.0, 5e-5]})
     graze["normal"] = {}
-    table = cr.sweep(graze, executor=here)
+    table = swept(graze)
     assert numbers(table, "status", "message") == [
         ["undecided", "certified"],
         [
@@ -155,32 +146,32 @@ def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
     assert sorted(rows["scene"].to_pylist()) == list(range(16))
 
 
-def test_a_part_of_a_sweep(here: Executor, whole: cr.SweepTable, tmp_path: Path) -> None:
+def test_a_part_of_a_sweep(whole: cr.SweepTable, tmp_path: Path) -> None:
     for k in (2, 3, 1):
-        table = cr.sweep(SMALL, executor=here, out=tmp_path / "a", part=(k, 3))
+        table = swept(SMALL, out=tmp_path / "a", part=(k, 3))
         assert table.complete == (k == 1)
     assert same(table, whole)
-    second = cr.sweep(SMALL, executor=here, part=(2, 3))
+    second = swept(SMALL, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
 
 
-def test_a_folder_of_another_sweep_is_refused(here: Executor, folder: Path) -> None:
+def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     before = sorted(path.name for path in (folder / "parts").iterdir())
     with pytest.raises(cr.FileError) as caught:
-        cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=folder, resume=True)
+        swept(tables(sweep={"seeds": 5}), out=folder, resume=True)
     said = str(caught.value)
     assert "holds another sweep, 16 scenes of sweep by version" in said
     assert "this is 20 scenes of sweep" in said
     with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; --resume"):
-        cr.sweep(SMALL, executor=here, out=folder)
+        swept(SMALL, out=folder)
     assert sorted(path.name for path in (folder / "parts").iterdir()) == before
     other = tables(sweep={"seeds": 1})
-    replaced = cr.sweep(other, executor=here, out=folder, overwrite=True)
-    assert same(replaced, cr.sweep(other, executor=here))
+    replaced = swept(other, out=folder, overwrite=True)
+    assert same(replaced, swept(other))
 
 
 def test_resuming_computes_what_is_missing_or_damaged_only(
-    here: Executor, whole: cr.SweepTable, folder: Path, caplog: pytest.LogCaptureFixture
+    whole: cr.SweepTable, folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     gone, broken, *kept = sorted((folder / "parts").iterdir())
     gone.unlink()
@@ -189,7 +180,7 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
     (folder / "parts/notes.txt").write_text("mine")
     times = {part: part.stat().st_mtime_ns for part in kept}
     with caplog.at_level(logging.INFO, "convexrough"):
-        again = cr.sweep(SMALL, executor=here, out=folder, resume=True)
+        again = swept(SMALL, out=folder, resume=True)
     said = [news for news in caplog.messages if "scenes" in news]
     removed = "1 damaged parts removed, 1 unfinished files removed"
     assert said[0] == f"found 14 scenes of an earlier run, {removed}"
