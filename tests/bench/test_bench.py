@@ -62,7 +62,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert (ran.status, ran.err) == (0, "")
     folder = tmp_path / "bench-results"
     assert {path.name for path in folder.iterdir()} == {
-        *("files.json", "bench.json", "rows.csv", "work-precision.png", "cost.png"),
+        *("files.json", "bench.json", "rows.csv", "work-precision.png", "cost.png")
     }
     assert len(rows(folder / "rows.csv")) == len(tiny().rows)
     summary = json.loads(ran.out)

@@ -69,12 +69,8 @@ def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
     problem.P, problem.G, problem.A = map(sparse.csc_matrix, (problem.P, problem.G, problem.A))
     settings = {"eps_abs": TOLERANCE, "eps_rel": TOLERANCE, "max_iter": 50_000, "polishing": True}
     for solver, given in (("clarabel", {}), ("osqp", settings)):
-        judged(
-            name,
-            about,
-            qpsolvers.solve_problem(problem, solver, **given).x,
-            about["load_error_estimate"],
-        )
+        found = qpsolvers.solve_problem(problem, solver, **given)
+        judged(name, about, found.x, about["load_error_estimate"])
 
 
 @pytest.mark.sample(3)
