@@ -1,11 +1,14 @@
 """Scene files and files of loads that several tests write, and tables that they read."""
 
 import csv
+import gzip
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from scipy.io import savemat
 
 import convexrough as cr
 
@@ -65,6 +68,31 @@ def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bo
     names, *below = cells(columns)
     written = [[str(cell).replace(".", decimal) for cell in row] for row in below]
     return "".join(separator.join(row) + "\n" for row in [*([names] if header else []), *written])
+
+
+def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
+    """Write columns, an array, sheets of rows, text, or bytes, as the name of the file says."""
+    path, kind = folder / name, name.rpartition(".")[2]
+    if isinstance(made, bytes):
+        path.write_bytes(made)
+    elif kind == "npy":
+        np.save(path, made)
+    elif kind == "npz":
+        np.savez(path, **made)
+    elif kind == "mat":
+        savemat(path, made)
+    elif kind == "xlsx":
+        book = pytest.importorskip("openpyxl").Workbook()
+        book.remove(book.active)
+        for sheet in made:
+            page = book.create_sheet()
+            for row in sheet:
+                page.append(row)
+        book.save(path)
+    else:
+        content = (made if isinstance(made, str) else lines(made)).encode()
+        path.write_bytes(gzip.compress(content) if kind == "gz" else content)
+    return name
 
 
 def write_loads(path: Path, scene: cr.Scene, loads: Any, order: Any) -> Path:

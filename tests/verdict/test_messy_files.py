@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from scene_files import Columns, cells, lines
+from scene_files import Columns, cells, lines, put
 from scipy.io import savemat
 
 import convexrough as cr
@@ -42,31 +42,6 @@ approach = 4e-7
 BODIES = """sphere = {youngs_modulus = 210e9, poisson_ratio = 0.3}
 base = {youngs_modulus = 70, poisson_ratio = 0.3}"""
 STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
-
-
-def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
-    """Write columns, an array, sheets of rows, text, or bytes, as the name of the file says."""
-    path, kind = folder / name, name.rpartition(".")[2]
-    if isinstance(made, bytes):
-        path.write_bytes(made)
-    elif kind == "npy":
-        np.save(path, made)
-    elif kind == "npz":
-        np.savez(path, **made)
-    elif kind == "mat":
-        savemat(path, made)
-    elif kind == "xlsx":
-        book = pytest.importorskip("openpyxl").Workbook()
-        book.remove(book.active)
-        for sheet in made:
-            page = book.create_sheet()
-            for row in sheet:
-                page.append(row)
-        book.save(path)
-    else:
-        content = (made if isinstance(made, str) else lines(made)).encode()
-        path.write_bytes(gzip.compress(content) if kind == "gz" else content)
-    return name
 
 
 class Case(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import lines, scene_text, write_loads
+from scene_files import cells, put, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -19,12 +19,16 @@ PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]
 
 
-def small() -> cr.Scene:
-    return cr.Scene(1.0, cr.Asperities(PLACES, 0.1), cr.Material(1.0, 0.3), geometry="summit")
+SMALL = cr.Scene(1.0, cr.Asperities(PLACES, 0.1), cr.Material(1.0, 0.3), geometry="summit")
 
 
-def read_loads(path: Path, scene: cr.Scene, **how: Any) -> Claimed:
+def read_loads(path: Path, scene: cr.Scene = SMALL, **how: Any) -> Claimed:
     return read_with(path, scene, Manner(**how))
+
+
+def read(folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMALL) -> Claimed:
+    """The loads of a file that holds this."""
+    return read_loads(folder / put(folder, made, name), scene)
 
 
 @pytest.fixture(scope="module")
@@ -37,19 +41,11 @@ def contact() -> cr.Contact:
     )
 
 
-def written(folder: Path, content: str | bytes, name: str = "loads.csv") -> Path:
-    path = folder / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
-
-
-def refused(
-    folder: Path, content: str | bytes, name: str = "loads.csv", **options: Any
-) -> list[str]:
+def refused(folder: Path, content: str | bytes) -> list[str]:
     """The lines of the message, without the path."""
-    path = written(folder, content)
+    path = folder / "loads.csv"
     with pytest.raises(cr.ConvexroughError) as caught:
-        read_loads(path, small(), **options)
+        read(folder, content)
     said = str(caught.value).splitlines()
     assert all(line.startswith(f"{path}: ") for line in said)
     return [line.removeprefix(f"{path}: ") for line in said]
@@ -95,7 +91,7 @@ FILES = {
 @pytest.mark.sample(10)
 @pytest.mark.parametrize("content", FILES.values(), ids=FILES)
 def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
-    assert read_loads(written(tmp_path, content), small()).values.tolist() == LOADS
+    assert read(tmp_path, content).values.tolist() == LOADS
 
 
 @pytest.mark.parametrize(
@@ -109,14 +105,14 @@ def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
 )
 def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: str) -> None:
     """The loads decide; a user sees what her code calls what."""
-    found = read_loads(written(tmp_path, lines({"load": LOADS, "status": list(words)})), small())
+    found = read(tmp_path, {"load": LOADS, "status": list(words)})
     assert said in found.note
     assert any(said in line for line in found.explained)
     assert ("not compared" in found.note) == bool(said)
 
 
 @pytest.mark.parametrize(
-    ("column", "cells", "same"),
+    ("column", "values", "same"),
     [
         ("height", (0, 0, 1e-9), False),
         ("tip_radius [m]", (0.1, 0.2, 0.1), True),
@@ -125,10 +121,10 @@ def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: 
     ],
 )
 def test_heights_and_radii_of_another_scene_are_told(
-    tmp_path: Path, column: str, cells: Sequence[float], same: bool
+    tmp_path: Path, column: str, values: Sequence[float], same: bool
 ) -> None:
     """A unit is not converted here: such a column is not compared."""
-    found = read_loads(written(tmp_path, lines({"load": LOADS, column: cells})), small())
+    found = read(tmp_path, {"load": LOADS, column: values})
     said = f"column {column.lower()} differs from the scene's: loads of another scene?"
     assert (said in found.note) == (not same)
 
@@ -137,24 +133,19 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
     """As MATLAB writes a row vector."""
     row = cr.Asperities([[i, 0] for i in range(5)], 0.1)
     scene = cr.Scene(1.0, row, cr.Material(1.0, 0.3), geometry="summit")
-    path = written(tmp_path, "1,2,3,4,5.5\n")
-    assert read_loads(path, scene).values.tolist() == [1, 2, 3, 4, 5.5]
-    np.save(tmp_path / "a.npy", [[1, 2, 3, 4, 5.5]])
-    assert read_loads(tmp_path / "a.npy", scene).values.tolist() == [1, 2, 3, 4, 5.5]
+    for name, made in (("a.csv", "1,2,3,4,5.5\n"), ("a.npy", [[1, 2, 3, 4, 5.5]])):
+        assert read(tmp_path, made, name, scene).values.tolist() == [1, 2, 3, 4, 5.5]
 
 
 def test_arrays(tmp_path: Path) -> None:
     table = np.column_stack((PLACES, LOADS))
     records = np.rec.fromarrays(table.T, names="x,y,load")
-    for name, saved in (("a", LOADS), ("b", table), ("c", records)):
-        np.save(tmp_path / f"{name}.npy", saved)
-        assert read_loads(tmp_path / f"{name}.npy", small()).values.tolist() == LOADS, name
-    np.savez(tmp_path / "e.npz", load=LOADS)
-    np.savez(tmp_path / "f.npz", np.array(LOADS))
-    np.savez(tmp_path / "g.npz", x=table[:, 0], y=table[:, 1], load=LOADS, more=["a", "b", "c"])
-    np.savez(tmp_path / "h.npz", force=3.0, grid=np.eye(4), load=LOADS, other=np.ones(9))
-    for name in "efgh":
-        assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
+    columns = {"x": table[:, 0], "y": table[:, 1], "load": LOADS, "more": ["a", "b", "c"]}
+    alone = {"force": 3.0, "grid": np.eye(4), "load": LOADS, "other": np.ones(9)}
+    for made in (LOADS, table, records):
+        assert read(tmp_path, made, "a.npy").values.tolist() == LOADS
+    for made in ({"load": LOADS}, {"arr_0": LOADS}, columns, alone):
+        assert read(tmp_path, made, "a.npz").values.tolist() == LOADS
 
 
 def test_arrays_of_two_dimensions(tmp_path: Path) -> None:
@@ -162,15 +153,12 @@ def test_arrays_of_two_dimensions(tmp_path: Path) -> None:
     x, y = np.meshgrid(np.linspace(-0.1, 1.1, 13), np.linspace(-0.1, 2.6, 28))
     pressure = np.where(np.hypot(x - 0.5, y - 2.5) < 0.15, 2.0, 0.0)
     pressure[1, 1] = 1.0
-    np.savez(tmp_path / "a.npz", x=x, y=y, pressure=pressure)
     area = 0.1 * 0.1
-    found = read_loads(tmp_path / "a.npz", small()).values
+    found = read(tmp_path, {"x": x, "y": y, "pressure": pressure}, "a.npz").values
     assert found == pytest.approx(area * np.array([1.0, 0.0, pressure.sum() - 1.0]))
-    np.savez(tmp_path / "b.npz", x=x[0], y=y[:, 0], pressure=pressure)
-    np.savez(tmp_path / "c.npz", load=pressure)
-    for name in "bc":
+    for made in ({"x": x[0], "y": y[:, 0], "pressure": pressure}, {"load": pressure}):
         with pytest.raises(cr.FileError, match=r"of 28 x 13 numbers, expected vectors, or x, y an"):
-            read_loads(tmp_path / f"{name}.npz", small())
+            read(tmp_path, made, "b.npz")
 
 
 def test_text_in_arrays_that_is_none(tmp_path: Path) -> None:
@@ -180,7 +168,7 @@ def test_text_in_arrays_that_is_none(tmp_path: Path) -> None:
         (tmp_path / "a.npy").read_bytes().replace(b"'<u4'", b"'<U3'").replace(b"(9,)", b"(3,)")
     )
     with pytest.raises(cr.FileError, match=r"not an \.npy file"):
-        read_loads(written(tmp_path, contents, "a.npy"), small())
+        read(tmp_path, contents, "a.npy")
 
 
 def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,26 +178,26 @@ def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     x, y = np.transpose(PLACES)
     columns = {"x": x[::-1], "y": y[::-1], "status": ["a", "b", "c"], "load": LOADS[::-1]}
     parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
-    assert read_loads(tmp_path / "a.parquet", small()).values.tolist() == LOADS
+    assert read_loads(tmp_path / "a.parquet").values.tolist() == LOADS
     parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
     with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
-        read_loads(tmp_path / "gap.parquet", small())
-    (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
+        read_loads(tmp_path / "gap.parquet")
     with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
-        read_loads(tmp_path / "b.parquet", small())
+        read(tmp_path, b"PAR1 and then nothing", "b.parquet")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(cr.FileError, match="needs pyarrow: pip install pyarrow"):
-        read_loads(tmp_path / "a.parquet", small())
+        read_loads(tmp_path / "a.parquet")
 
 
 def test_shear_forces_with_statuses(tmp_path: Path) -> None:
     content = "status,force [N],x,y\nopen,0,1,0\nsliding,-2,0,0\npartial,1,0.5,2.5\n"
-    found = read_shear_forces(written(tmp_path, content), small(), Manner())
+    path = tmp_path / put(tmp_path, content)
+    found = read_shear_forces(path, SMALL, Manner())
     assert found.values.tolist() == [-2, 0, 1]
     assert found.status is not None
     assert found.status.tolist() == ["sliding", "open", "partial"]
-    bare = written(tmp_path, "force\n1\n2\n3\n")
-    assert read_shear_forces(bare, small(), Manner()).status is None
+    put(tmp_path, "force\n1\n2\n3\n")
+    assert read_shear_forces(path, SMALL, Manner()).status is None
 
 
 # Positions
@@ -279,10 +267,9 @@ def test_all_mistakes_at_once_with_their_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize("unit", [b"1", b"1,", b"1 ", b'"', b"x,", b"\xff", b"#"])
 @pytest.mark.sample(1)
 def test_an_endless_line_is_refused(tmp_path: Path, unit: bytes) -> None:
-    path = written(tmp_path, b"load\n" + unit * (100_000_000 // len(unit)))
     with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
-        read_loads(path, small())
-    path.unlink()
+        read(tmp_path, b"load\n" + unit * (100_000_000 // len(unit)))
+    (tmp_path / "loads.csv").unlink()
 
 
 # Files of asperities
@@ -331,8 +318,7 @@ def test_summits(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
-    path = tmp_path / "summits.csv"
-    path.write_text(content)
+    path = tmp_path / put(tmp_path, content)
     with pytest.raises(cr.ConvexroughError) as caught:
         read_summits(path, tip_radius=None if "neither" in expected else 1.0)
     assert str(caught.value).startswith(str(path))
@@ -340,15 +326,8 @@ def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
 
 
 def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
-    book = pytest.importorskip("openpyxl").Workbook()
-    book.active.append(["notes"])
-    page = book.create_sheet("Run 2")
-    for row in (["x", "y", "load"], *np.column_stack((PLACES, LOADS)).tolist()):
-        page.append(row)
-    book.save(tmp_path / "loads.xlsx")
-    note = read_loads(tmp_path / "loads.xlsx", small()).note
-    assert 'loads.xlsx: sheet "Run 2", matched by position' in note
-    book.create_sheet("Run 3").append(["load"])
-    book.save(tmp_path / "loads.xlsx")
-    note = read_loads(tmp_path / "loads.xlsx", small()).note
-    assert 'loads.xlsx: sheet "Run 2", not "Run 3", matched by position' in note
+    pages = [[["notes"]], cells({"x": [0, 1, 0.5], "y": [0, 0, 2.5], "load": LOADS})]
+    note = read(tmp_path, pages, "loads.xlsx").note
+    assert 'loads.xlsx: sheet "Sheet1", matched by position' in note
+    note = read(tmp_path, [*pages, [["load"]]], "loads.xlsx").note
+    assert 'loads.xlsx: sheet "Sheet1", not "Sheet2", matched by position' in note
