@@ -10,7 +10,7 @@ from warnings import catch_warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.io import savemat
+from scene_files import put
 
 import convexrough as cr
 
@@ -18,14 +18,11 @@ HEIGHTS = np.random.default_rng(3).normal(size=(7, 9))
 Y, X = np.mgrid[:7, :9]
 
 
-def raw(path: Path, **options: Any) -> cr.surface.Surface:
+def raw(path: Path, made: Any = None, **options: Any) -> cr.surface.Surface:
+    """A map as its file has it; of a file that is written first, if `made` is given."""
+    if made is not None:
+        put(path.parent, made, path.name)
     return cr.surface.read(path, detrend=None, **options)
-
-
-def text(folder: Path, content: str, name: str = "map.txt") -> Path:
-    path = folder / name
-    path.write_text(content, encoding="utf-8")
-    return path
 
 
 def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> str:
@@ -33,53 +30,47 @@ def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> 
 
 
 def test_arrays(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", HEIGHTS)
-    surface = raw(tmp_path / "a.npy", pixel=2.0, unit="um")
+    alone, several = tmp_path / "a.npy", tmp_path / "a.npz"
+    surface = raw(alone, HEIGHTS, pixel=2.0, unit="um")
     assert_array_equal(surface.heights, HEIGHTS)
     assert (surface.pixel, surface.unit, surface.filled) == ((2.0, 2.0), "µm", 0)
-    assert surface.source == str(tmp_path / "a.npy")
-    np.savez(tmp_path / "a.npz", heights=HEIGHTS, pixel=[2.0, 3.0], unit="mm", height_unit="µm")
-    surface = raw(tmp_path / "a.npz")
+    assert surface.source == str(alone)
+    sides = {"heights": HEIGHTS, "pixel": [2.0, 3.0]}
+    surface = raw(several, sides | {"unit": "mm", "height_unit": "µm"})
     assert (surface.pixel, surface.unit) == ((2.0, 3.0), "mm")
     assert_allclose(surface.heights, 1e-3 * HEIGHTS, rtol=1e-15)
-    y, x = (step * np.arange(n) for step, n in zip((3.0, 2.0), HEIGHTS.shape, strict=True))
-    for pixel in ([2.0, 3.0], [2.0, 2.0]):
-        np.savez(tmp_path / "x.npz", heights=HEIGHTS, pixel=pixel, x=x, y=y)
-        if pixel[1] == 3.0:
-            assert raw(tmp_path / "x.npz").pixel == (2.0, 3.0)
+    axes = sides | {"x": 2.0 * X[0], "y": 3.0 * Y[:, 0]}
+    assert raw(several, axes).pixel == (2.0, 3.0)
     with pytest.raises(cr.InputError, match="pixel: found 2 by 2, expected 2 by 3, the steps of x"):
-        raw(tmp_path / "x.npz")
-    np.savez(tmp_path / "b.npz", whatever=HEIGHTS.astype(np.float32), other=np.zeros(3))
-    assert_array_equal(raw(tmp_path / "b.npz", pixel=1.0).heights, HEIGHTS.astype(np.float32))
-    points = np.column_stack([it.ravel() for it in (*np.meshgrid(x, y), HEIGHTS)])[::-1]
-    np.save(tmp_path / "points.npy", points)
-    savemat(tmp_path / "points.mat", dict(zip("xyz", points.T[:, :, None], strict=True)))
-    for name in ("points.npy", "points.mat"):
-        surface = raw(tmp_path / name)
+        raw(several, axes | {"pixel": [2.0, 2.0]})
+    single = HEIGHTS.astype(np.float32)
+    named = {"whatever": single, "other": np.zeros(3)}
+    assert_array_equal(raw(several, named, pixel=1.0).heights, single)
+    assert raw(alone, (100 * HEIGHTS).astype(np.int16), pixel=50.0).heights.dtype == np.float64
+    points = np.column_stack([it.ravel() for it in (2.0 * X, 3.0 * Y, HEIGHTS)])[::-1]
+    lists = dict(zip("xyz", points.T[:, :, None], strict=True))
+    for path, made in ((alone, points), (tmp_path / "a.mat", lists)):
+        surface = raw(path, made)
         assert_allclose(surface.heights, HEIGHTS)
         assert_allclose(surface.pixel, (2.0, 3.0))
     for name in ("scale", "z_unit", "dx"):
-        np.savez(tmp_path / "more.npz", heights=HEIGHTS, pixel=1.0, **{name: 0.5})
         with pytest.raises(cr.InputError, match=f"arrays: found {name}, expected pixel, unit, hei"):
-            raw(tmp_path / "more.npz")
-    np.savez(tmp_path / "two.npz", height=HEIGHTS, z=2 * HEIGHTS, pixel=1.0)
+            raw(several, sides | {name: 0.5})
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
-        raw(tmp_path / "two.npz")
-    np.save(tmp_path / "i.npy", (100 * HEIGHTS).astype(np.int16))
-    assert raw(tmp_path / "i.npy", pixel=50.0).heights.dtype == np.float64
+        raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
 
 
 @pytest.mark.parametrize(
     ("separator", "ending"), [(" ", "\n"), ("\t", "\r\n"), (",", "\n"), (";", ";\n"), (", ", "\n")]
 )
 def test_matrices(tmp_path: Path, separator: str, ending: str) -> None:
-    path = text(tmp_path, matrix(separator=separator, ending=ending), "map.csv")
-    assert_array_equal(raw(path, pixel=1.0).heights, HEIGHTS)
+    content = matrix(separator=separator, ending=ending)
+    assert_array_equal(raw(tmp_path / "map.csv", content, pixel=1.0).heights, HEIGHTS)
 
 
 def test_what_gwyddion_writes(tmp_path: Path) -> None:
     head = "# Channel: Height\n# Width: 18.0 µm\n# Height: 21.0 µm\n# Value units: nm\n"
-    surface = raw(text(tmp_path, head + matrix(1e2 * HEIGHTS, "\t")))
+    surface = raw(tmp_path / "map.txt", head + matrix(1e2 * HEIGHTS, "\t"))
     assert (surface.pixel, surface.unit) == ((2.0, 3.0), "µm")
     assert_allclose(surface.heights, 0.1 * HEIGHTS, rtol=1e-14)
 
@@ -88,7 +79,7 @@ def test_what_gwyddion_writes(tmp_path: Path) -> None:
 def test_lists(tmp_path: Path, header: str) -> None:
     rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
     rows = np.random.default_rng(0).permutation(rows)
-    surface = raw(text(tmp_path, header + matrix(rows, ","), "list.csv"))
+    surface = raw(tmp_path / "list.csv", header + matrix(rows, ","))
     assert_allclose(surface.pixel, (10, 20), rtol=1e-12)
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
@@ -100,13 +91,11 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
     x, y = (2 * X[0], 3 * Y[:, 0]) if form == "vectors" else (2 * X, 3 * Y)
     turned = "T" if "along" in form else "real"
     arrays = {"X": getattr(x, turned), "Y": getattr(y, turned), "z": getattr(HEIGHTS, turned)}
-    savemat(tmp_path / "a.mat", arrays)
-    surface = raw(tmp_path / "a.mat")
+    surface = raw(tmp_path / "a.mat", arrays)
     assert_allclose(surface.pixel, (2, 3))
     assert_array_equal(surface.heights, HEIGHTS)
-    savemat(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
     with pytest.raises(cr.InputError, match="as y and x are long; transpose it"):
-        raw(tmp_path / "a.mat")
+        raw(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
 
 
 @pytest.mark.sample(3)
@@ -117,11 +106,10 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     cells[3, 4:6] = mark
     rows = zip(X.ravel(), Y.ravel(), cells.ravel(), strict=True) if listed else cells
     content = "".join(",".join(map(str, row)) + "\n" for row in rows)
-    path = text(tmp_path, "x,y,z\n" + content if listed else content)
-    pixel = None if listed else 1.0
+    made, pixel = ("x,y,z\n" + content, None) if listed else (content, 1.0)
     with pytest.raises(cr.ConvexroughError, match=r"2 holes .*--fill"):
-        raw(path, pixel=pixel)
-    filled = raw(path, pixel=pixel, fill=True)
+        raw(tmp_path / "a.txt", made, pixel=pixel)
+    filled = raw(tmp_path / "a.txt", pixel=pixel, fill=True)
     assert filled.filled == 2
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
@@ -141,8 +129,8 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
                 if mark or place == np.s_[3]:  # else separators at the end, or empty lines
                     cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], object)
                     cells[place] = mark
-                    path = text(tmp_path, "\n".join(map(separator.join, cells)))
-                    found = raw(path, pixel=1.0, fill=True)
+                    content = "\n".join(map(separator.join, cells))
+                    found = raw(tmp_path / "a.txt", content, pixel=1.0, fill=True)
                     assert found.heights.shape == HEIGHTS.shape
                     assert found.filled == (cells == mark).sum()
 
@@ -211,7 +199,7 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:
-    path = text(tmp_path, content)
+    path = tmp_path / put(tmp_path, content, "map.txt")
     with pytest.raises(cr.ConvexroughError, match=message) as caught:
         cr.surface.read(path, **options)
     assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())
@@ -219,16 +207,9 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    (tmp_path / "a.gwy").write_bytes(b"GWYP")
-    with pytest.raises(
-        cr.FileError, match=r"a\.gwy: needs SurfaceTopography: pip install SurfaceTopography"
-    ):
-        cr.surface.read(tmp_path / "a.gwy")
-
-
-def topographies() -> Any:
-    with catch_warnings(action="ignore", category=ImportWarning):
-        return import_module("SurfaceTopography")
+    said = r"a\.gwy: needs SurfaceTopography: pip install SurfaceTopography"
+    with pytest.raises(cr.FileError, match=said):
+        raw(tmp_path / "a.gwy", b"GWYP")
 
 
 @pytest.mark.skipif(
@@ -239,7 +220,9 @@ class TestInstruments:
     """Round trips through formats that SurfaceTopography writes, too."""
 
     def written(self, path: Path, heights: Any = HEIGHTS, unit: str = "µm") -> Path:
-        topography = topographies().Topography(heights.T, (18.0, 21.0), unit=unit)
+        with catch_warnings(action="ignore", category=ImportWarning):
+            made = import_module("SurfaceTopography").Topography
+        topography = made(heights.T, (18.0, 21.0), unit=unit)
         {".nc": topography.to_netcdf, ".x3p": topography.to_x3p, ".gwy": topography.to_gwy}[
             path.suffix
         ](str(path))
@@ -264,9 +247,7 @@ class TestInstruments:
         assert raw(path, fill=True).filled == 7
 
     def test_no_such_format(self, tmp_path: Path) -> None:
-        path = tmp_path / "a.bin"
-        path.write_bytes(b"\1\2\3" * 50)
         with pytest.raises(cr.FileError, match=r"a\.bin: SurfaceTopography cannot read it"):
-            raw(path)
+            raw(tmp_path / "a.bin", b"\1\2\3" * 50)
         with pytest.raises(cr.FileError, match="cannot be read: No such file"):
             raw(tmp_path / "b.gwy")
