@@ -31,6 +31,31 @@ hardness = 8e3
 youngs_modulus = 70e3
 poisson_ratio = 0.33"""
 
+#: Every table that a scene file may have, for the paper's scene.
+EVERYTHING = f"""{FRICTION}
+[shear]
+fractions = [0.1, 0.37, 0.5]
+[cycle]
+maximum_fraction = [0.37, 0.5]
+minimum_fraction = [-0.37, 0.1]
+[history]
+fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
+[path]
+loads = [0.6, 0.6, 1.0, 1.0]
+forces = [0.0, 0.15, 0.15, -0.075]
+reference = 3.6085338874666633e-07
+[steady]
+ellipse = {{ load = 0.7, load_amplitude = 0.28, force_amplitude = 0.175, chords = 12 }}
+reference = 3.6085338874666633e-07
+phases = [0.5]
+[shakedown]
+loads = 3.6085338874666633e-07
+force_amplitudes = [1.8042669437333e-07, -1.8042669437333e-07]
+[gradient]
+of = "loss"
+fraction = 0.5
+"""
+
 
 def scene_text(
     asperities: str = HEXAGONAL,

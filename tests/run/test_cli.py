@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import FRICTION, WITHIN, rows, scene_text
+from scene_files import EVERYTHING, WITHIN, rows, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -114,19 +114,9 @@ def test_without_a_certificate(command: Any, tmp_path: Path) -> None:
     assert "warning: not certified" in verified.err
 
 
-SHEAR = """[shear]
-fractions = [0.1, 0.37, 0.5]
-[cycle]
-maximum_fraction = [0.37, 0.5]
-minimum_fraction = [-0.37, 0.1]
-[history]
-fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
-"""
-
-
 def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     """Every table of the scene is computed, and every file says what the package says."""
-    (tmp_path / "a.toml").write_text(scene_text(more=FRICTION + SHEAR))
+    (tmp_path / "a.toml").write_text(scene_text(more=EVERYTHING))
     outcome = command("run", "a.toml", "--no-figures", "--json")
     assert (outcome.status, outcome.err) == (0, "")
     summary, folder = json.loads(outcome.out), tmp_path / "a-results"

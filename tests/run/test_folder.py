@@ -6,35 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import FRICTION, WITHIN, scene_text
+from scene_files import EVERYTHING, WITHIN, scene_text
 
 from convexrough import plots
 from convexrough.run import results
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
-
-#: Every table that a scene file may have.
-EVERYTHING = """
-[shear]
-fractions = [0.1, 0.5]
-[cycle]
-maximum_fraction = [0.37, 0.5]
-minimum_fraction = [-0.37, 0.1]
-[history]
-fractions = [0.6, -0.2]
-[path]
-loads = [3e-7, 3e-7]
-forces = [0.0, 1e-7]
-[steady]
-ellipse = { load = 3e-7, load_amplitude = 5e-8, force_amplitude = 5e-8, chords = 6 }
-phases = [0.5]
-[shakedown]
-loads = 3e-7
-force_amplitudes = [1e-7, -1e-7]
-[gradient]
-of = "loss"
-fraction = 0.5
-"""
 
 
 def keys(value: Any) -> Any:
@@ -62,7 +39,7 @@ def test_names_columns_and_keys(
 
     monkeypatch.setattr(results, "write_results", after)
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
-    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=FRICTION + EVERYTHING))
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
     ran = command("run", "a.toml", "--out", "out", "--html")
     assert (ran.status, ran.err) == (0, "")
     found: dict[str, Any] = {"files": sorted(path.name for path in (tmp_path / "out").iterdir())}
