@@ -23,11 +23,10 @@ def added(monkeypatch: pytest.MonkeyPatch) -> None:
     exec(compile(block, str(PAGE), "exec"), {"__name__": "onset"})
 
 
-def test_it_is_computed_written_and_printed(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(more=MORE))
-    ran = command("run", "a.toml", "--no-figures")
+def test_it_is_computed_written_and_printed(run: Any) -> None:
+    ran = run(scene_text(more=MORE))
     assert (ran.status, ran.err) == (0, "")
-    said = json.loads((tmp_path / "a-results" / "summary.json").read_text())["onset"]
+    said = json.loads(Path("a-results/summary.json").read_text())["onset"]
     assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{said[0]['onset']:.7g}$",
                      ran.out, re.M)  # fmt: skip
     file = cr.read_scene("a.toml")
@@ -50,8 +49,5 @@ def test_it_is_computed_written_and_printed(command: Any, tmp_path: Path) -> Non
         ("[onset]", "[friction]: missing table, needed with [onset]"),
     ],
 )
-def test_its_mistakes_are_told(command: Any, tmp_path: Path, more: str, said: str) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(more=more))
-    ran = command("run", "a.toml")
-    assert (ran.status, ran.err) == (2, ran.err)
-    assert said in ran.err
+def test_its_mistakes_are_told(run: Any, more: str, said: str) -> None:
+    assert run(scene_text(more=more)).refuses(said)

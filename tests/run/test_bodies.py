@@ -52,28 +52,23 @@ fraction = 0.2
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("radius", ["inf", "[1.0, 2.5]", "[1.0, inf]"])
-def test_a_whole_run(command: Any, tmp_path: Path, radius: str) -> None:
+def test_a_whole_run(run: Any, command: Any, radius: str) -> None:
     """With a proof that the checker accepts."""
-    more = FRICTION + STAGES
-    text = scene_text(WITHIN, "load = 0.02", more, radius=radius, material=TWO_BODIES)
-    (tmp_path / "scene.toml").write_text(text)
-    outcome = command("run", "scene.toml", "--out", "found", "--proof", "--no-figures")
+    text = scene_text(WITHIN, "load = 0.02", FRICTION + STAGES, radius, TWO_BODIES)
+    outcome = run(text, "--proof")
     assert outcome.status == 0, outcome.err
     assert "Dundurs' beta = -0.117, neglected" in outcome.out
     smooth = radius == "[1.0, 2.5]"
     assert ("smooth W/W0" in outcome.out) == smooth
     assert ("no smooth reference" in outcome.out) != smooth
-    summary = json.loads((tmp_path / "found" / "summary.json").read_text())
+    summary = json.loads(Path("a-results/summary.json").read_text())
     assert summary["normal"]["mismatch"] == pytest.approx(-0.1167, abs=1e-4)
     assert (summary["cycle"][0]["loss_normalised"] is not None) == smooth
     assert summary["cycle"][0]["loss"] > 0
     assert "sphere_radius" not in summary["gradient"]["by"]
-    assert command("check", "found/proof.json").status == 0
+    assert command("check", "a-results/proof.json").status == 0
 
 
-def test_the_slider_page_is_of_spheres(command: Any, tmp_path: Path) -> None:
+def test_the_slider_page_is_of_spheres(run: Any) -> None:
     text = scene_text(WITHIN, "load = 1e-7", FRICTION + STAGES, radius="inf")
-    (tmp_path / "scene.toml").write_text(text)
-    outcome = command("run", "scene.toml", "--no-figures", "--html")
-    assert "slider page: found a flat, expected a sphere" in outcome.err
-    assert outcome.status == 2
+    assert run(text, "--html").refuses("slider page: found a flat, expected a sphere")

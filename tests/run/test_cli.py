@@ -20,12 +20,11 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     assert command("new", "no/such/folder.toml").status == 2
 
 
-def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(WITHIN))
-    ran = command("run", "a.toml", "--json", "--no-figures", "--out", "deep/er")
+def test_json_is_one_object_and_the_summary(run: Any, command: Any) -> None:
+    ran = run(scene_text(WITHIN), "--json", "--out", "deep/er")
     assert (ran.status, ran.err) == (0, "")
     summary = json.loads(ran.out)
-    assert summary == json.loads((tmp_path / "deep/er/summary.json").read_text())
+    assert summary == json.loads(Path("deep/er/summary.json").read_text())
     assert (summary["schema"], summary["version"]) == (2, cr.__version__)
     normal, proof = summary["normal"], summary["normal"]["certificate"]
     counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
@@ -96,31 +95,28 @@ def test_nothing_touches(command: Any, tmp_path: Path) -> None:
 TWINS = "x,y\n-5e-5,0\n5e-5,0\n"
 
 
-def test_without_a_certificate(command: Any, tmp_path: Path) -> None:
+def test_without_a_certificate(run: Any, command: Any) -> None:
     """Two summits that are almost one: nothing is proved, and everything says so."""
-    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, "load = 6.6e-8"))
-    (tmp_path / "summits.csv").write_text(TWINS)
-    outcome = command("run", "a.toml", "--json", "--no-figures")
+    Path("summits.csv").write_text(TWINS)
+    outcome = run(scene_text(SUMMITS, "load = 6.6e-8"), "--json")
     assert outcome.status == 3
     proof = json.loads(outcome.out)["normal"]["certificate"]
     assert proof["scope"] == "none"
     assert proof["load_error"] is None
     assert "warning: not certified" in outcome.err
     assert "warning: contact discs overlap" in outcome.err
-    assert (tmp_path / "a-results" / "asperities.csv").exists()
     verified = command("verify", "a.toml", "a-results/asperities.csv")
     assert verified.status == 3
     assert "none: nothing is proved" in verified.out
     assert "warning: not certified" in verified.err
 
 
-def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
+def test_shear_cycle_and_history(run: Any) -> None:
     """Every table of the scene is computed, and every file says what the package says."""
-    (tmp_path / "a.toml").write_text(scene_text(more=EVERYTHING))
-    outcome = command("run", "a.toml", "--no-figures", "--json")
+    outcome = run(scene_text(more=EVERYTHING), "--json")
     assert (outcome.status, outcome.err) == (0, "")
-    summary, folder = json.loads(outcome.out), tmp_path / "a-results"
-    file = read_scene(tmp_path / "a.toml")
+    summary, folder = json.loads(outcome.out), Path("a-results")
+    file = read_scene("a.toml")
     contact = file.press()
     limit = 0.5 * contact.load
     counts = [[row[key] for row in summary["shear"]] for key in ("sliding", "partial", "undecided")]
@@ -146,7 +142,7 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
 
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
     assert summary["history"]["loss"] == past.losses.tolist()
-    text = command("run", "a.toml", "--no-figures", "--force").out
+    text = run(scene_text(more=EVERYTHING), "--force").out
     assert re.search(r"^ *0\.5 .* 6 +31 +0$", text, re.M)
 
 
@@ -159,13 +155,12 @@ measure = ["load"]
 
 
 @pytest.mark.usefixtures("no_processes")
-def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(more=SWEEP))
-    ran = command("run", "a.toml", "--json")
+def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
+    ran = run(scene_text(more=SWEEP), "--json")
     assert (ran.status, json.loads(ran.out)["sweep"]["certified"]) == (0, 2)
-    found = cr.open_sweep(tmp_path / "a-sweep").read()["load"]
-    (tmp_path / "one.toml").write_text(scene_text())
-    assert found[1] == read_scene(tmp_path / "one.toml").press().load
+    found = cr.open_sweep("a-sweep").read()["load"]
+    Path("one.toml").write_text(scene_text())
+    assert found[1] == read_scene("one.toml").press().load
     assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
     assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
 

@@ -10,8 +10,8 @@ from scene_files import FRICTION, WITHIN, rows, scene_text
 import convexrough as cr
 
 
-def write(table: str) -> None:
-    Path("scene.toml").write_text(scene_text(WITHIN, "load = 3.60853389e-7", FRICTION + table))
+def scene(table: str) -> str:
+    return scene_text(WITHIN, "load = 3.60853389e-7", FRICTION + table)
 
 
 def printed(out: str) -> dict[str, str]:
@@ -20,14 +20,14 @@ def printed(out: str) -> dict[str, str]:
     return {line[:22].strip(): line[22:] for line in lines}
 
 
-def test_what_is_written_and_printed(command: Any) -> None:
+def test_what_is_written_and_printed(run: Any) -> None:
     """Names apart from numbers, what is held, how far heights are known, and what was asked by."""
-    write('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    text = scene('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
+    outcome = run(text, "--out", "out")
     assert outcome.status == 0, outcome.err
     assert "gradient of the loss at Q/(fP) = 0.5, at constant load and force" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
-    contact = cr.read_scene("scene.toml").press()
+    contact = cr.read_scene("a.toml").press()
     gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
     found = rows("out/gradient.csv")
     table = {key: np.array([float(row[key]) for row in found]) for key in found[0]}
@@ -47,20 +47,19 @@ def test_what_is_written_and_printed(command: Any) -> None:
     assert far[at] == far.max()
     assert lines["by position"].startswith(f"up to ({table['by_x'][at]:.8g}, ")
     assert "by tip_radius" not in lines
-    write('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')
-    lines = printed(command("run", "scene.toml", "--out", "other", "--no-figures").out)
+    lines = printed(run(scene('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')).out)
     assert "by height" not in lines
     assert lines["by friction"] == "0"
     assert lines["by tip_radius"].startswith("up to ")
 
 
-def test_where_there_is_none(command: Any) -> None:
+def test_where_there_is_none(run: Any) -> None:
     """All else is computed and written; what is missing is said, and the status says so."""
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
     said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
     said += "force below f P: at constant approach f P may fall below the force"
-    write(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    text = scene(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
+    outcome = run(text, "--out", "out")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())
     assert said in summary["gradient"]["none_because"]

@@ -15,18 +15,13 @@ from convexrough.friction import general_step
 SCENE = scene_text(WITHIN, more=EVERYTHING)
 
 
-def test_a_run(command: Any) -> None:
-    Path("scene.toml").write_text(SCENE)
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+def test_a_run(run: Any) -> None:
+    outcome = run(SCENE, "--out", "out")
     assert outcome.status == 0, outcome.err
     assert "indentations increase with the load: proved" in outcome.out
-    assert (
-        outcome.out.count("a path of 12 chords; the ellipse loses more, in our tests by at m") == 1
-    )
+    assert outcome.out.count("path of 12 chords; the ellipse loses more, in our tests by at m") == 1
     summary = json.loads(Path("out/summary.json").read_text())
-    assert summary["path"]["displacement"][3] == pytest.approx(
-        -1.4399972915528e-06, rel=1e-11, abs=0.0
-    )
+    assert summary["path"]["displacement"][3] == pytest.approx(-1.4399972915528e-06, rel=1e-11)
     assert summary["path"]["sliding"] == [0, 12, 0, 6]
     assert summary["steady"]["undecided"] == 0
     assert summary["shakedown"]["factor"] == pytest.approx(0.351719571750, rel=1e-10)
@@ -65,7 +60,9 @@ reference = LOAD
 """
 
 
-def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_proved_where_order_fails(
+    run: Any, command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A small low asperity between five crowded ones loses load as the load rises.
 
     How exact the steps of such a path are is tested in tests/friction; here few are enough.
@@ -76,10 +73,8 @@ def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.M
     around = [f"{np.cos(t)},{np.sin(t)},0,1" for t in turn]
     lines = ["x,y,height,tip_radius", "0,0,-0.06,0.05", *around]
     Path("shaded.csv").write_text("\n".join(lines))
-    Path("scene.toml").write_text(SHADED)
-    pressed = json.loads(command("run", "scene.toml", "--no-figures", "--json").out)["normal"]
-    Path("scene.toml").write_text(SHADED + STAGES.replace("LOAD", repr(pressed["load"])))
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    load = json.loads(run(SHADED, "--json").out)["normal"]["load"]
+    outcome = run(SHADED + STAGES.replace("LOAD", repr(load)), "--out", "out")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())
     for stage in ("path", "steady", "shakedown"):
@@ -95,7 +90,7 @@ def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.M
     assert summary["shakedown"]["upper"] is None
     assert "not proved: any bounds on the limit of [shakedown]" in outcome.err
     total = repr(summary["shear"][0]["force"])
-    claimed = ("verify", "scene.toml", "out/asperities.csv", "--shear", "out/shear.csv")
+    claimed = ("verify", "a.toml", "out/asperities.csv", "--shear", "out/shear.csv")
     said = command(*claimed, "--shear-force", total)
     assert said.status == 3
     assert "statuses not proved\nindentations increase with the load: fails\n" in said.out

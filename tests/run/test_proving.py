@@ -62,9 +62,7 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
 
 
-def test_a_scene_too_large_to_prove_is_refused(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "many.toml").write_text(scene_text(f"{HEXAGONAL}within = 0.08"))
-    assert command("run", "many.toml", "--proof", "--no-figures").refuses(
-        "many.toml: asperities of a scene to prove"
-    )
-    assert not (tmp_path / "many-results").exists()
+def test_a_scene_too_large_to_prove_is_refused(run: Any) -> None:
+    ran = run(scene_text(f"{HEXAGONAL}within = 0.08"), "--proof")
+    assert ran.refuses("a.toml: asperities of a scene to prove")
+    assert not Path("a-results").exists()

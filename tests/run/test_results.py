@@ -42,27 +42,23 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     assert (folder / "notes.txt").read_text() == "mine"
 
 
-def test_a_manifest_removes_nothing_outside_its_folder(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
+def test_a_manifest_removes_nothing_outside_its_folder(run: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("precious")
     folder = tmp_path / "out"
     folder.mkdir()
     for files in (["../mine.txt"], [str(tmp_path / "mine.txt")], [1], 1):
         (folder / "files.json").write_text(json.dumps({"files": files}))
-        ran = command("run", "a.toml", "--out", "out", "--no-figures", "--force")
-        assert ran.status == 0
+        assert run(scene_text(), "--out", "out", "--force").status == 0
     assert (tmp_path / "mine.txt").read_text() == "precious"
 
 
-def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) -> None:
+def test_a_folder_says_where_its_results_are_from(run: Any) -> None:
     rough = HEXAGONAL + "height_std = 1e-6\nseed = 7"
-    (tmp_path / "a.toml").write_text("# µm\n" + scene_text(rough), encoding="utf-8")
-    assert command("run", "a.toml", "--no-figures").status == 0
-    folder = tmp_path / "a-results"
-    said = json.loads((folder / "files.json").read_text())
-    assert (folder / "scene.toml").read_bytes() == (tmp_path / "a.toml").read_bytes()
+    assert run("# µm\n" + scene_text(rough)).status == 0
+    said = json.loads(Path("a-results/files.json").read_text())
+    assert Path("a-results/scene.toml").read_bytes() == Path("a.toml").read_bytes()
     assert said["files"] == ["asperities.csv", "scene.toml", "summary.json"]
-    digest = hashlib.sha256((tmp_path / "a.toml").read_bytes()).hexdigest()
+    digest = hashlib.sha256(Path("a.toml").read_bytes()).hexdigest()
     assert said["inputs"] == {"a.toml": digest}
     assert (said["seed"], said["version"]) == (7, cr.__version__)
     assert said["versions"]["numpy"] == np.__version__
@@ -71,33 +67,19 @@ def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) 
 # Plausibility: a warning with its numbers, never an error.
 
 
-def warned(command: Any, tmp_path: Path, text: str) -> Any:
-    (tmp_path / "a.toml").write_text(text)
-    outcome = command("run", "a.toml", "--no-figures", "--force")
-    assert outcome.status in (0, 3)
-    return outcome
-
-
-def test_an_ordinary_scene_is_not_warned_of(command: Any, tmp_path: Path) -> None:
-    closest = HEXAGONAL.replace("summit", "closest")
-    outcome = warned(command, tmp_path, scene_text(closest))
-    assert outcome.err == ""
-    assert 'with "closest"' not in outcome.out
-
-
-def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
+def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
+    ordinary = run(scene_text(HEXAGONAL.replace("summit", "closest")))
+    assert (ordinary.err, 'with "closest"' in ordinary.out) == ("", False)
     blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
-    outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
-    assert (
-        "1.09 of the sphere's radius from the axis: from 0.2 on, the paraboloid of the model"
-        in outcome.err
-    )
-    assert "of the tip radius: from 0.2 on, the paraboloid of the model" in outcome.err
+    outcome = run(scene_text(blunt, "approach = 0.9"), "--force")
+    model = "from 0.2 on, the paraboloid of the model"
+    assert f"1.09 of the sphere's radius from the axis: {model}" in outcome.err
+    assert f"of the tip radius: {model}" in outcome.err
     claimed = command("verify", "a.toml", "a-results/asperities.csv")  # the same loads: also told
-    assert "of the tip radius: from 0.2 on, the paraboloid of the model" in claimed.err
+    assert f"of the tip radius: {model}" in claimed.err
 
 
-def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
+def test_contact_at_the_rim_of_the_array(run: Any) -> None:
     """A radius in the wrong unit, of a sphere or along one axis; a flat base has no such limit."""
     said = "contact reaches the rim of the array, which ends at 0."
     for radius, warns in (
@@ -108,10 +90,10 @@ def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
         ("inf", False),
     ):
         text = scene_text(WITHIN, radius=radius)
-        assert (said in warned(command, tmp_path, text).err) == warns, radius
+        assert (said in run(text, "--force").err) == warns, radius
     for within, warns in (("0.004", True), ("0.002", False)):  # 7 asperities, and one
         few = scene_text(WITHIN.replace("0.0102", within), radius="1e3")
-        assert (said in warned(command, tmp_path, few).err) == warns
+        assert (said in run(few, "--force").err) == warns
 
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:

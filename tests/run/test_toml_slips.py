@@ -66,11 +66,10 @@ STEADY = FRICTION + "[steady]\nreference = 1e60\n"
 STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 
 
-def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any) -> None:
+def test_a_steady_state_of_which_nothing_is_proved(run: Any) -> None:
     """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
     layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
-    (tmp_path / "a.toml").write_text(scene_text(layout, more=STEADY))
-    outcome = command("run", "a.toml", "--no-figures")
+    outcome = run(scene_text(layout, more=STEADY))
     assert outcome.status == 3
     assert "nan" not in outcome.out
 
