@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-import convexrough as cr
-
 Columns = Mapping[str, Iterable[Any]]
 
 HEXAGONAL = """
@@ -118,9 +116,3 @@ def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
         content = (made if isinstance(made, str) else lines(made)).encode()
         path.write_bytes(gzip.compress(content) if kind == "gz" else content)
     return name
-
-
-def write_loads(path: Path, scene: cr.Scene, loads: Any, order: Any) -> Path:
-    x, y = scene.asperities.positions[order].T
-    path.write_text(lines({"x": x, "load": loads[order], "y": y}))
-    return path

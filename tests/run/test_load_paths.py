@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, rows, scene_text
+from path_scenes import shaded
+from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, put, rows, scene_text
 
 import convexrough as cr
 from convexrough.friction import general_step
@@ -69,10 +70,10 @@ def test_nothing_is_proved_where_order_fails(
     """
     for name in ("SETTLED", "SETTLED_MOTION"):
         monkeypatch.setattr(general_step, name, np.inf)
-    turn = 2 * np.pi * np.arange(5) / 5
-    around = [f"{np.cos(t)},{np.sin(t)},0,1" for t in turn]
-    lines = ["x,y,height,tip_radius", "0,0,-0.06,0.05", *around]
-    Path("shaded.csv").write_text("\n".join(lines))
+    low = shaded().asperities
+    x, y = low.positions.T
+    columns = {"x": x, "y": y, "height": low.heights, "tip_radius": low.tip_radii}
+    put(Path(), columns, "shaded.csv")
     load = json.loads(run(SHADED, "--json").out)["normal"]["load"]
     outcome = run(SHADED + STAGES.replace("LOAD", repr(load)), "--out", "out")
     assert outcome.status == 3

@@ -9,23 +9,19 @@ from convexrough.surface.holes import filled
 
 RNG = np.random.default_rng(5)
 NOISE = 1e-3 * RNG.standard_normal((40, 60))
-
-
-def grid(shape: tuple[int, int] = (40, 60), pixel: tuple[float, float] = (0.5, 0.7)):  # type: ignore[no-untyped-def]
-    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
-    return (x - (shape[1] - 1) / 2) * pixel[0], (y - (shape[0] - 1) / 2) * pixel[1]
+PIXEL = (0.5, 0.7)
+Y, X = np.mgrid[-19.5:20, -29.5:30] * np.reshape(PIXEL[::-1], (2, 1, 1))
 
 
 def test_a_plane_is_removed_and_said() -> None:
-    x, y = grid()
-    plane = cr.surface.Surface(3 + 0.2 * x - 0.1 * y + NOISE, (0.5, 0.7)).detrend()
+    plane = cr.surface.Surface(3 + 0.2 * X - 0.1 * Y + NOISE, PIXEL).detrend()
     removed = plane.removed[0]
     assert removed.kind == "plane"
     assert_allclose(removed.slopes, (0.2, -0.1), atol=1e-4)
     assert_allclose(removed.height, 3.0, atol=1e-3)
     assert removed.radius == np.inf
     left = plane.heights
-    for term in (np.ones_like(x), x, y):  # a least-squares fit leaves nothing of its terms
+    for term in (np.ones_like(X), X, Y):  # a least-squares fit leaves nothing of its terms
         assert abs(np.vdot(left, term)) < 1e-9
     assert_allclose(plane.rms_height, NOISE.std(), rtol=1e-2)
     with pytest.raises(cr.InputError, match="detrend: found 'cone', expected \"plane\", "):
@@ -35,22 +31,20 @@ def test_a_plane_is_removed_and_said() -> None:
 @pytest.mark.parametrize("radius", [25.0, -25.0, 400.0])
 def test_a_sphere_is_removed_and_said(radius: float) -> None:
     """A deep cap, half as steep as it can be, off the middle; a bowl; and nearly a plane."""
-    x, y = grid()
-    cap = np.sign(radius) * np.sqrt(radius**2 - (x - 2) ** 2 - (y + 1) ** 2)
-    exact = cr.surface.Surface(cap + 1e-9 * NOISE, (0.5, 0.7)).detrend("sphere")
+    cap = np.sign(radius) * np.sqrt(radius**2 - (X - 2) ** 2 - (Y + 1) ** 2)
+    exact = cr.surface.Surface(cap + 1e-9 * NOISE, PIXEL).detrend("sphere")
     removed = exact.removed[0]
     assert_allclose(removed.radius, radius, rtol=1e-9)
     assert_allclose(removed.height, cap[19:21, 29:31].mean(), rtol=1e-3)
     assert exact.max_height < 2e-11
-    rough = cr.surface.Surface(cap + NOISE, (0.5, 0.7)).detrend("sphere")
+    rough = cr.surface.Surface(cap + NOISE, PIXEL).detrend("sphere")
     assert_allclose(rough.removed[0].radius, radius, rtol=5e-3)
     assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
 
 
 def test_another_unit_is_the_same_surface() -> None:
-    x, y = grid()
-    cap = np.sqrt(50**2 - x**2 - y**2) + NOISE
-    scan = cr.surface.Surface(cap, (0.5, 0.7), unit="mm").detrend("sphere")
+    cap = np.sqrt(50**2 - X**2 - Y**2) + NOISE
+    scan = cr.surface.Surface(cap, PIXEL, unit="mm").detrend("sphere")
     metres = scan.to_unit("m")
     assert_allclose(metres.heights, 1e-3 * scan.heights, rtol=1e-15)
     assert_allclose(metres.pixel, (0.5e-3, 0.7e-3), rtol=1e-15)
@@ -79,29 +73,25 @@ def test_no_map(heights: object, message: str) -> None:
 
 
 def test_a_paraboloid_of_a_turned_cylinder() -> None:
-    x, y = grid()
-    across = 0.8 * x + 0.6 * y
-    surface = cr.surface.Surface(0.1 * x - across**2 / 500 + NOISE, (0.5, 0.7))
+    across = 0.8 * X + 0.6 * Y
+    surface = cr.surface.Surface(0.1 * X - across**2 / 500 + NOISE, PIXEL, "mm")
     (removed,) = surface.detrend("paraboloid").removed
     assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
     assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
-    metres = (
-        cr.surface.Surface(surface.heights, (0.5, 0.7), "mm").detrend("paraboloid").to_unit("m")
-    )
+    metres = surface.detrend("paraboloid").to_unit("m")
     assert_allclose(metres.removed[0].curvatures, np.multiply(1e3, removed.curvatures))
 
 
 def test_a_trend_that_explains_most_is_named() -> None:
-    x, y = grid()
-    ball, tilt = -(x**2 + y**2) / 400, 0.3 * x
+    ball, tilt = -(X**2 + Y**2) / 400, 0.3 * X
     for trend, kind in (
         (tilt, "plane"),
         (ball, "sphere"),
         (ball + tilt / 10, "sphere"),
-        (-(x**2) / 300 + tilt, "paraboloid"),
+        (-(X**2) / 300 + tilt, "paraboloid"),
         (-ball, "sphere"),
     ):
-        surface = cr.surface.Surface(trend + NOISE, (0.5, 0.7))
+        surface = cr.surface.Surface(trend + NOISE, PIXEL)
         assert f'explains 100 % of the variance of the heights: detrend="{kind}"' in str(
             surface.warnings
         )
@@ -137,8 +127,7 @@ def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
 
 def test_holes_become_soap_films() -> None:
     """A harmonic map comes back as it was, and no filled pixel is a maximum."""
-    x, y = grid()
-    saddle = x**2 / 0.25 - y**2 / 0.49  # harmonic for the pixels, too
+    saddle = X**2 / 0.25 - Y**2 / 0.49  # harmonic for the pixels, too
     holed = saddle.copy()
     holed[10:20, 5:30] = holed[30, 40] = np.nan
     assert_allclose(filled(holed), saddle, atol=1e-8 * np.ptp(saddle))

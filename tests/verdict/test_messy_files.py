@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from scene_files import Columns, cells, lines, put
+from scene_files import Columns, cells, lines, put, scene_text
 from scipy.io import savemat
 
 import convexrough as cr
@@ -24,21 +24,6 @@ PLACES = 5e-5 * (GRID + RNG.uniform(-0.2, 0.2, GRID.shape))
 HEIGHTS = RNG.uniform(-3e-7, 0, COUNT)
 XY = {"x": PLACES[:, 0], "y": PLACES[:, 1]}
 SUMMITS = XY | {"height": HEIGHTS}
-SCENE = """
-[sphere]
-radius = 0.01
-[material]
-{modulus}
-[asperities]
-pattern = "file"
-path = "summits.csv"
-geometry = "closest"
-tip_radius = 2e-4
-[normal]
-approach = 4e-7
-[units]
-{units}
-"""
 BODIES = """sphere = {youngs_modulus = 210e9, poisson_ratio = 0.3}
 base = {youngs_modulus = 70, poisson_ratio = 0.3}"""
 STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
@@ -93,8 +78,10 @@ def case(tmp_path: Path, command: Any) -> Case:
 
 
 def write_scene(modulus: str = STEEL, units: str = METRES) -> None:
-    ratio = "" if modulus is BODIES else "\npoisson_ratio = 0.3"
-    Path("scene.toml").write_text(SCENE.format(modulus=modulus + ratio, units=units))
+    file = 'pattern = "file"\npath = "summits.csv"\ngeometry = "closest"\ntip_radius = 2e-4'
+    material = modulus if modulus is BODIES else f"{modulus}\npoisson_ratio = 0.3"
+    text = scene_text(file, "approach = 4e-7", f"[units]\n{units}", "0.01", material)
+    Path("scene.toml").write_text(text)
 
 
 def matrix(columns: Columns) -> Any:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import cells, put, scene_text, write_loads
+from scene_files import cells, put, scene_text
+from scenes import rough
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -29,16 +30,6 @@ def read_loads(path: Path, scene: cr.Scene = SMALL, **how: Any) -> Claimed:
 def read(folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMALL) -> Claimed:
     """The loads of a file that holds this."""
     return read_loads(folder / put(folder, made, name), scene)
-
-
-@pytest.fixture(scope="module")
-def contact() -> cr.Contact:
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.006, height_std=1e-6, tip_radius_cv=0.1, seed=2
-    )
-    return cr.press(
-        cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"), approach=2e-5
-    )
 
 
 def refused(folder: Path, content: str | bytes) -> list[str]:
@@ -204,21 +195,19 @@ def test_shear_forces_with_statuses(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("offset", "fine"), [(0.009, True), (0.011, False)])
-def test_loads_at_a_slightly_different_place(
-    tmp_path: Path, contact: cr.Contact, offset: float, fine: bool
-) -> None:
-    path, scene = tmp_path / "loads.csv", contact.scene
-    moved = cr.Asperities(scene.asperities.positions + np.array([offset * 0.0025, 0]), 0.02)
-    there = cr.Scene(1.0, moved, scene.material, geometry="summit")
-    write_loads(path, there, contact.loads, range(len(moved)))
+def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine: bool) -> None:
+    path, scene = tmp_path / "loads.csv", rough()
+    loads = cr.press(scene, approach=2e-5).loads
+    x, y = scene.asperities.positions.T
+    put(tmp_path, {"x": x + offset * 0.0025, "y": y, "load": loads})
     if fine:
-        assert np.array_equal(read_loads(path, scene).values, contact.loads)
+        assert np.array_equal(read_loads(path, scene).values, loads)
         with pytest.raises(cr.InputError, match="to 1e-05"):
             read_loads(path, scene, tolerance=1e-5)
     else:
         with pytest.raises(cr.InputError, match=r"all are shifted by \[2.75e-05, 0\], .* 2.5e-05$"):
             read_loads(path, scene)
-        assert np.array_equal(read_loads(path, scene, tolerance=1e-4).values, contact.loads)
+        assert np.array_equal(read_loads(path, scene, tolerance=1e-4).values, loads)
 
 
 # Mistakes
@@ -276,10 +265,9 @@ def test_an_endless_line_is_refused(tmp_path: Path, unit: bytes) -> None:
 
 
 def test_summits(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
+    (tmp_path / "data").mkdir()
     content = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
-    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + content.encode())
+    (tmp_path / "data/summits.csv").write_bytes(b"\xef\xbb\xbf" + content.encode())
     # The path is relative to the scene file, wherever the command runs.
     (tmp_path / "scene.toml").write_text(scene_text('pattern = "file"\npath = "data/summits.csv"'))
     asperities = read_scene(tmp_path / "scene.toml").scene.asperities

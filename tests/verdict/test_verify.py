@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import fits, texts
-from scene_files import FRICTION, WITHIN, lines, rows, scene_text, write_loads
+from scene_files import FRICTION, WITHIN, lines, put, rows, scene_text
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
@@ -33,7 +33,8 @@ def claim(contact: cr.Contact, changes: dict[int, float] | None = None, factor: 
     for i, load in (changes or {}).items():
         loads[i] = load
     order = np.random.default_rng(1).permutation(len(loads))
-    return str(write_loads(Path("loads.csv"), contact.scene, loads, order))
+    x, y = contact.scene.asperities.positions[order].T
+    return put(Path(), {"x": x, "load": loads[order], "y": y})
 
 
 @pytest.mark.parametrize("scene", ["a.toml", "b.toml"])
