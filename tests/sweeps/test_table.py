@@ -103,11 +103,15 @@ def test_scenes_made_in_python() -> None:
         assert row == {"approach": contact.approach, "loss_0.3": loss}
 
 
+def failing(over: dict[str, Any]) -> dict[str, Any]:
+    """Radii of 61 asperities, for scenes of 61 and of 19."""
+    found = sweeping(over=over | {"asperities.within": [0.0102, 0.0052]})
+    found["asperities"]["tip_radius"] = [0.02] * 61
+    return found
+
+
 def test_a_scene_that_fails_has_a_row_that_says_why() -> None:
-    both = sweeping(over={"normal.load": [1e-7, 1e-30, 3e-7]}, together={})
-    both["asperities"] = {**both["asperities"], "tip_radius": [0.02] * 61}
-    both["sweep"]["over"]["asperities.within"] = [0.0102, 0.0052]  # of 61 and of 19 asperities
-    table = swept(both)
+    table = swept(failing({"normal.load": [1e-7, 1e-30, 3e-7]}))
     status, message, contact = numbers(table, "status", "message", "contact")
     assert status == ["certified", "failed"] * 3
     assert "tip_radius: found shape (61,), expected 19 values" in message[1]
@@ -119,14 +123,9 @@ def test_what_is_not_proved_is_said() -> None:
     graze = sweeping(over={"normal.approach": [0.0, 5e-5]})
     graze["normal"] = {}
     table = swept(graze)
-    assert numbers(table, "status", "message") == [
-        ["undecided", "certified"],
-        [
-            "not certified: undecided asperities: 1; "
-            "no asperity carries a load: check the sign and the unit of the approach",
-            "",
-        ],
-    ]  # fmt: skip
+    said = "not certified: undecided asperities: 1; "
+    said += "no asperity carries a load: check the sign and the unit of the approach"
+    assert numbers(table, "status", "message") == [["undecided", "certified"], [said, ""]]
 
 
 def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
@@ -213,9 +212,7 @@ def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.usefixtures("no_processes")
 def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: Path) -> None:
-    failing = sweeping(over={"asperities.within": [0.0102, 0.0052]})
-    failing["asperities"] = {**failing["asperities"], "tip_radius": [0.02] * 61}
-    (tmp_path / "a.toml").write_text(toml(failing))
+    (tmp_path / "a.toml").write_text(toml(failing({})))
     status, _, err = command("sweep", "a.toml", "--workers", "1")
     assert status == 4
     assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")

@@ -97,9 +97,8 @@ def test_json_and_files(command: Any, contact: cr.Contact, tmp_path: Path) -> No
     assert found == json.loads((folder / "verdict.json").read_text())
     written = rows(folder / "verdict.csv")[36]
     assert (written["claimed"], written["suspect"]) == ("open", "1")
-    assert command(*asked).refuses(
-        "found: not empty; --force replaces its results; or name another folder"
-    )
+    said = "found: not empty; --force replaces its results; or name another folder"
+    assert command(*asked).refuses(said)
 
 
 @pytest.mark.parametrize("scene", ["a.toml", "b.toml"])
@@ -113,8 +112,7 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
     turned = dict(enumerate(np.roll(contact.loads, 5).tolist()))
     elsewhere = command("verify", scene, claim(contact, turned))
     assert "hint: the loads are those of the solution, in another order" in elsewhere.err
-    outcome_of_any = command("verify", scene, claim(contact, factor=1e3), "--within", "1")
-    assert hint in outcome_of_any.err
+    assert hint in command("verify", scene, claim(contact, factor=1e3), "--within", "1").err
     if scene == "b.toml":
         assert ": ratio 1000\n" in outcome.out
         assert "the total load is not the prescribed one" in outcome.err
@@ -129,16 +127,14 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     assert "and 14 more: --json and --out list all" in outcome.out
     floored = command("verify", "a.toml", claim(contact, noisy), "--floor", "2e-20")
     assert (floored.status, floored.err) == (0, "")
-    below = claim(contact, {40: -1e-20})
-    assert command("verify", "a.toml", below).refuses(
-        "not negative; --floor 1e-20 counts noise as 0: "
-    )
-    assert command("verify", "a.toml", below, "--floor", "1e-20").status == 0
+    below = ("verify", "a.toml", claim(contact, {40: -1e-20}))
+    assert command(*below).refuses("not negative; --floor 1e-20 counts noise as 0: ")
+    assert command(*below, "--floor", "1e-20").status == 0
 
 
 def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: cr.Contact) -> None:
     """A file with statuses makes two claims about each asperity."""
-    texts, shown = np.array(contact.status), 1 + np.arange(61)
+    texts = np.array(contact.status)
     flags = np.where(texts == "open", "0", "1")
     for said, column, asperity, word in (
         *((texts, "status", asperity, word) for asperity, word in ((0, "open"), (60, "contact"))),
@@ -155,21 +151,20 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
             Path("loads.csv").write_text(lines({"load": contact.loads, column: statuses}))
             outcome = command("verify", "a.toml", "loads.csv")
             assert outcome.status == status
-            place = f"row {1 + shown[asperity]}, column {column.lower()}"
+            place = f"row {2 + asperity}, column {column.lower()}"
             told = f'{place}: found "{word.lower()}", expected "'
             assert (told in outcome.err) == (status == 2), outcome.err
-
-
-def shear_file(forces: Any, **more: Any) -> str:
-    Path("forces.csv").write_text(lines({"force": forces} | more))
-    return "forces.csv"
 
 
 def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     force = 0.25 * contact.load
     state = cr.shear(contact, force=force)
     asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
-    outcome = command(*asked, shear_file(state.forces))
+
+    def judged(forces: Any, *options: str, **more: Any) -> Any:
+        return command(*asked, put(Path(), {"force": forces} | more, "forces.csv"), *options)
+
+    outcome = judged(state.forces)
     assert (outcome.status, outcome.err) == (0, "")
     assert "shear forces      statuses proved; shear forces correct to within " in outcome.out
     opened, slid = np.array(state.status), np.array(state.status)
@@ -180,21 +175,19 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
         ("state", state.status, "found statuses, expected them in a column called st"),
         ("slip", np.zeros(61, int), "found flags, expected"),
     ):
-        assert command(*asked, shear_file(state.forces, **{column: values})).refuses(
-            f"column {column}: {expected}"
-        )
-    rounded = command(*asked, shear_file(0.998 * state.forces))
+        assert judged(state.forces, **{column: values}).refuses(f"column {column}: {expected}")
+    rounded = judged(0.998 * state.forces)
     assert "below f P, but not within 0.01 %: without a column status" in rounded.err
     for factor, said in ((-1, "have the other sign than"), (-1e3, "total and are 10^3"),
                          (1e-6, "are 10^-6 times what they should be: another unit, as MN for N?"),
                          (1.25, "are 1.25 times those of the solution")):  # fmt: skip
-        outcome = command(*asked, shear_file(factor * state.forces))
+        outcome = judged(factor * state.forces)
         assert outcome.status == 3
         assert "hint: the shear forces " in outcome.err
         assert said in outcome.err
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
-    outcome = command(*asked, shear_file(spoiled), "--json")
+    outcome = judged(spoiled, "--json")
     assert outcome.status == 3
     found = json.loads(outcome.out)
     assert found["verdict"]["holds"]
@@ -208,7 +201,7 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     other = cr.shear(contact, force=1.1 * state.force)
     right = np.abs(other.forces - state.forces) <= 1e-12 * state.forces.max()
     assert right[contact.loads > 0].any()
-    found = json.loads(command(*asked, shear_file(other.forces), "--json").out)
+    found = json.loads(judged(other.forces, "--json").out)
     assert found["shear_verdict"]["suspects"]
     assert not right[found["shear_verdict"]["suspects"]].any()
 
