@@ -5,7 +5,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -74,25 +74,10 @@ def browser() -> Iterator[Browser]:
         running.close()
 
 
-class Opened:
-    """A page in the browser, which must ask for nothing and complain of nothing."""
+class Opened(NamedTuple):
+    """A page in the browser."""
 
-    def __init__(self, browser: Browser, file: Path) -> None:
-        self.context = browser.new_context(viewport={"width": 1400, "height": 900})
-        self.context.set_default_timeout(5000)
-        self.page: Page = self.context.new_page()
-        self.asked: list[str] = []
-        self.complaints: list[str] = []
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(file.as_uri())
-        self.address = file.as_uri()
-
-    def close(self) -> None:
-        self.context.close()
-        assert self.asked == [self.address]
-        assert self.complaints == []
+    page: Page
 
     def text(self, name: str) -> str:
         return self.page.locator(f"#{name}").inner_text()
@@ -108,14 +93,22 @@ class Opened:
 
 @pytest.fixture
 def opened(browser: Browser, page: str, tmp_path: Path) -> Iterator[Opened]:
-    """The page, which follows asperity 36."""
-    (tmp_path / "slider.html").write_text(page, encoding="utf-8")
-    shown = Opened(browser, tmp_path / "slider.html")
-    options = shown.page.locator("#follow option").all_inner_texts()
+    """The page, which follows asperity 36, asks for nothing, and complains of nothing."""
+    file, asked, complaints = tmp_path / "slider.html", [], []
+    file.write_text(page, encoding="utf-8")
+    context = browser.new_context(viewport={"width": 1400, "height": 900})
+    context.set_default_timeout(5000)
+    shown = context.new_page()
+    shown.on("request", lambda request: asked.append(request.url))
+    shown.on("console", lambda message: complaints.append(message.text))
+    shown.on("pageerror", lambda error: complaints.append(str(error)))
+    shown.goto(file.as_uri())
+    options = shown.locator("#follow option").all_inner_texts()
     (label,) = [option for option in options if option.startswith("36:")]
-    shown.page.locator("#follow").select_option(label=label)
-    yield shown
-    shown.close()
+    shown.locator("#follow").select_option(label=label)
+    yield Opened(shown)
+    context.close()
+    assert (asked, complaints) == ([file.as_uri()], [])
 
 
 def near(values: Any) -> Any:

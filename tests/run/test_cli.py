@@ -20,27 +20,6 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     assert command("new", "no/such/folder.toml").status == 2
 
 
-def test_json_is_one_object_and_the_summary(run: Any, command: Any) -> None:
-    ran = run(scene_text(WITHIN), "--json", "--out", "deep/er")
-    assert (ran.status, ran.err) == (0, "")
-    summary = json.loads(ran.out)
-    assert summary == json.loads(Path("deep/er/summary.json").read_text())
-    assert (summary["schema"], summary["version"]) == (2, cr.__version__)
-    normal, proof = summary["normal"], summary["normal"]["certificate"]
-    counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
-    assert {key: normal[key] for key in counts} == counts
-    assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
-    assert normal["approach"] == 5e-5
-    assert normal["solver"] == "newton"
-    assert {"iterations", "seconds", "model_error", "crowding", "approach_error"} < set(normal)
-    assert proof["scope"] == "global"
-    assert proof["convexity_number"] == pytest.approx(0.504, abs=1e-3)
-    assert 0 < proof["load_error"] < 1e-10 * normal["load"]
-    assert proof["gap_error"] > 0
-    verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
-    assert json.loads(verified.out)["normal"]["certificate"].keys() == proof.keys()
-
-
 def test_paper(command: Any, tmp_path: Path) -> None:
     outcome = command("paper", "--json", "--no-figures", "--html")
     assert outcome.status == 0
@@ -111,11 +90,27 @@ def test_without_a_certificate(run: Any, command: Any) -> None:
     assert "warning: not certified" in verified.err
 
 
-def test_shear_cycle_and_history(run: Any) -> None:
-    """Every table of the scene is computed, and every file says what the package says."""
-    outcome = run(scene_text(more=EVERYTHING), "--json")
+def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
+    """As one object of JSON, which is the summary; in every table; and as text."""
+    text, folder = scene_text(WITHIN, more=EVERYTHING), Path("deep/er")
+    outcome = run(text, "--json", "--out", "deep/er")
     assert (outcome.status, outcome.err) == (0, "")
-    summary, folder = json.loads(outcome.out), Path("a-results")
+    summary = json.loads(outcome.out)
+    assert summary == json.loads((folder / "summary.json").read_text())
+    assert (summary["schema"], summary["version"]) == (2, cr.__version__)
+    normal, proof = summary["normal"], summary["normal"]["certificate"]
+    counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
+    assert {key: normal[key] for key in counts} == counts
+    assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
+    assert (normal["approach"], normal["solver"]) == (5e-5, "newton")
+    assert {"iterations", "seconds", "model_error", "crowding", "approach_error"} < set(normal)
+    assert proof["scope"] == "global"
+    assert proof["convexity_number"] == pytest.approx(0.504, abs=1e-3)
+    assert 0 < proof["load_error"] < 1e-10 * normal["load"]
+    assert proof["gap_error"] > 0
+    verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
+    assert json.loads(verified.out)["normal"]["certificate"].keys() == proof.keys()
+
     file = read_scene("a.toml")
     contact = file.press()
     limit = 0.5 * contact.load
@@ -142,8 +137,7 @@ def test_shear_cycle_and_history(run: Any) -> None:
 
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
     assert summary["history"]["loss"] == past.losses.tolist()
-    text = run(scene_text(more=EVERYTHING), "--force").out
-    assert re.search(r"^ *0\.5 .* 6 +31 +0$", text, re.M)
+    assert re.search(r"^ *0\.5 .* 6 +31 +0$", run(text).out, re.M)
 
 
 SWEEP = """
