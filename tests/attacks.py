@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import multiprecision
 import numpy as np
 from flint import arb, ctx
 from numpy.typing import NDArray

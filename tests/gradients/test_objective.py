@@ -93,5 +93,5 @@ def test_autograd() -> None:
 
 
 def test_a_force_without_use_is_refused() -> None:
-    with pytest.raises(cr.InputError, match="force: found .*, expected none, as the load does not"):
+    with pytest.raises(cr.InputError, match=r"force: found .*, expected none, as the load does"):
         of_loss(of="load", load=None, approach=5e-5)
