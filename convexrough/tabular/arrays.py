@@ -33,7 +33,7 @@ def reading(path: Path) -> Iterator[None]:
     except ConvexroughError:
         raise
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
+        raise FileError(f"{path}: not UTF-8 text, at byte {error.start}: save it as UTF-8") from error
     except UnicodeError as error:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:

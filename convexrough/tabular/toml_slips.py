@@ -41,7 +41,7 @@ _SLIPS = [
         r"(?P<text>[^\W\d][^\"'=#\[\]{}\u201c\u201d\u2018\u2019\u00bb]*?)"
         r"[\u201c\u201d\u2018\u2019\u00bb]?",
         '"{text}"',
-        "text in straight quotes",
+        "text in straight quotes, or a number",
     ),
     (r":\s*(?P<value>[^\s#].*?)", "{value}", "an equals sign instead of a colon"),
     (

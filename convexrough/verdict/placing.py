@@ -207,7 +207,7 @@ class Placing:
             )
             wrong = f"numbers from {least} to {most}: {question}"
         elif most - (first := min(least, 1)) >= count:
-            wrong = f"{most}, expected at most {count - 1 + first}, the last asperity"
+            wrong = f"{most}, expected at most {count - 1 + first}, the last asperity, or x and y"
         else:
             self.how = f"in the order of column {name or '1'}, from {first}"
             return index - first
