@@ -146,7 +146,8 @@ def summits(
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
-    from convexrough.run.results import results_folder
+    from convexrough.run.results import results_folder, versions
+    from convexrough.run.scene_file import digest
     from convexrough.surface import read, report
 
     how = Pressing(**{name: options.pop(name) for name in Pressing._fields})
@@ -155,7 +156,9 @@ def summits(
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
     folder = out or Path(f"{surface.stem}-summits")
     reads = [surface, *([how.scene] if how.scene else [])]
-    with results_folder(folder, force=force, reads=reads) as new:
+    inputs = {str(each): digest(each) for each in reads}
+    said: dict[str, Any] = {"inputs": inputs, "versions": versions()}
+    with results_folder(folder, force=force, reads=reads, **said) as new:
         with progress(f"reading {surface}"):
             scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
             with blamed_on(surface):

@@ -33,7 +33,8 @@ def reading(path: Path) -> Iterator[None]:
     except ConvexroughError:
         raise
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: not UTF-8 text, at byte {error.start}: save it as UTF-8") from error
+        found = f"not UTF-8 text, at byte {error.start}: save it as UTF-8"
+        raise FileError(f"{path}: {found}") from error
     except UnicodeError as error:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
