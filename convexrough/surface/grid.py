@@ -69,6 +69,11 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
         if min(heights.shape) > 2:
             _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
             _refuse_numbers(path, "column 1", heights[1:, 0], heights[1:, 1])
+            for place, of, grid in (("row", "columns", heights), ("column", "rows", heights.T)):
+                if np.allclose(grid[-1], grid[:-1].mean(axis=0), rtol=1e-6, atol=0.0):
+                    found = f"the means of the {of}"
+                    raise InputError(f"last {place}", found=found, expected="heights alone",
+                                     where=str(path))  # fmt: skip
         return _said(table.comments, heights)
     if table.header and width > 3:
         first = [table.style.number(cell) for cell in table.header.cells[1:]]
