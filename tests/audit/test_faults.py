@@ -1,39 +1,63 @@
-"""Commands that are killed, interrupted, out of room or in each other's way leave whole files.
+"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind.
 
-2 trials of `run` without figures and `new` by default, 300 of all commands with --full.
+By default 2 trials of `run` without figures and `new`, and 18 fresh mutants, which get an answer or
+a clear error, in time and in the memory they warrant; with --full 300 trials of all commands, and
+3,000 mutants. Each batch is a process of its own under limits of memory and processor time.
 """
 
+import json
 import os
 import random
 import subprocess
 import sys
 from pathlib import Path
 
-import faults
 import pytest
 from scene_files import scene_text
 
 from convexrough.atomic import remove_unfinished
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
+TESTS = Path(__file__).parent.parent
+
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
 
 
-def test_what_is_left(pytestconfig: pytest.Config) -> None:
-    """In a process of its own, without the threads of this one."""
-    quick = [seed for seed in range(30) if seed % 6 in (1, 5)]
-    figures = random.Random(pytestconfig.option.seed).sample(quick, 2)
-    which = range(300) if pytestconfig.option.full else figures
-    program = Path(faults.__file__)
-    path = os.pathsep.join([str(program.parent.parent), str(program.parent)])
+BATCH = 18
+
+
+def printed(program: str, *numbers: int) -> list[str]:
+    """By a program of the tests, in a process of its own, without the threads of this one."""
+    path = os.pathsep.join([str(TESTS.parent), str(TESTS)])
     done = subprocess.run(
-        [sys.executable, str(program), *map(str, which)],
+        [sys.executable, str(TESTS / program), *map(str, numbers)],
         env=os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
         capture_output=True, text=True, check=False, timeout=3600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-2000:]
-    assert len(done.stdout.splitlines()) == 1, done.stdout
+    return done.stdout.splitlines()
 
 
+@forks
+def test_what_is_left(pytestconfig: pytest.Config) -> None:
+    quick = [seed for seed in range(30) if seed % 6 in (1, 5)]
+    sample = random.Random(pytestconfig.option.seed).sample(quick, 2)
+    lines = printed("faults.py", *(range(300) if pytestconfig.option.full else sample))
+    assert len(lines) == 1, lines
+
+
+def test_mutants(pytestconfig: pytest.Config) -> None:
+    fresh = 10_000 + pytestconfig.option.seed * BATCH
+    seen: set[str] = set()
+    for first in range(0, 3_006, BATCH) if pytestconfig.option.full else [fresh]:
+        *fallen, counts = map(json.loads, printed("fuzz.py", first, first + BATCH))
+        assert fallen == []
+        assert sum(counts.values()) == BATCH
+        seen |= set(counts)
+    if pytestconfig.option.full:
+        assert {"status 0", "status 2"} <= seen
+
+
+@forks
 def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, command: object) -> None:
     """And of one that still runs, or of the user, nothing."""
     (tmp_path / "a.toml").write_text(scene_text())
@@ -52,6 +76,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
     assert all(path.exists() for path in kept)
 
 
+@forks
 def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
     code = limit + "from convexrough.cli import main; raise SystemExit(main(['new', 'a.toml']))"

@@ -53,43 +53,30 @@ def test_its_gradient(name: str) -> None:
     assert done == len(x)
 
 
-def test_jax() -> None:
-    jax = pytest.importorskip("jax", reason="needs the extra jax")
-    jax.config.update("jax_enable_x64", True)
+@pytest.mark.parametrize("package", ["jax", "torch", "autograd"])
+def test_in_other_packages(package: str) -> None:
+    """Bit by bit; torch only where it is installed: its wheel is as large as all that is needed."""
+    library = pytest.importorskip(package, reason=f"needs the extra {package}")
     objective = of_loss(("heights", "friction"))
-    function, x = objective.to_jax(), objective.start
+    function, x = getattr(objective, f"to_{package}")(), objective.start
     value, slopes = objective(x)
+    if package == "torch":
+        given = library.tensor(x.copy(), requires_grad=True)
+        (2.0 * function(given)).backward()
+        assert function(given).item() == value
+        np.testing.assert_array_equal(given.grad.numpy(), 2.0 * slopes)
+        return
+    if package == "jax":
+        library.config.update("jax_enable_x64", True)
+        several = np.stack([x, x * 1.001])
+        both = library.vmap(library.value_and_grad(function))(several)
+        np.testing.assert_array_equal(both[0], [objective(each)[0] for each in several])
+        np.testing.assert_array_equal(both[1][1], objective(several[1])[1])
+        np.testing.assert_array_equal(library.jit(library.grad(function))(x), slopes)
     assert float(function(x)) == value
-    np.testing.assert_array_equal(jax.jit(jax.grad(function))(x), slopes)
-    several = np.stack([x, x * 1.001])
-    both = jax.vmap(jax.value_and_grad(function))(several)
-    np.testing.assert_array_equal(both[0], [objective(each)[0] for each in several])
-    np.testing.assert_array_equal(both[1][1], objective(several[1])[1])
-    squared = jax.grad(lambda y: function(y) ** 2)(x)
+    np.testing.assert_array_equal(library.grad(function)(x), slopes)
+    squared = library.grad(lambda y: function(y) ** 2)(x)
     np.testing.assert_allclose(squared, 2 * value * slopes, rtol=1e-14)
-
-
-def test_torch() -> None:
-    """Where it is installed: the wheel for Linux is as large as all that the tests need else."""
-    torch = pytest.importorskip("torch", reason="needs the extra torch")
-    objective = of_loss(("heights", "friction"))
-    function = objective.to_torch()
-    x = torch.tensor(objective.start.copy(), requires_grad=True)
-    value, slopes = objective(objective.start)
-    (2.0 * function(x)).backward()
-    assert function(x).item() == value
-    np.testing.assert_array_equal(x.grad.numpy(), 2.0 * slopes)
-
-
-def test_autograd() -> None:
-    autograd = pytest.importorskip("autograd", reason="needs the extra autograd")
-    objective = of_loss(("heights", "friction"))
-    function, x = objective.to_autograd(), objective.start
-    value, slopes = objective(x)
-    assert function(x) == value
-    np.testing.assert_array_equal(autograd.grad(function)(x), slopes)
-    other = autograd.grad(lambda y: function(y) ** 2)(x)
-    np.testing.assert_allclose(other, 2 * value * slopes, rtol=1e-14)
 
 
 def test_a_force_without_use_is_refused() -> None:

@@ -115,18 +115,6 @@ def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
     assert (state.status == truth.status).all()
 
 
-def test_an_uncertified_contact_gets_no_status() -> None:
-    contact = replace(
-        pressed("paper"), certificate=replace(pressed("paper").certificate, scope="none")
-    )
-    for fraction in (0.1, 1.0):
-        state = shear_vector(contact, force=fraction * FRICTION * contact.load)
-        loaded = contact.loads > 0
-        assert (state.status[loaded] == "undecided").all()
-        assert state.certificate.scope == "none"
-        assert not state.certificate.holds
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("fraction", [1 - 1e-6, 1 - 1e-9, 1 - 1e-11])
