@@ -20,9 +20,6 @@ def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
     return read_scene(path)
 
 
-# What `within` is when the file does not say
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("pattern", ["hexagonal", "square"])
@@ -42,9 +39,6 @@ def test_the_default_within_loses_no_asperity(
     assert far.certificate.holds
     assert np.allclose(far.loads[:n], same.loads, rtol=1e-12, atol=0)
     assert not far.loads[n:].any()
-
-
-# Results
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -42,8 +42,6 @@ def refused(folder: Path, content: str | bytes) -> list[str]:
     return [line.removeprefix(f"{path}: ") for line in said]
 
 
-# As people have them
-
 ROWS = "0,0,1.5\n1,0,0\n0.5,2.5,2.5e-5\n"
 GERMAN = "x;y;load [N]\n0;0;1,5\n1;0;0\n0,5;2,5;2,5E-05\n"
 FILES = {
@@ -191,9 +189,6 @@ def test_shear_forces_with_statuses(tmp_path: Path) -> None:
     assert read_shear_forces(path, SMALL, Manner()).status is None
 
 
-# Positions
-
-
 @pytest.mark.parametrize(("offset", "fine"), [(0.009, True), (0.011, False)])
 def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine: bool) -> None:
     path, scene = tmp_path / "loads.csv", rough()
@@ -208,9 +203,6 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine
         with pytest.raises(cr.InputError, match=r"all are shifted by \[2.75e-05, 0\], .* 2.5e-05$"):
             read_loads(path, scene)
         assert np.array_equal(read_loads(path, scene, tolerance=1e-4).values, loads)
-
-
-# Mistakes
 
 
 @pytest.mark.sample(8)
@@ -250,18 +242,12 @@ def test_all_mistakes_at_once_with_their_lines(tmp_path: Path) -> None:
     assert many[-1] == "and 990 more mistakes"
 
 
-# Never a traceback, and nothing takes long
-
-
 @pytest.mark.parametrize("unit", [b"1", b"1,", b"1 ", b'"', b"x,", b"\xff", b"#"])
 @pytest.mark.sample(1)
 def test_an_endless_line_is_refused(tmp_path: Path, unit: bytes) -> None:
     with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
         read(tmp_path, b"load\n" + unit * (100_000_000 // len(unit)))
     (tmp_path / "loads.csv").unlink()
-
-
-# Files of asperities
 
 
 def test_summits(tmp_path: Path) -> None:
