@@ -37,7 +37,7 @@ from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_
 from convexrough.influence.slopes import pulls
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.scene.lattice import Lattice, Sites
+from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import Layout
 from convexrough.scene.neighbours import crowding, separations
 
@@ -97,14 +97,14 @@ class LatticeInfluence:
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
         """The box, and (n,) flat indices of the sites in an array with rows of padded length."""
-        basis, places = self.lattice.basis / self.spacing, self.places
-        if len(places) == 0:
+        basis, (i, j) = self.lattice.basis / self.spacing, self.places
+        if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
-        low, high = places.min(axis=0), places.max(axis=0)
-        rows, columns = (high - low + 1).tolist()
-        box = SiteBox((rows, columns), basis, _extent(places, (low + high) / 2.0, basis))
-        index = (places[:, 0] - low[0]) * np.intp(box.padded[1]) + (places[:, 1] - low[1])
-        return box, index
+        (row, column), (last_row, last_column) = (i.min(), j.min()), (i.max(), j.max())
+        shape = (int(last_row - row) + 1, int(last_column - column) + 1)
+        middle = (row + last_row) / 2.0, (column + last_column) / 2.0
+        box = SiteBox(shape, basis, _extent(i, j, middle, basis))
+        return box, (i - row) * np.intp(box.padded[1]) + (j - column)
 
     @property
     def box(self) -> SiteBox:
@@ -203,10 +203,11 @@ class LatticeInfluence:
         return entry_error(self.point_error, self.spacing * self._least)
 
     @property
-    def places(self) -> Sites:
-        """(n, 2) the site (i, j) of each asperity."""
+    def places(self) -> tuple[Indices, Indices]:
+        """The sites (i, j) of the asperities: (n,) i and (n,) j."""
         assert self.layout.sites is not None
-        return self.layout.sites[self.members]
+        i, j = self.layout.sites.T
+        return i[self.members], j[self.members]
 
     def restricted(self, which: Indices) -> LatticeInfluence:
         last: LatticeInfluence | None = self._spectra.get("restricted")
@@ -222,7 +223,8 @@ class LatticeInfluence:
         if places is None:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         together = np.concatenate((points, self.points))
-        layout = Layout(together, (self.lattice, np.concatenate((places, self.places))))
+        sites = np.concatenate((places, np.stack(self.places, axis=1)))
+        layout = Layout(together, (self.lattice, sites))
         joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
         return JointCoupling(joint, len(points))
 
@@ -395,11 +397,11 @@ def _least_symbol(lattice: Lattice) -> float:
     return least_symbol(lattice.basis / lattice.spacing)
 
 
-def _extent(places: Sites, middle: Array, basis: Array) -> float:
+def _extent(i: Indices, j: Indices, middle: tuple[float, float], basis: Array) -> float:
     """Upper bound on the distance of two sites: twice the largest distance from the middle."""
     (g11, g12), (_, g22) = basis @ basis.T
     largest = 0.0
-    for start in range(0, len(places), CHUNK):
-        i, j = (places[start : start + CHUNK] - middle).T
-        largest = max(largest, float((i * (g11 * i + 2.0 * g12 * j) + g22 * (j * j)).max()))
+    for start in range(0, len(i), CHUNK):
+        x, y = i[start : start + CHUNK] - middle[0], j[start : start + CHUNK] - middle[1]
+        largest = max(largest, float((x * (g11 * x + 2.0 * g12 * y) + g22 * (y * y)).max()))
     return 2.0 * float(np.sqrt(largest)) * (1.0 + 1e-9)
