@@ -58,13 +58,8 @@ class Reference:
 
 
 def solve(
-    positions: ArrayLike,
-    tip_radii: ArrayLike,
-    heights: ArrayLike,
+    scene: Any,
     *,
-    sphere_radius: float | tuple[float, float],
-    contact_modulus: float,
-    geometry: str = "summit",
     approach: float | None = None,
     load: float | arb | None = None,
     digits: int = 50,
@@ -72,10 +67,7 @@ def solve(
 ) -> Reference:
     """Solve one contact and prove it: all loads and gaps to `digits` significant digits.
 
-    positions : (n, 2) [length];  tip_radii, heights : (n,) [length], taller is positive
-    contact_modulus : E* = E / (2 (1 - nu^2)) [force / length^2]
-    sphere_radius : R, or one along x and one along y; inf is flat
-    geometry : "summit", or "closest" for contact points at r_i R / (R + rho_i)
+    scene : a `Scene`, of which only what is given is read, or what has the same names
     approach [length] or load [force] : what is prescribed, exactly one of the two
     start : (n,) loads [force] to begin Newton at, such as an approximate solution
 
@@ -87,13 +79,9 @@ def solve(
         raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
-        bends = curvatures(sphere_radius)
-        modulus = arb(float(contact_modulus))
-        control, tips = arb(approach if load is None else load), exact(tip_radii)
-        points, shape, law = assemble(
-            exact(positions), tips, exact(heights), bends, modulus, geometry
-        )
-        influence = coupling(points, modulus)
+        control = arb(approach if load is None else load)
+        points, shape, law = of_scene(scene)
+        influence = coupling(points, arb(float(scene.material.contact_modulus)))
 
         # A P >= 0, so an asperity with D_i <= 0 cannot touch: it is left out of the equations.
         able = np.full(len(shape), True) if by_load else ~(shape + control <= 0)
@@ -283,19 +271,15 @@ def slide(f: arb, nu: arb, full: Any, held: Any) -> Friction:
     return Friction(f * (above - below), slips, moved, energies, energies.sum(initial=ZERO))
 
 
-def curvatures(sphere_radius: float | tuple[float, float]) -> Balls:
-    """1 / Rx and 1 / Ry."""
-    radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
-    return np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
-
-
 def of_scene(scene: Any) -> tuple[Balls, Balls, Balls]:
-    """As `assemble`, of a scene."""
+    """As `assemble`; the sphere has one radius, or one along x and one along y, and inf is flat."""
+    R, asperities = scene.sphere_radius, scene.asperities
+    radii = R if isinstance(R, tuple) else (R, R)
     return assemble(
-        exact(scene.asperities.positions),
-        exact(scene.asperities.tip_radii),
-        exact(scene.asperities.heights),
-        curvatures(scene.sphere_radius),
+        exact(asperities.positions),
+        exact(asperities.tip_radii),
+        exact(asperities.heights),
+        np.array([ZERO if inf == each else 1 / arb(float(each)) for each in radii]),
         arb(float(scene.material.contact_modulus)),
         scene.geometry,
     )

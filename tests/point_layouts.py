@@ -35,11 +35,4 @@ def coincident(rng: np.random.Generator) -> np.ndarray:
     return np.concatenate((points, points + 10.0 ** rng.uniform(-12, -6, points.shape)))
 
 
-LAYOUTS = {
-    "disc": disc,
-    "clustered": clustered,
-    "two": two,
-    "line": line,
-    "jittered": jittered,
-    "coincident": coincident,
-}
+LAYOUTS = {each.__name__: each for each in (disc, clustered, two, line, jittered, coincident)}

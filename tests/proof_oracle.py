@@ -1,5 +1,6 @@
 """What a proof file claims, judged by the 50-digit reference; knows nothing of the checker."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import multiprecision
@@ -63,13 +64,12 @@ def _solved(scene: Any, radii: list[list[str]], control: Any) -> multiprecision.
     a = np.array([sum(map(float.fromhex, radius)) for radius in radii])
     modulus, sphere = float.fromhex(scene["contact_modulus"]), scene["sphere_radius"]
     along = tuple(map(float.fromhex, sphere if isinstance(sphere, list) else [sphere] * 2))
+    summits = SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights)
+    material = SimpleNamespace(contact_modulus=modulus)
     return multiprecision.solve(
-        np.stack([x, y], axis=1),
-        tips,
-        heights,
-        sphere_radius=along,
-        contact_modulus=modulus,
-        geometry=scene["geometry"],
+        SimpleNamespace(
+            asperities=summits, sphere_radius=along, material=material, geometry=scene["geometry"]
+        ),
         digits=DIGITS,
         start=4 * modulus * a**3 * (sum(1 / R for R in along) / 2 + 1 / tips) / 3,
         **control,

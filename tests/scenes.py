@@ -81,23 +81,14 @@ def _accepted(scene: cr.Scene, kind: Kind) -> bool:
 CASES = [(name, kind) for name, (scene, _) in NAMED.items() for kind in operators(scene)]
 
 
+#: The proved solution, of 50 digits if no others are asked for, from a `start` if given.
+solve_exactly = multiprecision.solve
+
+
 @cache
 def reference(scene: cr.Scene, **control: float) -> multiprecision.Reference:
-    """The proved 50-digit solution; kept, as several tests ask for the same one."""
+    """As `solve_exactly`; kept, as several tests ask for the same one."""
     return solve_exactly(scene, **control)
-
-
-def solve_exactly(scene: cr.Scene, **control: Any) -> multiprecision.Reference:
-    """As `reference`, from a `start` if given."""
-    return multiprecision.solve(
-        scene.asperities.positions,
-        scene.asperities.tip_radii,
-        scene.asperities.heights,
-        sphere_radius=scene.sphere_radius,
-        contact_modulus=scene.material.contact_modulus,
-        geometry=scene.geometry,
-        **control,
-    )
 
 
 def scattered(seed: int, count: int, crowding: float, roughness: float) -> tuple[cr.Scene, float]:

@@ -15,21 +15,10 @@ energy is convex, which is not tested here.
 from dataclasses import dataclass
 from typing import Any
 
+import multiprecision as mp
 import numpy as np
 from flint import arb, ctx
-from multiprecision import (
-    GUARD_DIGITS,
-    Balls,
-    NotProved,
-    coupling,
-    cube_root,
-    exact,
-    mid,
-    newton,
-    of_scene,
-    prove,
-    travel_of,
-)
+from multiprecision import Balls, NotProved, exact, mid
 
 import convexrough as cr
 
@@ -112,11 +101,11 @@ def solve_vectors(
 
     start : (n, 2) forces [force] near the solution;  displacement : (2,) near it
     """
-    with ctx.workdps(digits + GUARD_DIGITS):
+    with ctx.workdps(digits + mp.GUARD_DIGITS):
         problem, x = _problem(scene, loads, force, start, displacement)
         size = max(float(abs(value)) for value in x)
-        x = newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
-        return _state(problem, prove(problem, x, radius=arb(size) * arb(10) ** (-digits)))
+        x = mp.newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - mp.GUARD_DIGITS // 2))
+        return _state(problem, mp.prove(problem, x, radius=arb(size) * arb(10) ** (-digits)))
 
 
 def _problem(
@@ -125,14 +114,14 @@ def _problem(
     touching = [i for i, load in enumerate(loads) if load > 0]
     P = np.array([loads[i] for i in touching])
     E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
-    points, _, law = (each[touching] for each in of_scene(scene))
-    thresholds = law * cube_root(P * P)
+    points, _, law = (each[touching] for each in mp.of_scene(scene))
+    thresholds = law * mp.cube_root(P * P)
     friction = arb(scene.friction)
-    kernel = _kernel(points, coupling(points, E), nu / (2 - nu))
+    kernel = _kernel(points, mp.coupling(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
     q = exact(np.asarray(start)[touching].reshape(-1)) / friction
     X = (
-        exact(displacement) / travel_of(friction, nu)
+        exact(displacement) / mp.travel_of(friction, nu)
         if np.isfinite(displacement).all()
         else _near_the_limit(P, kernel, total)
     )
@@ -173,10 +162,6 @@ def _state(problem: VectorMap, x: Balls) -> VectorReference:
     forces = np.array([problem.force(i, each)[0] for i, each in enumerate(eta)])
     lengths = [(each @ each).sqrt() for each in eta]
     sliding = [bool(a > k) for a, k in zip(lengths, problem.thresholds, strict=True)]
-    slips = np.array(
-        [
-            each * (1 - k / a) if slides else each * 0
-            for each, a, k, slides in zip(eta, lengths, problem.thresholds, sliding, strict=True)
-        ]
-    )
+    beyond = [1 - k / a for a, k in zip(lengths, problem.thresholds, strict=True)]
+    slips = np.where(np.array(sliding)[:, None], np.array(beyond)[:, None] * eta, arb(0))
     return VectorReference(forces, slips, x[-2:], sliding)
