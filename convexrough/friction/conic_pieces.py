@@ -15,7 +15,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.sphere import hertz
 
-#: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5 and Z are their positions.
+#: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5, Z are the places of y3, y5, z.
 LIFT, Y3, Y5, Z = 7, 3, 5, 6
 
 #: Layers thinner than this fraction of the load are omitted; the solver's error is larger.
@@ -23,11 +23,11 @@ THIN = 1e-9
 
 
 class ConePiece(NamedTuple):
-    """A piece of W(T). Forces are over the load N of the asperity, lengths over k N^(2/3).
+    """A piece of W(T). Forces are divided by the load N of the asperity, lengths by k N^(2/3).
 
-    On a slipping piece the slip front L runs from `low` to `high`. There  T = force - rate L,  the
-    deflection is  own - rate L^(2/3)  and  W = own T + (3/5) rate^2 L^(5/3) + energy. On a stuck
-    piece  rate = 0,  |T - force| <= high  and
+    On a slipping piece the level L of the slip front runs from `low` to `high`. There
+    T = force - rate L,  the deflection is  own - rate L^(2/3),  and
+    W = own T + (3/5) rate^2 L^(5/3) + energy. On a stuck piece  rate = 0,  |T - force| <= high  and
     W = own (T - force) + (T - force)^2 softness / 2 + energy.
     """
 
@@ -80,7 +80,7 @@ class ConePiece(NamedTuple):
 
 
 def pieces_of(levels: Array, heights: Array, own: float, k: float) -> list[ConePiece]:
-    """The pieces of an asperity, from its memory curve before the step.
+    """The pieces of the energy of an asperity, from its memory curve before the step.
 
     levels, heights : (m,) vertices of this curve; no level exceeds `own`
     own : indentation of the asperity after the step, positive

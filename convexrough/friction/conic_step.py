@@ -1,4 +1,4 @@
-"""The general step as one second-order cone program: a check of Newton's method and of the rules.
+"""The general step as one second-order cone program, which checks the solution by Newton's method.
 
 The cones of `convexrough.convex.cones` represent each piece of the energy W(T) of an asperity
 (`conic_pieces`) exactly, and W is the convex hull of its pieces. Piece j has a weight w_j, which
@@ -29,7 +29,8 @@ from convexrough.sphere import hertz
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
-#: Tolerance of Clarabel, and largest part of the way to the cones' boundary that one step takes.
+#: Tolerance of the solver Clarabel, and the largest fraction of the way to the cones' boundary that
+#: one of its steps takes.
 TOLERANCE, STEP = 1e-11, 0.9
 
 
@@ -57,7 +58,7 @@ class StepProgram:
     which  : (n,) indices of the asperities in the scene
     loads, own : (n,) loads N_i and indentations after the step
     parts  : (n,) p_i, the fraction of the step during which the asperity touches
-    shells : (n,) a diagonal; the coupling plus this diagonal is positive semidefinite
+    shells : (n,) a diagonal; the compliance matrix plus this diagonal is positive semidefinite
     pieces : pairs of an asperity (its index among the n) and a piece of its energy
     """
 
@@ -73,7 +74,7 @@ class StepProgram:
 
     @classmethod
     def assemble(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:
-        """The program of a step. Raises SolverError if the shells exceed what the cones allow."""
+        """The program of a step. Raises SolverError if `shells` are too large for its cones."""
         which = np.flatnonzero(level.loads > 0)
         k, own = stepper.coefficients[which], level.indentations[which]
         gaps = np.maximum(-now.level.indentations[which], 0.0)

@@ -2,10 +2,10 @@
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
 after any path of (P, T) is a polygon: heights Th(s) over load levels 0 <= s <= P, from (0, 0) to
-the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes it by one
-of the three rules of docs/theory/paths.md, "The rules". The slip front is the level above which the
-segment has changed the polygon. The rules do not depend on elasticity. All numbers are rational, as
-float64 numbers are, and every rule is exact.
+the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes the
+polygon by the rules of docs/theory/paths.md, "The rules". The slip front is the level above which
+the segment has changed the polygon. The rules do not depend on elasticity. All numbers are exact
+fractions, so no rule rounds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
     sign   : the direction c of slip, 1 or -1
     slope  : slope th of the layer; the loss is proportional to 1 - c th
     top, bottom : [force] levels of the front before and after
-    load_before, load_after : [force] P before and after; it changes linearly with the level
+    load_before, load_after : [force] P before and after; P changes linearly with the front's level
     """
 
     sign: int
@@ -47,11 +47,12 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Plottable):
-    """A state after a path: a polygon over load levels, as in docs/theory/paths.md.
+    """The friction state after a path, as a polygon over load levels (docs/theory/paths.md).
 
     levels, heights : (m + 1,) [force] coordinates s and Th of the vertices, from the origin
     slopes : (m,) slope of each layer, between a vertex and the next
-    front  : [force] level of the slip front at the end of the last segment; None if nothing slips
+    front  : [force] level of the slip front at the end of the last segment; above it, this segment
+        has changed the polygon. None if nothing slips
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])
@@ -98,7 +99,7 @@ class MemoryCurve(Table, Plottable):
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:
-        """The level and the bend of each vertex: (s_k, c_k) in (1) of docs/theory/paths.md."""
+        """The level s_k of each vertex, and its bend c_k: the slope below it minus that above."""
         slopes = (Fraction(0), *self.slopes, Fraction(0))
         bends = [below - above for below, above in pairwise(slopes)]
         return list(zip(self.levels, bends, strict=True))
@@ -134,7 +135,7 @@ class MemoryCurve(Table, Plottable):
         return self._slip(sign, *self._crossing(sign, load, height))
 
     def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
-        """The state after running back along the top layer, down to `load` or the layer's end."""
+        """The state after unloading along the top layer, down to `load` or the layer's end."""
         last = len(self.slopes) - 1
         below = self._cut(last)
         if load <= self.levels[last]:
@@ -159,9 +160,10 @@ class MemoryCurve(Table, Plottable):
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
         """The state after slip of this sign on the segment, and the pieces of its loss.
 
-        A `part` of the segment is covered when the line of slope c through the moving point reaches
-        the lower end of a layer. Within a layer the part is linear in the level of the front. The
-        front passes layers of slope c at once.
+        The line of slope `sign` through the moving point (P, T) meets the old curve at the front.
+        When the front reaches the lower end of a layer, the fraction `part` of the segment is
+        covered. Within a layer this fraction is linear in the level of the front. The front passes
+        a layer of slope `sign` at once.
         """
         added = load - self.load
         rate = (height - self.height) - sign * added

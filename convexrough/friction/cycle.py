@@ -81,7 +81,7 @@ class Cycle(Table, Plottable):
     balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
         docs/theory/losses.md, as a check of rounding; nan if P varies or order fails
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
-        nu Poisson's ratio, G the shear modulus, a_H the contact radius of the smooth sphere
+        nu Poisson's ratio, G the shear modulus, a_H the contact radius of the sphere if smooth
     smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
         if no asperity is loaded, or if no smooth solution is known for the shape
     displacement_amplitude : [length] half the range of the displacement of one body relative to the
@@ -147,21 +147,21 @@ class Cycle(Table, Plottable):
 
     @property
     def partial_slip_losses(self) -> Array:
-        """(n,) [force length] part of `asperity_losses` that is due to partial slip."""
+        """(n,) [force length] `asperity_losses` that are due to partial slip."""
         return self._shares[0]
 
     @property
     def sliding_losses(self) -> Array:
-        """(n,) [force length] part of `asperity_losses` that is due to gross slip."""
+        """(n,) [force length] `asperity_losses` that are due to gross slip."""
         return self._shares[1]
 
     @property
     def asperity_losses(self) -> Array:
-        """(n,) [force length] energy lost at each asperity per cycle; nan where `order` fails.
+        """(n,) [force length] energy lost at each asperity per cycle; nan if `order` is "fails".
 
-        Where the load varies, these losses are integrals over 64 intervals, with two normal
-        solutions for each interval. Their errors are about 0.1 %; the proved bounds on these errors
-        are some per cent.
+        Where the load varies, these losses are integrals over about 64 intervals, each from normal
+        solutions at its ends. Their errors are about 0.1 %; the proved bounds on these errors are
+        some per cent.
         """
         return self._shares[2]
 
@@ -202,7 +202,7 @@ class Cycle(Table, Plottable):
 
     @property
     def loss_factor(self) -> float:
-        """loss / (2 pi U), U = force amplitude x displacement amplitude / 2; nan if nothing moves.
+        """loss / (2 pi U) with U = force amplitude * displacement amplitude / 2; nan if U = 0.
 
         Source: Ungar and Kerwin, J. Acoust. Soc. Am. 34 (1962) 954.
         """
@@ -216,7 +216,7 @@ class Cycle(Table, Plottable):
             points. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if the last asperities to slide start at one force.
+        approach is kept constant, or if several asperities are the last to slide, at one force.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -236,7 +236,7 @@ class Cycle(Table, Plottable):
         points     : approximate number of points; half of them on each branch
         asperities : indices of the asperities whose own loops are returned; default all
 
-        Raises InputError where the load varies.
+        Raises InputError if the load varies.
         """
         return loops([self], points, asperities)[0]
 
@@ -290,8 +290,8 @@ def cycle(
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
 
-    Raises InputError if the scene has no friction, the minimum exceeds the maximum, a force exceeds
-    the friction limit f P, or the displacement exceeds that of gross sliding.
+    Raises InputError if the scene has no friction, if the minimum exceeds the maximum, if a force
+    exceeds the friction limit f P, or if the displacement exceeds that of gross sliding.
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss:.4g}", (cycle.status == "sliding").sum())
@@ -373,7 +373,7 @@ def steady(
 
     loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
         segments between points are straight, and the last one returns to the first point
-    influence : compliance operator, as in `load_path`
+    influence : how the compliance matrix is stored, as in `press`
 
     Raises the errors of `load_path`.
 
@@ -418,7 +418,7 @@ class _Closed(Walk):
 
     @cached_property
     def stuck(self) -> Point:
-        """The point (L*, T*) of the module docstring."""
+        """The point (L*, T*) through which the memory curve always passes from cycle 2 on."""
         plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
         return (plus + minus) / 2, (plus - minus) / 2
 
@@ -428,7 +428,7 @@ class _Closed(Walk):
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """The loads of the levels that the steady cycle needs."""
+        """The loads of the normal solutions that the first and the steady cycle need."""
         pieces = self.first, self.later
         return levels_needed(self.steady, pieces) | {self.stuck[0], self.least}
 
@@ -458,7 +458,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """The result, from the losses of cycles 1 and 2, and the displacements of the points."""
+    """The result, from `spent`, the losses of cycles 1 and 2, and `moved`, the displacements."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
@@ -556,7 +556,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop through Q = maximum - 2 way as Q falls, and Q = minimum + 2 way as it rises."""
+    """The loop through the forces maximum - 2 way, as Q falls, and minimum + 2 way, as Q rises."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

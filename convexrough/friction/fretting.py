@@ -37,8 +37,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: The largest traction is sought at the radii a(s_k) and at about this number of other distances.
-#: At constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
+#: The largest traction is sought at the contact radii a(s_k) and at about this number of other
+#: distances r. At constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
 DISTANCES = 64
 
 
@@ -52,8 +52,8 @@ class Fretting(Table, Plottable):
         because slip while it is open is not known
     gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
         sticks, nan where "intermittent"
-    losses, loss_errors : [force length] energy lost per cycle, and bounds on its errors:
-        `Cycle.asperity_losses`. At varying load these are less exact than `Cycle.loss`
+    losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
+        bounds on their errors. If the load varies, they are less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
@@ -85,7 +85,7 @@ class Fretting(Table, Plottable):
 
 
 def fretting(cycle: Cycle) -> Fretting:
-    """The fretting of each asperity in a steady cycle, a result of `cycle` or `steady`.
+    """The fretting of each asperity in a steady cycle, which `cycle` or `steady` returns.
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True
@@ -134,7 +134,7 @@ def _largest(bends: Array, radii: Sequence[Array]) -> Array:
 
 
 def rim_gap(x: Array) -> Array:
-    """h(x): the gap of a Hertz contact of radius x r at the distance r, divided by r^2 / R."""
+    """h(x): the gap of a Hertz contact at the distance r, divided by r^2 / R; x r is its radius."""
     root = np.sqrt((1.0 - x) * (1.0 + x))
     return np.maximum(0.5 - x**2 + ((2.0 * x**2 - 1.0) * np.arcsin(x) + x * root) / np.pi, 0.0)
 

@@ -44,8 +44,9 @@ RECENT = 10
 #: The smallest and the largest number of steps per segment.
 FEWEST, MOST = 4, 64
 
-#: The steps are doubled until each loss, and the displacements, change by less than these
-#: fractions. A loss below NEGLIGIBLE times the largest may change by more.
+#: The number of steps is doubled until each loss changes by less than SETTLED of itself, and the
+#: displacements by less than SETTLED_MOTION of the largest. The change of a loss is compared with
+#: the loss plus NEGLIGIBLE times the largest loss.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
 
@@ -180,7 +181,8 @@ class Stepper:
 class SteppedPath(NamedTuple):
     """Results of general steps at m points, without proofs.
 
-    losses : (m,) [force length] energy lost since the start; nan if the doubling does not settle
+    losses : (m,) [force length] energy lost since the start; nan where doubling the number of steps
+        still changes it
     status : (m, N) "open" or "undecided"
     fronts : (m, N) indentation at the slip front of each asperity; its indentation if it sticks
     """
@@ -203,8 +205,8 @@ def followed(
     The loss W_n by n steps has an error of about e / n^2, with some constant e. The loss returned
     is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
 
-    steps : number of steps per segment, with which the loss is W_n; None doubles the number until
-        losses and displacements settle
+    steps : number n of steps per segment; the loss returned is then W_n. None doubles the number
+        until losses and displacements settle, up to 64
     """
     by = (stepper or Stepper)(levels)
 
@@ -256,7 +258,7 @@ class _Iterate(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """The largest defect, or, if larger, the displacement that would correct the total."""
+        """The largest defect or the displacement that corrects `excess`, whichever is larger."""
         stiffness, rounding = float(self.slopes.sum()), len(self.eta) * ROUNDOFF
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
         beyond = abs(self.excess) > rounding * float(np.abs(self.own.forces).sum())
@@ -279,7 +281,7 @@ class _Iterate(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """The equations of a step from a state to a level of the normal load."""
+    """The equations of a step from the state `now` to the normal solution `level`."""
 
     stepper: Stepper
     now: Bundle
@@ -296,7 +298,10 @@ class _Trial(NamedTuple):
         return cls(stepper, now, level, own, now.curves.cut(own), parts)
 
     def even(self, total: float) -> tuple[Array, float]:
-        """Start values of eta and x: each asperity carries the same part of its friction limit."""
+        """Start values of eta and x: each asperity is deflected by the same fraction of its limit.
+
+        This limit is the indentation, and the fraction is `total` divided by the load.
+        """
         wanted = total / self.level.load * self.indentations - self.now.deflections
         eta = np.divide(wanted, self.parts, out=np.zeros(len(wanted)), where=self.parts > 0)
         return eta, float(eta @ self.level.loads / self.level.load)

@@ -4,10 +4,10 @@ Levels are in the scaled units of the normal problem (`normal.problem`). The uni
 f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
 coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
 
-A rational number [force] identifies a level. If the load is prescribed, this number is the total
-load of the level. If the approach is prescribed, the load P is only known to thirty digits. Then
-the float64 number p nearest to P identifies P, and p - x identifies the load P - x.
-The number 0 always identifies the load 0.
+A rational number [force] identifies a level. If the load of the contact is prescribed, this number
+is the total load of the level. If the approach is prescribed, the load P of the contact is known to
+about thirty digits. Then the float64 number p nearest to P identifies P, and p - x identifies the
+load P - x. The number 0 always identifies the load 0.
 """
 
 from __future__ import annotations
@@ -125,9 +125,9 @@ class FrictionLevels:
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
-        """[force] P - Q / f for the shear force Q at which first loading has displaced by X >= 0.
+        """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 from rest.
 
-        The level there has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
+        The level of this load has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
         exceeds the displacement of gross sliding.
         """
         if not displacement <= self.farthest * (1 + 1e-14):
@@ -245,9 +245,9 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
 
     Order means that no indentation falls as the load rises. The result is "proved", "proved for one
     step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse the
-    proof. For some asperities, mostly at the edge of the contact, the proof needs a search, which
-    takes some milliseconds for each. Without this call the search is made for at most 1,000
-    asperities, and only if at most 10,000 touch.
+    proof. For some asperities, mostly at the edge of the contact, the proof needs a search of some
+    milliseconds per asperity. Other functions search for at most 1,000 asperities, and only if at
+    most 10,000 touch.
 
     most : largest number of asperities for which the search is made; at most ten times as many may
         touch
@@ -284,5 +284,5 @@ def exactly(values: Sequence[Fraction]) -> Ball:
 
 
 def rounded(ball: Ball) -> tuple[Array, Array]:
-    """The centres of a ball as float64 numbers, and bounds on their errors."""
+    """The centres of the balls as float64 numbers, and bounds on their errors."""
     return frozen(np.array(ball.value)), frozen(np.array(ball.error))

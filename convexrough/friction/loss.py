@@ -1,12 +1,12 @@
 """The energy loss by slip: of each asperity, of the whole contact, and along a path.
 
-docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2, with the coefficient of
-friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
-level L (above the front, slip has changed the memory curve), the loss per unit of L is
-(1 - c th) (-dB/dL). Here th is the slope of the memory curve at L, c the direction of slip, and B
-the sum of B_i(P, L) in (2) of that page. By (1) of that page,
-B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. All of this assumes order: no indentation falls as
-the load rises.
+docs/theory/losses.md derives the formulas. Losses are divided by c_t f^2, with the coefficient of
+friction f and Mindlin's ratio c_t. The slip front is the load level above which slip has changed
+the memory curve. While the total load is P and the front falls through the level L, the loss per
+unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at L, c the direction of
+slip (1 or -1), and B the sum of B_i(P, L) in (2) of that page. By (1) of that page,
+B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)], with the approach D0 and its integral V over the
+load. All of this assumes order: no indentation falls as the load rises.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Pair: TypeAlias = tuple[Fraction, Fraction]
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """The parts (k, n) of all B_i due to partial slip and to sliding, for k pairs P and L."""
+    """(k, n) the parts of B_i due to partial slip, and those due to sliding, for k pairs P, L."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -50,7 +50,7 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B by (1) of docs/theory/losses.md: twice the error of the trapezoid rule on D0."""
+    """B(P, L): twice the integral of D0 from L to P minus twice its value by the trapezoid rule."""
     run = high.load - low.load
     return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
 
@@ -94,7 +94,7 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) integrals I of -dB/dL over pieces on which the load changes.
 
-    (4) of docs/theory/losses.md, with the intervals for D, m and M that follow it.
+    They follow from (4) of docs/theory/losses.md, with the intervals for D, m and M given there.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -125,7 +125,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _stiffest(level: Level) -> float:
-    """A lower bound on 2 E* a of the largest contact. The slope of D0 is at most 1 / (2 E* a)."""
+    """A lower bound on 2 E* a, with the largest contact radius a: dD0/dL <= 1 / (2 E* a)."""
     k = level.problem.exact.coefficients.upper
     stiffness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
     return float(stiffness.max(initial=0.0)) * (1 - SAFETY)
@@ -151,8 +151,8 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     cells : total number of cells into which the pieces with a varying load are cut
 
     The loss in a cell lies between the losses for the loads at the two ends of the cell
-    (docs/theory/losses.md, "A front while the load changes"). The returned means have relative
-    errors of about cells^-2; the proved bounds on these errors are about 1 / cells.
+    (docs/theory/losses.md, "A front while the load changes"). The results are the means of both.
+    Their relative errors are about cells^-2; the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends

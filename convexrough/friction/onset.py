@@ -1,8 +1,9 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
-On first loading asperity i slides once the level P - Q / f is below its onset: the load L at which
-its indentation n_i(L) is 0. Newton's method finds the onset, and two proofs enclose it: that the
-asperity is open at a slightly smaller load, and that it touches at a slightly larger one.
+P is the load, Q the shear force and f the coefficient of friction. The onset of asperity i is the
+total load L at which its indentation n_i(L) is 0. On first loading the asperity slides once
+P - Q / f is below its onset. Newton's method finds the onset, and two proofs enclose it: the
+asperity is open at a slightly smaller load, and it touches at a slightly larger one.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ MOST_ONSETS = 256
 #: Relative distances from the computed onset at which proofs are tried, the closest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: Levels that are known already are used if they are nearer than TRIED[ENOUGH] to the onset.
+#: A level (normal solution) that is known already is tried first if its relative distance from the
+#: onset is at most TRIED[ENOUGH].
 ENOUGH = 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, that ends them.
@@ -47,10 +49,10 @@ class Onset(NamedTuple):
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
-    In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds this
-    force. The result is nan for an asperity without load. It is also nan if the order (see
-    `prove_order`) "fails" between the load at which the asperity first touches and the load of the
-    contact; the asperity may then start to slide at another force.
+    In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
+    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. It
+    is also nan if the indentation of some asperity falls while the load rises from the first touch
+    of this asperity to the load of the contact: it may then start to slide at another force.
 
     which : indices of the asperities, in the order of the result; default all. Each asperity needs
         several normal solutions
@@ -86,7 +88,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
-    """The onsets of asperities that touch at P; a bound that is not proved is 0 or P."""
+    """The onsets of asperities that touch at P; 0 or P replaces a bound that is not proved."""
     depths = levels.top.indentation.value[levels.top.problem.places[which]]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
@@ -136,7 +138,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def _short(load: Fraction) -> Fraction:
-    """The load rounded to a sum of two float64 numbers, so that the fraction has few digits."""
+    """The load as a sum of two float64 numbers: a rounded fraction with a short numerator."""
     high = Fraction(float(load))
     return high + Fraction(float(load - high))
 

@@ -79,7 +79,8 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
-#: A computed rate below -RATE_ROUNDING counts as negative. SOLVED: tolerance in solving for rates.
+#: A computed rate below -RATE_ROUNDING counts as negative. Rates are solved for to the relative
+#: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: If at most INVERTED asperities touch, an inverse gives the weights and costs no more than the
@@ -137,7 +138,7 @@ def order_between(
 
 
 def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """True if the upper level proves order down to the lower one, by (a) and (b).
+    """True if the upper level proves order down to the lower level, by (a) and (b) above.
 
     rising : (n,) true for asperities that may touch at the highest load of the path
     most   : as in `order_between`
@@ -171,7 +172,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` for m pairs of levels, the upper ones at the highest load of a path."""
+    """(m,) `proved_between` for m pairs of levels, if each upper level has the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
     entry_error = np.empty((len(span.c), 1))
     for some, problem in rows.coupled:
@@ -286,7 +287,7 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if each asperity is proved open at `lower`, or is `rising` and proved deeper above."""
+    """True unless each asperity is proved open at `lower`, or is rising and proved deeper above."""
     if upper.solution is None:
         return True
     if lower.solution is None:

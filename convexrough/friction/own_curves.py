@@ -1,10 +1,10 @@
 """The memory curves of asperities, each in the plane of its own indentation and deflection.
 
 This module writes docs/theory/paths.md, "The rules", as one formula. The curve after a straight
-step follows from the old curve and the end (s1, t1) of the step alone, because the front only moves
-down, and layers above the present indentation are forgotten. Cut the old curve at the smaller of
-the old and the new indentation, and let h be its heights. Unless the asperity sticks, the new curve
-ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
+step follows from the old curve and the end (s1, t1) of the step alone: the slip front only moves
+down, and the part of a curve above the present indentation is dropped. Cut the old curve at the
+smaller of the old and the new indentation, and let h be its heights. If the asperity slips, the new
+curve ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
 
     L - c h(L) = s1 - c t1,
 
@@ -24,7 +24,7 @@ from convexrough.sphere import hertz
 
 
 class OwnCurves(NamedTuple):
-    """The curves of n asperities: polygons of m vertices; the last vertex may be repeated.
+    """The curves of n asperities, as polygons of m vertices; the last vertex may be repeated.
 
     coefficients : (n,) k of Hertz's law
     levels, heights : (n, m) indentations and deflections at the vertices
@@ -82,7 +82,7 @@ class OwnCurves(NamedTuple):
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
     def _front(self, sign: Array, wanted: Array) -> _Front:
-        """The points of the curves at which  level - sign height  reaches `wanted`, (n,)."""
+        """The point on each curve at which  level - sign * height  reaches `wanted` (n,)."""
         keys, rows = self.levels - sign[:, None] * self.heights, np.arange(len(sign))
         below = (keys < wanted[:, None]).sum(axis=1)
         after = np.clip(below, 1, keys.shape[1] - 1)
@@ -101,7 +101,7 @@ class OwnCurves(NamedTuple):
         return _Front(after, level, height, load, force)
 
     def _ended(self, front: _Front, *ends: Array) -> OwnCurves:
-        """The curves up to the front, and a line from there to these ends."""
+        """The curves up to the front, then a line to `ends`: levels, heights, loads and forces."""
         columns, after = np.arange(int(front.after.max()) + 2), front.after[:, None]
         kept = np.minimum(columns, self.levels.shape[1] - 1)
         parts = (

@@ -1,6 +1,6 @@
 """`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
 
-docs/theory/paths.md derives the method, the memory curve.
+The friction state is a memory curve, a polygon over load levels: docs/theory/paths.md derives it.
 """
 
 from __future__ import annotations
@@ -49,12 +49,13 @@ class LoadPath(Table, Plottable):
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] total load down to which the slip front has moved on the latest
-        segment that changes P or Q; nan if nothing slips there
-    status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
+    fronts         : (m,) [force] level of the slip front: the load level above which the latest
+        segment that changes P or Q has changed the memory curve; nan if nothing slips on it
+    status         : (m, n) for the latest segment: "stuck" (no slip), "partial" (a disc sticks),
+        "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
-    order          : "proved" if it is proved that no indentation falls as the load rises between
-        the total loads that the path uses; other values as in `Cycle`
+    order          : "proved": no indentation falls as the load rises, between any two total loads
+        at which normal solutions are used; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
 
@@ -119,7 +120,7 @@ class LoadPath(Table, Plottable):
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
             of the last loss is 1, and all others are 0
-        holding : quantity kept constant, as in `Contact.gradient`. Derivatives by anything but
+        holding : quantity kept constant, as in `Contact.gradient`. All derivatives except those by
             `forces` are at constant forces Q, not at constant Q / (f P)
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
@@ -147,10 +148,10 @@ def load_path(
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
-    influence : compliance operator; None for the cheapest that is exact
-    general_steps : number of steps per segment of a method that does not need order
-        (docs/theory/without-order.md). Its results are not proved. None uses the memory curve, or,
-        if an indentation falls as the load rises, as many general steps as needed
+    influence : how the compliance matrix is stored, as in `press`; None chooses by speed
+    general_steps : number of general steps per segment. These steps hold also if an indentation
+        falls as the load rises (docs/theory/without-order.md), but their results are not proved.
+        None uses the memory curve, or, if an indentation falls, 4 to 64 general steps per segment
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.

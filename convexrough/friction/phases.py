@@ -33,14 +33,15 @@ class PhaseLosses(Table, Plottable):
 
         P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    Arrays have one value for each ellipse: all phases of the first factor, then of the next.
+    An ellipse has one phase and one factor. Arrays start with all phases of the first factor.
 
     phases, factors : (c,) phase [rad], and factor of both amplitudes
     losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
         replace the ellipse
     loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
         the chords
-    smooth  : (c,) [force length] losses of the smooth sphere; nan if no smooth solution is known
+    smooth  : (c,) [force length] losses of the shape without roughness; nan if no solution of the
+        smooth contact is known
     levels  : (c,) [force] L*, as in `Cycle.level`
     sliding : (c,) number of asperities that slide or lose contact in every cycle
     order   : the weakest `Cycle.order` of all cycles
@@ -91,9 +92,9 @@ def phase_losses(
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
     phases  : (m,) [rad] from -pi to pi
     factors : (k,) factors by which both amplitudes are multiplied
-    chords  : number of chords per ellipse. They reduced the loss by a fraction of at most
-        12 / chords^2 in tests
-    influence : compliance operator, as in `load_path`
+    chords  : approximate number of chords per ellipse. In tests the loss was smaller than that of
+        the ellipse by a fraction of at most 12 / chords^2
+    influence : how the compliance matrix is stored, as in `press`
 
     Raises the errors of `elliptic_path` and `steady`.
 

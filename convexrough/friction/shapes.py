@@ -24,12 +24,12 @@ def elliptic_path(
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase  : [rad] from -pi to pi; at 0 the axes of the ellipse are those of P and Q, at pi/2 it is
-        a straight line (P and Q in phase)
+    phase  : [rad] from -pi to pi. At 0 the axes of the ellipse are parallel to those of P and Q; at
+        pi/2 the ellipse is a straight line, as P and Q are in phase
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so that `Cycle.level` is exact
-    chords : approximate number of chords. They reduced the loss by a fraction of at most
-        12 / chords^2 in tests
+    chords : approximate number of chords that replace the ellipse. In tests the loss was smaller
+        than that of the ellipse by a fraction of at most 12 / chords^2
 
     Raises InputError for other phases, or if `friction` is not positive.
     >>> loads, forces = cr.elliptic_path(

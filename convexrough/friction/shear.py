@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: An asperity keeps the status "sliding" if the error bound of its given force is smaller than this
-#: fraction of the friction limit f P_i.
+#: An asperity keeps the status "sliding" of the solution if the error bound of its given force is
+#: smaller than this fraction of the friction limit f P_i.
 NEAR_SLIDING = 1e-2
 
 
@@ -133,7 +133,7 @@ class ShearState(Table, Plottable):
             too; `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if there is no derivative. In gross sliding there is none if the approach
-        is kept constant, or if the last asperities to slide start at one force.
+        is kept constant, or if several asperities are the last to slide, at one force.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -168,8 +168,8 @@ def shear(
         at most 16 * 2^-53, it counts as f P, which means gross sliding
     displacement : [length] relative tangential displacement of distant points
 
-    Raises InputError if the scene has no friction, |Q| exceeds f P, or the displacement exceeds
-    that of gross sliding; SolverError if a normal problem is not solved.
+    Raises InputError if the scene has no friction, if |Q| exceeds f P, or if the displacement
+    exceeds that of gross sliding; SolverError if a normal problem is not solved.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")

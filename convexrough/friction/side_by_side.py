@@ -1,8 +1,9 @@
 """Comparison of three methods for a load path: agreement and time.
 
-The memory curve needs monotonic indentations. The general step, solved by Newton's method, does
-not; the conic step minimises the same energy as a cone program (docs/theory/without-order.md). Both
-take one step per segment, which is exact where indentations are monotonic.
+The memory curve holds only if no indentation falls as the load rises. The general step
+(docs/theory/without-order.md) holds without this condition; Newton's method solves it. The conic
+step minimises the energy of the same step as a cone program. Both take one step per segment, which
+is exact if no indentation falls as the load rises.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ Way = Literal["general step", "memory curve", "conic step"]
 class PathEntry(Record):
     """The result of one method for a load path.
 
-    way     : the method
-    outcome : "answered"; "refused": the method does not apply to the scene; or "failed"
+    way     : the method: "general step", "memory curve" or "conic step"
+    outcome : "answered", "refused" (the method does not apply to the scene) or "failed"
     message : the reason why there is no result; else ""
     path    : the result; None if there is none
     force_disagreement : largest difference of a shear force Q_i from the first method that

@@ -1,8 +1,9 @@
 """Friction states as sums of normal solutions, weighted with slope changes of the memory curve.
 
-(1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of
-the bodies. The same sum over the indentations n_i (minus gaps where open) is the own deflection of
-an asperity plus its drift. (1) of docs/theory/states.md is the special case of first loading.
+Equation (1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the
+displacement X of the bodies. The same sum over the indentations n_i (minus the gap where open) is
+the own deflection of an asperity plus its drift, the displacement relative to the opposite surface.
+Equation (1) of docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 class States(NamedTuple):
     """m states of N asperities in the scene's units, and proved bounds on their errors.
 
-    displacements : (m,) X
-    forces        : (m, N) Q_i
+    displacements : (m,) X, of the bodies
+    forces        : (m, N) Q_i, shear forces of the asperities
     asperity_displacements : (m, N) own deflection plus drift
     drifts        : (m, N) displacement relative to the opposite surface, also while open
     """
@@ -102,7 +103,7 @@ def displacements_of(levels: FrictionLevels, sums: LevelSums) -> Ball:
 def states_of(
     levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
 ) -> States:
-    """The states of these curves, for the asperities `which` (default: all) in this order."""
+    """The states of these curves, for the asperities `which` in this order; default all."""
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
@@ -119,7 +120,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from proofs at P and the front."""
+    """(N,) the status of each asperity, from what is proved at the load and at the slip front."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)
@@ -131,7 +132,7 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) each given status where its mask is true, else "open" if proved, else "undecided"."""
+    """(N,) the status whose mask in `proved` is true; else "open" if proved, or "undecided"."""
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"
@@ -142,7 +143,7 @@ def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) 
 
 
 def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
-    """(N,) [length] contact radii 3 P^(1/3) / (4 k E*) at a level, and bounds on their errors."""
+    """(N,) [length] contact radii 3 P_i^(1/3) / (4 k_i E*) at a level, and bounds on the errors."""
     modulus = Ball.exact(levels.scene.material.contact_modulus)
     root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
     radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus

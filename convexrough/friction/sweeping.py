@@ -39,7 +39,7 @@ from convexrough.roundoff import ROUNDOFF
 # All numbers here are heuristics.
 
 #: Numbers of neighbours: for weights of least energy, and for each of several searches for weights
-#: of least total. Each search adds the constraint that the result of the last one violated most.
+#: of least total. Each search adds the constraint that the last search's result violated most.
 NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
 
 #: The constraints of weights of least total are at the NEAR nearest asperities, and at one in each
@@ -53,13 +53,13 @@ STEPS, LEAST = 40, 1e-8
 #: Largest number of searches for weights of least energy; each drops neighbours of weights below 0.
 SEARCHES = 8
 
-#: Number of directions in which the extent of the support is computed, and the count of float64
-#: numbers that are in memory at once.
+#: Number of directions in which the extent of the support is computed, and the approximate number
+#: of float64 numbers that are in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
-    """(n,) lower bounds on y(C) for all 0 <= C <= C~.
+    """(n,) lower bounds on the rates y(C) for all diagonal C with 0 <= C <= C~.
 
     All are -inf if any bound on the support is not positive, or if the support has fewer than two
     asperities (then row sums of A C~ are enough).
@@ -94,7 +94,7 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
 
 
 def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
-    """make(*rows), computed for so many rows at once that about NUMBERS numbers are in memory."""
+    """make(*rows), computed in parts of so many rows that about NUMBERS numbers are in memory."""
     some = max(1, NUMBERS // cost)
     parts = range(0, max(1, len(rows[0])), some)  # one at least, if empty
     return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
@@ -102,7 +102,7 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """An operator whose unit charges are swept onto the shells of a support, of radii (n,)."""
+    """Potentials of unit charges at asperities, swept onto `shells`: radii (n,), on the support."""
 
     influence: Influence
     support: Indices
@@ -159,7 +159,7 @@ class _Swept:
         return np.where(found, self.lost / 2, -np.inf)
 
     def lightest(self, which: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and their weights of least energy; all are 0 if none are found."""
+        """(m, s) neighbours, and their weights of least energy; 0 if no such weights are found."""
         near = self.neighbours(which, NEIGHBOURS)
         return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
 
@@ -229,7 +229,7 @@ class _Swept:
         return weights
 
     def _spread(self, which: Indices, nearest: Indices) -> Indices:
-        """(m, k) one asperity of the support per sector of each ring; `nearest` if it is empty."""
+        """(m, k) an asperity of the support in each sector of each ring; `nearest` if none is."""
         away = self.places[self.support] - self.places[which][:, None]
         itself = self.support == which[:, None]
         apart = np.abs(np.where(itself, self.extent, away))
@@ -244,7 +244,7 @@ class _Swept:
         return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) bounds 1 - q_i, -inf where all weights are 0; and the k of (1) that sets q_i."""
+        """(m,) bounds 1 - q_i, -inf where all weights are 0; and the k at which (1) is tight."""
         from scipy.sparse import csr_array
 
         total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
@@ -267,7 +267,7 @@ class _Swept:
         return rates, worst
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
-        """(m, k) distances between asperities; between equal ones, the entry of `themselves`."""
+        """(m, k) distances between asperities; from one to itself, the entry of `themselves`."""
         from scipy.spatial.distance import cdist
 
         apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))

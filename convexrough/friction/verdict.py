@@ -25,7 +25,7 @@ CLAIMS_SLIDING = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """Comparison of claimed shear forces with what is proved about first loading.
+    """Comparison of claimed shear forces with what is proved about the state on first loading.
 
     forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] the prescribed sum Q of the shear forces
@@ -62,7 +62,7 @@ class ShearVerdict(Claim, Record):
 
     @property
     def largest(self) -> float:
-        """[force] the largest size of a claimed force, or the largest limit f P_i if all are 0."""
+        """[force] the largest |claimed force|, or the largest limit f P_i if all claims are 0."""
         limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())
         return super().largest or limit
 
@@ -110,7 +110,7 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Comparison of shear forces from any source with what is proved about first loading.
+    """Comparison of shear forces from any source with the proved state on first loading.
     forces  : (n,) [force] shear forces in the order of the scene's asperities
     force   : [force] the prescribed sum Q of the shear forces
     within  : largest error allowed, as a fraction of the largest force

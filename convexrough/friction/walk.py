@@ -1,8 +1,9 @@
 """A path of (P, T = Q / f) with its levels, states and losses: the basis of all friction results.
 
-States are sums over the levels of the memory curve, losses are integrals over the pieces of each
-segment (`curve.Piece`). If an indentation falls as the load rises, general steps compute the
-results, without proofs.
+P is the load, Q the shear force, f the coefficient of friction; a level is the normal solution at
+one load. States are sums over the levels of the memory curve. Losses are integrals over the pieces
+of each segment (`curve.Piece`). If an indentation falls as the load rises, general steps compute
+the results, without proofs.
 """
 
 from __future__ import annotations
@@ -31,7 +32,10 @@ from convexrough.roundoff import SAFETY
 class Walk:
     """A path from a memory curve through m points, with straight segments between them.
 
-    steps   : number of general steps per segment; None: general steps only if order fails
+    levels  : the normal solutions of the contact
+    start   : the memory curve before the first segment
+    points  : the m points (P, T)
+    steps   : number of general steps per segment; None takes general steps only if order fails
     stepper : solver of the general steps
     """
 
@@ -59,7 +63,7 @@ class Walk:
 
     @cached_property
     def order(self) -> Order:
-        """What is proved about order from the lowest of the needed levels up to P."""
+        """What is proved about order, from the lowest of the needed loads to the contact's load."""
         return self.levels.order(self.needed)
 
     @cached_property
@@ -112,7 +116,7 @@ def levels_needed(curves: Sequence[MemoryCurve], costs: Iterable[Iterable[Piece]
 
 
 def _cumulated(each: Ball) -> Ball:
-    """(m,) the cumulative sums."""
+    """(m,) the cumulative sums of m balls."""
     total, error, sums = Pair(0.0, 0.0), 0.0, []
     for high, low, radius in zip(
         *(part.tolist() for part in (*each.mid, each.radius)), strict=True
