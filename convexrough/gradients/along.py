@@ -1,8 +1,9 @@
 """Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
 
-docs/theory/gradients.md, "Along a path", explains the method: the path is compared with a path on
-which one load P_k or one T_k = Q_k / f is shifted by SHIFT, in exact arithmetic. Let l be the level
-of the original path that corresponds to a level L, and S = dD0/dL. To first order in the shift
+docs/theory/gradients.md, "Along a path", explains the method. The path is compared with a path on
+which one load P_k, or one T_k = Q_k / f, is shifted by SHIFT; Q_k is a shear force, f the
+coefficient of friction, and the arithmetic is exact. Let L be a load level of the shifted path, l
+the corresponding level of the original path, and S = dD0/dL. To first order in the shift
 
     V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l).
 """
@@ -26,8 +27,8 @@ from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.gradients.pulled import ZERO, Moves, Part
 
-#: The shift of loads and forces, and the distance below which levels of the two paths correspond,
-#: both divided by the largest load. SHIFT is less than any difference of float64 numbers.
+#: The shift of P_k or T_k, and the distance below which levels of the two paths correspond, both
+#: divided by the largest load. SHIFT is less than any difference of two float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: The weights of V, D0 and S at one level in a weighted sum.
@@ -45,7 +46,10 @@ NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
 class LevelWeights(NamedTuple):
-    """Weights of V, D0 and S at each level, for losses / (c_t f^2) and displacements / (c_t f)."""
+    """Weights of V, D0 and S at each level, for losses / (c_t f^2) and displacements / (c_t f).
+
+    f is the coefficient of friction, c_t Mindlin's ratio.
+    """
 
     losses: dict[Fraction, Weights]
     displacements: dict[Fraction, Weights]
@@ -54,8 +58,8 @@ class LevelWeights(NamedTuple):
         """Add the loss (1 - c th) I on a piece (`friction.loss`), multiplied by a weight.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
-        b = (P0 - P1) / (L0 - L1) and the mean M of D0 from P1 to P0. The load is P and the slip
-        front L; 0 marks the start of the piece and 1 its end.
+        b = (P0 - P1) / (L0 - L1) and the mean M of D0 over loads from P1 to P0. P is the load, L
+        the level of the slip front; 0 marks the start of the piece and 1 its end.
         """
         weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
@@ -88,8 +92,9 @@ class LevelWeights(NamedTuple):
 
 @dataclass(frozen=True)
 class Along:
-    """A path through points, with weights of the losses and displacements.
+    """A path through points, with weights of its losses and displacements.
 
+    known : the normal solutions of the contact
     start : [force] load at which the path begins, without shear
     steps : the segments and weights
     loads, heights : [force] P and T at the points
@@ -105,7 +110,7 @@ class Along:
     def of(
         cls, known: FrictionLevels, start: Fraction, steps: Steps, loads: Array, forces: Array
     ) -> Along:
-        """The path through points with these P and Q."""
+        """The path through points with these loads P and shear forces Q."""
         pairs = list(zip(map(Fraction, loads.tolist()), forces.tolist(), strict=True))
         heights = [height_at(load, force, known.scene) for load, force in pairs]
         return cls(known, start, steps, [load for load, _ in pairs], heights)
@@ -171,10 +176,10 @@ class Along:
         return total * times
 
     def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
-        """The derivatives (m,) along directions, times `factor`; (m, 2) those from below and above.
+        """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
 
-        A derivative is the mean of both sides if these agree within their error bounds. It is nan
-        if the sides differ or one does not exist.
+        The one-sided values are those from below and from above. A derivative is the mean of both
+        if they agree within their error bounds. It is nan if they differ or one does not exist.
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]

@@ -36,15 +36,15 @@ WHOLE = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(Record):
-    """A change of the parameters of a scene and of the load. The default of each is no change.
+    """A change of a scene's parameters and of what is prescribed. By default nothing changes.
 
     heights, tip_radii : [length] (n,), or one number for all asperities
     positions : [length] (n, 2), or one number for all coordinates
     sphere_radius : [length]
     contact_modulus : [force / length^2] at constant Poisson's ratio
-    load      : [force]
-    approach  : [length]; give at most one of load and approach. If neither is given, the prescribed
-        one does not change
+    poisson_ratio : at constant contact modulus
+    load      : [force] total load; give at most one of load and approach
+    approach  : [length]. If neither load nor approach is given, the prescribed one does not change
     friction, force : coefficient of friction and shear force [force]; only for friction states
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
@@ -95,10 +95,10 @@ class ContactChange(Table):
 class ShearChange(Table):
     """First-order changes of a friction state when the scene, load or shear force changes.
 
-    pressed : changes of the contact
+    pressed : changes of the pressed contact (loads, gaps, approach)
     forces  : (n,) [force] shear forces, in the scene's order
     slips   : (n,) [length] gross slips, in the scene's order
-    displacement : [length] tangential displacement of the bodies relative to each other
+    displacement : [length] tangential displacement of one body relative to the other
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print(f"{state.change(cr.Direction(force=1e-9)).displacement:.4g}")
@@ -116,7 +116,7 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """The result of `Contact.change`. Raises InputError if friction or shear force changes."""
+    """The result of `Contact.change`. Raises InputError if the friction or shear force changes."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
@@ -158,7 +158,7 @@ def _pressed(
 
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
-    """(n,) [length] changes dg = A dP + dA P - dd - dD0 of open gaps, in float64; 0 for others."""
+    """(n,) [length] changes of open gaps, dA P + A dP - dd - dD0, in float64; 0 for closed ones."""
     scene, open_ones = contact.scene, contact.loads == 0.0
     if not open_ones.any():
         return np.zeros(len(scene))
@@ -174,7 +174,7 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
 
 
 def shear_change(state: ShearState, direction: Direction) -> ShearChange:
-    """The result of `ShearState.change`, from the changes of the levels P and L = P - Q / f."""
+    """The result of `ShearState.change`, from the changes at the loads P and P - Q / f."""
     contact = state.contact
     checks.instance("direction", direction, Direction)
     sheared = Frictional.of(state)
@@ -207,7 +207,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
 
 
 class _Moved(NamedTuple):
-    """The changes of P, n, D0 and the total load of a level, in scaled units."""
+    """The changes of loads P, indentations n, approach D0 and total load, in scaled units."""
 
     loads: Ball
     indentation: Ball
@@ -270,7 +270,7 @@ class _Bent:
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:
-    """(n, 2) checked changes of positions; one number stands for all."""
+    """(n, 2) checked changes of positions, from such an array or from one number for all."""
     expected = f"({n}, 2) finite numbers: x and y of each asperity"
     moved = checks.numbers("positions", positions, expected)
     if moved.shape not in ((), (n, 2)):

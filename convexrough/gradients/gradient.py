@@ -1,8 +1,8 @@
 """`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
 
-The number is a weighted sum of energies V, approaches D0, loads and indentations at some load
-levels (`gradients.pulled`). The total loads of these levels depend on the prescribed loads and
-shear forces and on the coefficient of friction.
+The number is a weighted sum of energies V, approaches D0, loads and indentations at some levels.
+A level is the normal solution at one total load (`gradients.pulled`). These total loads depend on
+the prescribed loads and shear forces, and on the coefficient of friction.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class Number(NamedTuple):
     value    : J
     scaled   : the part of J that consists of energies and loads. If the modulus and all loads are
         multiplied by a number, this part is multiplied by the same number
-    pulled   : for each level the derivatives of its part of J by the load, and by offsets, local
-        coefficients and compliances of the candidates
+    pulled   : for each level, the derivatives of its part of J by the load, and by offsets, Hertz's
+        coefficients and compliances of the asperities that could touch
     slopes   : derivatives of J by parameters outside the scene's geometry, by name
-    steep    : if J contains D0 at the load 0, the factors of dD0/dL, which is infinite there
+    steep    : for each such name, the factor of dD0/dL at the load 0, where dD0/dL is infinite
     sides    : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
     """
 
@@ -86,7 +86,10 @@ class Number(NamedTuple):
         return self._replace(value=value, scaled=scaled, pulled=pulled, slopes=both)
 
     def holding_the_approach(self) -> Number:
-        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P."""
+        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P.
+
+        The bar names what is constant: the approach D0 or the load P. S is dD0/dP.
+        """
         slopes, units = dict(self.slopes), self.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
@@ -99,18 +102,18 @@ class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
-    derivative is at constant values of the other parameters listed here. Shear forces Q are kept
-    constant; their fractions of f P, or a prescribed displacement, are not. If instead the
-    displacement X is kept constant, a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is
-    the derivative of W by the amplitude of the cycle, twice that by `maximum`. X_Q is the
-    derivative of X by `force`, from the gradient of the `shear` state whose force is the amplitude
-    of the cycle.
+    derivative is at constant values of the other parameters named here. So shear forces Q are
+    constant, but neither their fractions Q / (f P) nor the displacements are. If instead the
+    displacement amplitude X of a symmetric cycle is constant, its loss W changes by
+    dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is the derivative of W by the amplitude of Q, twice
+    that by `maximum`. dX|Q and X_Q, the derivative by `force`, are from the gradient of the `shear`
+    state whose force is the amplitude of the cycle.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
     contact is not proved at some load that the number depends on. With more than 1,000 loaded
-    asperities and no stored matrix they are also infinite for positions and, in the geometry
-    "closest", for radii. An infinite derivative, in gross sliding, has the error 0.
+    asperities and no stored matrix, bounds for positions are also infinite, and in the geometry
+    "closest" bounds for radii, too. An infinite derivative, in gross sliding, has the error 0.
 
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant
@@ -126,9 +129,9 @@ class Gradient(Table, Plottable):
     maximum, minimum : derivatives by the largest and smallest shear force of a cycle
     forces, loads   : (m,) derivatives by the forces and loads of a history or path; nan where the
         derivatives from below and above differ, as at a repeated point
-    force_sides, load_sides : (m, 2) these derivatives from below and above
+    force_sides, load_sides : (m, 2) the derivatives by `forces` and `loads` from below and above
     balance_defect  : difference between two formulas for the derivative by the modulus, divided by
-        the largest term of both; a check of rounding
+        the largest term of both formulas; a check of rounding
 
     >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
     >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")
@@ -225,8 +228,9 @@ class Gradient(Table, Plottable):
     def normalised(self) -> Gradient:
         """The gradient of `Cycle.loss_normalised` = W / W0, from the gradient of a cycle's loss W.
 
-        At constant approach the load P in W0 varies. Raises InputError for gradients of other
-        numbers, and for shapes of which no smooth solution is known.
+        W0 is the energy scale of `Cycle.loss_normalised`; at constant approach its load P varies.
+        Raises InputError for gradients of other numbers, and for shapes of which no smooth solution
+        is known.
         """
         if self.maximum is None:
             expected = "the gradient of the loss of a cycle"
@@ -265,7 +269,7 @@ class Gradient(Table, Plottable):
 
 
 def _balance_defect(number: Number, found: Derivatives) -> float:
-    """Relative defect of  E* dJ/dE* + sum over levels of L dJ/dL = `number.scaled`."""
+    """Relative error in the identity  E* dJ/dE* + sum over levels of L dJ/dL = `number.scaled`."""
     bent, by_coupling = found.local.sum() * -2.0 / 3.0, -found.coupled
     terms = [bent, by_coupling, -number.scaled, *(each.load * each.total for each in number.pulled)]
     defect = float(sum(terms, start=ZERO).value)

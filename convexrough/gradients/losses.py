@@ -25,8 +25,8 @@ UNKNOWN = Ball.around(1.0, np.inf)
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     """The result of `Cycle.gradient`.
 
-    At constant load the loss W is (1) of docs/theory/losses.md. Otherwise W is the loss of the
-    second cycle on the path.
+    At constant load the loss W is given by (1) of docs/theory/losses.md. At varying load W is the
+    sum over the pieces of the second cycle (`Along`).
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
     holding = control_held(contact, holding)
@@ -59,7 +59,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
 
 
 def _loss(number: Number, order: Order) -> Number:
-    """The given `Number`, a loss; its error bounds become infinite unless order is proved."""
+    """The given `Number`, a loss, with infinite error bounds if order is not proved."""
     return number if order == "proved" else number.times(UNKNOWN, {})
 
 
@@ -93,7 +93,10 @@ def path_gradient(
 def _gradient(
     sheared: Frictional, along: Along, holding: Holding, *, paths: bool, order: Order
 ) -> Gradient:
-    """The gradient of a weighted sum along a path; if `paths`, with derivatives by all loads."""
+    """The gradient of a weighted sum along a path.
+
+    paths : True to add the derivatives by the loads of all points
+    """
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)

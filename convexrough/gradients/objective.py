@@ -32,7 +32,7 @@ ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach",
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Objective(Record):
-    """A result for a scene as a function of a vector of parameters, with the gradient.
+    """A result for a scene as a function of a vector of parameters, with its gradient.
 
     scene : the scene, with the values of all parameters that are not in the vector
     of    : the result: "loss" of the symmetric cycle with the amplitude `force`, "displacement"
@@ -43,11 +43,11 @@ class Objective(Record):
     load  : [force] the prescribed load, or None
     approach : [length] the prescribed approach, or None
     force : [force] shear force, or amplitude of the cycle
-    influence : compliance operator, as in `press`
+    influence : how the compliance matrix is stored, as in `press`
 
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
-    Divide value and gradient by the initial value: scipy's tolerances are absolute, and a loss may
-    be 1e-13.
+    For scipy, divide both by the initial value: its tolerances are absolute, and a loss may be
+    1e-13.
     `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
@@ -127,7 +127,7 @@ class Objective(Record):
         return gradient.value, np.concatenate(slopes)
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
-        """The `Gradient` of the number at these parameters."""
+        """The `Gradient` of the result at these parameters (m,), by all parameters of the scene."""
         given = dict(self._split(parameters))
         scene, control = self._scene(given), {}
         for name in PRESCRIBED:
@@ -146,19 +146,19 @@ class Objective(Record):
         return contact.gradient(load=1.0)
 
     def to_jax(self) -> Callable[[Any], Any]:
-        """The number as a function for jax. Raises ExtraError if jax is not installed."""
+        """The result as a function for jax. Raises ExtraError if jax is not installed."""
         from convexrough.gradients.with_jax import differentiable
 
         return differentiable(self)
 
     def to_torch(self) -> Callable[[Any], Any]:
-        """The number as a function for torch. Raises ExtraError if torch is not installed."""
+        """The result as a function for torch. Raises ExtraError if torch is not installed."""
         from convexrough.gradients.with_torch import differentiable
 
         return differentiable(self)
 
     def to_autograd(self) -> Callable[[Any], Any]:
-        """The number as a function for autograd. Raises ExtraError if it is not installed."""
+        """The result as a function for autograd. Raises ExtraError if it is not installed."""
         from convexrough.gradients.with_autograd import differentiable
 
         return differentiable(self)
@@ -201,7 +201,7 @@ class Objective(Record):
 
 
 def _loss(contact: Contact, force: float | None) -> Gradient:
-    """The gradient of the loss of the cycle from -force to force; InputErrors name `force`."""
+    """The gradient of the loss of the cycle between -force and force; InputErrors name `force`."""
     if force is not None:
         checks.non_negative("force", force)
     try:
@@ -213,7 +213,7 @@ def _loss(contact: Contact, force: float | None) -> Gradient:
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter; `force` is the maximum and minus the minimum of a cycle."""
+    """The derivative by a parameter; for "force" of a cycle, that by maximum minus by minimum."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

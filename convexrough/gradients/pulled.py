@@ -1,9 +1,10 @@
 """Derivatives of a number at one load level, as balls in the scaled units of the level.
 
 A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
-indentations n (minus the gap where open), and energy V. It depends on the offsets d, the local
-coefficients k and the compliance matrix A. (1), (2) and (4) of docs/theory/gradients.md give its
-derivatives; the weights v and w, and lambda, are those of (4).
+indentations n (minus the gap where open), and energy V. It depends on the offsets d, the
+coefficients k of Hertz's law and the compliance matrix A. (1), (2) and (4) of
+docs/theory/gradients.md give its derivatives; the names v, w and lambda in this module are those
+of (4).
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ Moves: TypeAlias = Mapping[str, Ball]
 class Part:
     """The part of a number that comes from one level: a weighted sum of V, D0, P and n.
 
-    energy, approach : weights of V and D0, in the unit of the number over that of the level
-    loads, indentations : (n,) weights of P and n, in the unit of the number over that of the level
+    energy, approach : weights of V and D0
+    loads, indentations : (n,) weights of P and n
+    All weights turn scaled units of the level into the unit of the number.
     moves : derivatives of the level's total load by parameters of the number
     """
 
@@ -64,7 +66,8 @@ class Part:
 class Pulled(NamedTuple):
     """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a `Part`.
 
-    offsets, local, left, load : these coefficients; the first three are (n,)
+    offsets, local, left : (n,) coefficients in this derivative
+    load  : coefficient of the change dL of the total load L
     loads, coupled : (n,) P and A P
     total : L
     steep : weight of D0 if L = 0, where the derivative dD0/dL is infinite
@@ -116,7 +119,7 @@ class Pulled(NamedTuple):
 
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
-    """Coefficients of dd and dL at the load 0, where D0 = -d of the first asperity to touch."""
+    """Coefficients of dd and dL at the load 0: there D0 is -d_i of the first asperity to touch."""
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
@@ -128,7 +131,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 
 
 def product(level: Level, weights: Ball) -> Ball:
-    """A times weights; the sum of their radii is multiplied by the largest entry of A."""
+    """A times weights, with error bounds: the sum of their radii times the largest entry of A."""
     problem = level.problem
     coupled = problem.product(weights.mid)
     if weights.radius.any():

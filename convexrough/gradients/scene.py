@@ -1,14 +1,14 @@
 """Derivatives by the parameters of a scene, as balls.
 
 They follow from the derivatives by offsets d, coefficients k and the compliance matrix A,
-dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, and from
+dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, with the loads P, and from
 
     d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
     A_ij = 1 / (pi E* |c_i - c_j|).
 
-An asperity has the summit r = (x, y) at the height z and the tip radius rho. The base has the
-curvature 1/R along each axis; in k it is the mean of both. In the geometry "summit" b = 1/R and
-the contact points are c = r; in "closest" b = 1 / (R + rho) and c = r / (1 + rho/R)
+An asperity has the summit r = (x, y) at the height z and the tip radius rho. The base has a
+curvature 1/R along each axis, x and y; in k, 1/R is the mean of both. In the geometry "summit",
+b = 1/R, and the contact points are c = r. In "closest", b = 1 / (R + rho) and c = r / (1 + rho/R)
 (docs/theory/gradients.md, "Derivatives by the data of a scene").
 """
 
@@ -121,10 +121,12 @@ class Geometry:
         )
 
     def slopes(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
-        """For each vector P, (m, 2) sums -scale sum_j (c_i - c_j) P_j / r_ij^3.
+        """(m, 2) for each vector P, the sums  -scale sum_j (c_i - c_j) P_j / |c_i - c_j|^3.
+
+        scale is 1 / (pi E*), in scaled units.
 
         loads : vectors P, (m,) each, of the asperities `which`. For more than PAIRWISE asperities
-            the sums are computed in float64, and without a stored matrix no error bound is known
+            the sums are computed in float64, and error bounds are infinite if no matrix is stored
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)
@@ -204,7 +206,7 @@ class Derivatives:
 
     @cached_property
     def coupled(self) -> Ball:
-        """The sum of left'A P over all levels, with `left` of each level's `Pulled`."""
+        """The sum of  left'A P  over all levels, with `left` from the `Pulled` of each level."""
         return sum((each.left.dot(each.coupled) for each in self.pulled), start=ZERO)
 
     @cached_property
@@ -215,7 +217,7 @@ class Derivatives:
         return self.turning * geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
-        """(n,) for each asperity the derivative along its change `by` of the geometry."""
+        """(n,) for each asperity, the derivative along the change `by` of its geometry."""
         found = self.offsets * by.offsets + self.local * by.local
         return found + (self.turning * by.points).sum() if self.geometry.closest else found
 

@@ -76,7 +76,10 @@ class Frictional:
         return self.known.at(self.known.load - height)
 
     def moves(self, height: Ball, /, **shares: float) -> Moves:
-        """Derivatives of L = P - T by load, friction and forces; `shares` are dQ by each force."""
+        """Derivatives of L = P - T, T = Q / f, by load, friction and forces.
+
+        shares : derivative of Q by each force, by name
+        """
         by_force = -1.0 / self.known.force_unit
         rates = {name: by_force * share for name, share in shares.items()}
         return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
@@ -179,7 +182,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
 def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
     """The level at which the indentation n of a candidate is 0, and dn/dL at this level.
 
-    The load of the level is a ball that contains the root of n, and n rises on all of it.
+    The load L of the level is an interval that contains the root of n; n increases on all of it.
     """
     known, named = levels(sheared.contact), sheared.known
 
@@ -202,7 +205,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """(n,) weights of gaps: 0 where touching; where undecided, balls with 0 and the weight."""
+    """(n,) weights of gaps: 0 where touching; where undecided, intervals from 0 to the weight."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
@@ -213,7 +216,7 @@ def _where_open(level: Level, weights: Array) -> Ball:
 
 
 def _wider(level: Level, which: Indices) -> Level:
-    """The same level with more asperities `which`, which are open, among its candidates."""
+    """The same level with the asperities `which` as further, open candidates."""
     problem = level.problem.widened(which)
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)
@@ -225,7 +228,7 @@ def _wider(level: Level, which: Indices) -> Level:
 
 
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
-    """The checked weights: numbers, or arrays (n,) for asperities; 0 for those not given."""
+    """The checked weights: numbers, or arrays (n,) for asperities; 0 in place of None."""
     if all(value is None for value in weights.values()):
         expected = "weights of at least one of these results"
         raise InputError(", ".join(weights), found="none", expected=expected)
