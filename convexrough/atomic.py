@@ -1,4 +1,4 @@
-"""Files that are written completely or not at all, and JSON without infinities."""
+"""Files that replace earlier ones only when they are complete, and JSON without infinities."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str | bytes) -> Path:
-    """Write a file and return its path."""
+    """Write a text as UTF-8, or bytes, to a file; return the path of the file."""
     with replacing(path) as temporary:
         temporary.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path

@@ -15,18 +15,22 @@ from convexrough.errors import InputError
 #: Smallest and largest size of a number in a scene's units; float64 holds products of such numbers.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: What an error message says is expected, if a number is outside these limits.
+#: The description of valid numbers in the error message for a number outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
 class Kind(NamedTuple):
-    """A kind of number: its name in error messages, and the condition on finite numbers."""
+    """A check of a number. Calling it with a name and a value returns the value as a float.
+
+    expected : description of valid numbers, for error messages
+    holds    : function that is True for a finite number if this number is valid
+    """
 
     expected: str
     holds: Callable[[float], bool]
 
     def __call__(self, what: str, value: float | None) -> float:
-        """The value as a float; raises InputError unless it is of this kind and size."""
+        """The value of `what` as a float; raises InputError if it is not valid or `is_sized`."""
         number = _number(what, value, self.expected)
         if not (math.isfinite(number) and self.holds(number)):
             raise InputError(what, found=number, expected=self.expected)
@@ -89,10 +93,11 @@ def array(
     smallest: float = 0.0,
     one: str = "asperity",
 ) -> Array:
-    """A read-only copy of a vector. A number stands for `length` equal values.
+    """A read-only copy of a vector; raises InputError for values that are not valid.
 
+    length : required number of values; a single number stands for this many equal values
     sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : the noun, in messages, for the things that have one value each
+    one  : noun in messages for that which has one value, as in "one per asperity"
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
@@ -130,7 +135,7 @@ def same_index(**given: Any) -> None:
 
 
 def in_order(what: str, values: Any) -> None:
-    """Raise InputError for a pandas object whose index 0, 1, ... is not in increasing order."""
+    """Raise InputError for a pandas object whose index is 0, 1, ..., n - 1 in another order."""
     if hasattr(values, "iloc"):
         index = np.asarray(values.index)
         counts = index.dtype.kind in "iu" and (np.sort(index) == np.arange(len(index))).all()

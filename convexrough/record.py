@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """Base of results; `repr` has a line for each field. Arrays stay read-only in pickles."""
+    """Base of results. `repr` has a line for each field; unpickled arrays are read-only again."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -95,8 +95,8 @@ class Table(Record):
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas data frame with a row for each asperity, step, point or solver.
 
-        Columns are named in the singular, components of vectors with _x and _y. Fields that are one
-        number or text are in `attrs`. Two-dimensional arrays that are not vectors, such as the
+        Columns are named in the singular; components of vectors end in _x and _y. Fields that are
+        one number or text are in `attrs`. Two-dimensional arrays that are not vectors, such as the
         forces of asperities at each step of a history, are only in `to_xarray`.
 
         Raises ExtraError if pandas is not installed.
@@ -127,13 +127,13 @@ class Table(Record):
         return places | arrays if rows_first else arrays | places
 
     def _attributes(self) -> dict[str, Any]:
-        """The fields that are one number or text."""
+        """The fields whose value is one number or one text, by name."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """A mapping for each row of columns, with Python's own numbers."""
+    """One mapping for each row: from the names of the columns to its values, as Python objects."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
@@ -148,7 +148,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value as text on one line: of an array the size and range, of statuses the counts, ..."""
+    """A value as text on one line; long arrays are summarised, by size and range or by counts."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):

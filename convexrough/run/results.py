@@ -1,7 +1,9 @@
 """The results folder, which is written under a temporary name and then renamed.
 
-A folder with contents is changed only with `force`: the complete new files then replace the files
-that `files.json` of the earlier run lists. Other files stay.
+If the folder exists already, the complete new files are moved into it one by one, `files.json`
+last. A folder with contents is accepted only with `force`; then the files that `files.json` of the
+earlier run lists, and this file first, are deleted before. Other files stay. If the process dies
+while files are moved, the folder has only some of the new files, and no `files.json`.
 """
 
 from __future__ import annotations
@@ -43,11 +45,11 @@ NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 def results_folder(
     folder: Path, *, force: bool, reads: Iterable[str | Path] = (), **said: Any
 ) -> Iterator[Path]:
-    """A temporary folder, which becomes `folder` if the body succeeds and is removed otherwise.
+    """A temporary folder; if the body succeeds, it becomes `folder`, or its files move there.
 
     force : accept a folder with contents
     reads : files that the body reads; none of them may be in `folder`
-    said  : entries of `files.json` besides the names of files
+    said  : entries of `files.json` in addition to the names of the files written
 
     Raises FileError, before the body runs, if `folder` cannot be written or replaced.
     """
@@ -73,7 +75,7 @@ def results_folder(
         finally:
             shutil.rmtree(new, ignore_errors=True)
             for each in parents:
-                with suppress(OSError):  # it holds results
+                with suppress(OSError):  # not empty: it holds results
                     each.rmdir()
 
 
@@ -82,7 +84,7 @@ def _moved(new: Path, folder: Path) -> None:
         os.replace(new, folder)
         return
     for name in _earlier(folder):
-        path = folder / Path(name).name  # inside the folder, whatever the file says
+        path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
         if path.is_file() or path.is_symlink():
             path.unlink()
     for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
@@ -120,11 +122,12 @@ def write_results(
     more: Mapping[str, Any] | None = None,
     **saved: Any,
 ) -> list[Path]:
-    """Write all tables, figures, and summary.json with the entries `more`; return the paths.
+    """Write all tables, figures and summary.json; return the paths.
 
-    saved : formats and dpi of figures, as for `write_figures`
+    more  : further entries of summary.json
+    saved : `formats` and `dpi` of figures, as for `write_figures`
 
-    Raises FileError.
+    Raises FileError if a file cannot be written.
     """
     written = []
     for result in results:
@@ -140,7 +143,7 @@ def write_results(
 
 
 def slider_page(pressed: Result) -> str:
-    """An HTML page with a slider for the shear force; this call computes the states on it.
+    """An HTML page with a slider for the shear force, and the friction states computed for it.
 
     Raises InputError if the scene has no friction, or another shape than a sphere.
     """
@@ -176,7 +179,7 @@ def write_figures(
             with replacing(path) as temporary:
                 save(figure, temporary, kind, dpi)
             written.append(path)
-            figure.set_layout_engine("none")  # saves the layout of later files
+            figure.set_layout_engine("none")  # the layout is the same in all formats: saves time
     return written
 
 

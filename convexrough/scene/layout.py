@@ -64,14 +64,14 @@ class Layout(Cached):
 
     @cached_property
     def order(self) -> Indices | None:
-        """(n,) indices that sort points by i, then by j, as for Fourier transforms; or None."""
+        """(n,) indices that sort points by their sites (i, j), i first; None without a lattice."""
         if self.sites is None:
             return None
         i, j = (self.sites - self.sites.min(axis=0)).T
         return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
 
     def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
-        """The indices where `wanted` (n,) is True; many points on a lattice are in `order`."""
+        """The indices where `wanted` (n,) is True; for many points on a lattice, as in `order`."""
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]

@@ -37,8 +37,9 @@ MOST_LOST = 64
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, in order of completion.
 
-    If a worker dies, its batches are computed again, one by one, after the others. Raises
-    WorkerError if a batch loses its worker twice, or if no worker is left.
+    A batch is lost if its worker dies. After all others, lost batches are computed again, one by
+    one. Raises WorkerError if a batch is lost again, if more than 64 are lost, if a worker has
+    other versions of packages, or if no worker is left.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -89,7 +90,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 
 class Processes(Executor):
-    """Processes on this machine, each with a new interpreter; after one dies, all are replaced."""
+    """An executor with processes on this machine. If one dies, all are replaced by new ones."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()
@@ -117,7 +118,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """End this process when its parent ends, which holds the other end of the pipe."""
+    """Start to watch a pipe whose other end the parent holds; end this process when that closes."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -133,7 +134,7 @@ def _sheltered() -> Iterator[None]:
     """Inside this context new processes do not run the user's script, and ignore interrupts."""
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
-    masks = hasattr(signal, "pthread_sigmask")  # not everywhere
+    masks = hasattr(signal, "pthread_sigmask")  # false on Windows
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
     try:
         yield
@@ -147,8 +148,8 @@ def _sheltered() -> Iterator[None]:
 def dask(address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler; workers may join and leave.
 
-    address : "tcp://host:port" of the scheduler; or its file, "scheduler.json"; or "local" for a
-        new cluster on this machine
+    address : "tcp://host:port" of the scheduler, the path of its .json file, or "local" for a new
+        cluster on this machine
 
     Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
     """

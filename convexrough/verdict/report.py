@@ -64,7 +64,7 @@ def _claim_summary(claim: Claim) -> dict[str, Any]:
 
 
 def asperity_columns(found: Verified) -> dict[str, NDArray[Any]]:
-    """Columns with one row per asperity: its claimed and proved values."""
+    """Columns by name, with an entry for each asperity: what is claimed, and what is proved."""
     x, y = found.verdict.scene.asperities.positions.T
     columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(found.verdict)}
     if found.sheared is not None:
@@ -84,7 +84,7 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
 
 
 def describe_verdict(found: Verified) -> list[str]:
-    """The printed report: for each claim, what is wrong, undecided or inaccurate, and the total."""
+    """The lines of the printed report on the scene and on each claim (of loads or shear forces)."""
     lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
         others = ": --json and --out list all"
@@ -116,7 +116,10 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
-    """Aligned lines on one claim; `others` is printed after the number of rows left out."""
+    """Aligned lines on one claim: wrong, undecided and inaccurate asperities, and the total.
+
+    others : text to print after the number of rows that a table leaves out
+    """
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, scene, which[:MOST_LISTED])
