@@ -45,12 +45,12 @@ class ConeRows(NamedTuple):
 
 
 def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
-    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones.
+    """The cones of n lifts as rows of  A x + s = b  with s in second-order cones.
 
     lifts : the columns of y2, y3, y4, y5 and z, (n,) each, for four cones; those of y1, ..., y5 and
         z for five cones
     width : number of variables of the program
-    ones  : (n,) columns of variables that replace the constant 1 in the cones of each lift
+    ones  : (n,) columns of variables, one for each lift, that replace the constant 1 in its cones
 
     Rows are grouped by lift, with three rows per cone.
     """

@@ -18,7 +18,10 @@ from convexrough.roundoff import ROUNDOFF
 
 
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
-    """The largest of the increasing margins for which `proved` is true, by bisection; else 0."""
+    """The largest of the increasing `margins` for which `proved` is true; 0 if it is for none.
+
+    The search is by bisection: if `proved` is true for a margin, it should be for smaller ones.
+    """
     low, high = -1, len(margins)
     middle = 0  # begin with the smallest: if it is not proved, no other needs a test
     while high - low > 1:
@@ -42,11 +45,11 @@ def is_definite(matrix: Array) -> bool:
 def proved_margin(
     couplings: Array, margins: Sequence[float], entry_error: float, spare: float = 0.0
 ) -> float:
-    """The first margin mu for which  I + M >= (mu + spare) I  is proved, else 0.
+    """The first margin mu for which  I + M >= (mu + spare) I  is proved; 0 if there is none.
 
     couplings   : (n, n) computed symmetric M, with 0 on the diagonal
-    margins     : each from 0 to 1
-    entry_error : e, bound on the relative error of each entry
+    margins     : each from 0 to 1, in the order in which they are tried
+    entry_error : bound on the relative error of each entry of M
     """
     n = len(couplings)
     perturbation = entry_error * float(np.abs(couplings).sum(axis=1).max())
@@ -68,15 +71,16 @@ def proved_sparse_margin(
 ) -> float:
     """The largest margin mu for which  S >= mu I  is proved for a sparse symmetric S; else 0.
 
-    diagonal : (n,)
-    pairs, values, errors : indices of entries above the diagonal, the entries, and bounds on their
-        errors
+    diagonal : (n,) the diagonal of S
+    pairs, values, errors : indices of the entries of S above the diagonal, these entries, and
+        bounds on their errors
     margins  : in increasing order
 
     1. Elimination without exchange of rows gives L and U with S = L U + E and
-       |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3).
-    2. Let the diagonal D of U be positive. Then S - L D L' = E + L (U - D L') is symmetric, so its
-       norm is at most its largest row sum.
+       |E| <= g / (1 - g) |L| |U|, where g = n u with the roundoff u (Higham, Accuracy and
+       Stability, theorem 9.3).
+    2. Let D, the diagonal of U, be positive. Then L D L' is positive definite, and
+       S - L D L' = E + L (U - D L') is symmetric, so its norm is at most its largest row sum.
     """
     from scipy.sparse import coo_array
 

@@ -1,8 +1,8 @@
 """Newton's method on a normal map, with a line search on the energy, for all laws of contact.
 
 Pressing, shear and vector friction lead to the same equation. The forces p(eta) are a monotone
-function of the local displacements eta of the asperities. With the compliance operator A and the
-prescribed displacements X, the law is
+function of the asperities' own displacements eta. With the compliance operator A, which gives the
+displacements by forces on other asperities, and the prescribed displacements X, the law is
 
     F(eta) = eta + A p(eta) - X = 0.
 
@@ -23,15 +23,16 @@ from convexrough.arrays import Array
 from convexrough.errors import SolverError
 from convexrough.progress import log_step
 
-#: The linear system of a step is solved to this relative residual, or to the square of the last
-#: reduction of the defect if that is smaller (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996)
-#: 16, choice 2).
+#: The linear system of a step is solved to this relative residual or, if that is smaller, to the
+#: square of the factor by which the last step reduced the defect (Eisenstat and Walker, SIAM J.
+#: Sci. Comput. 17 (1996) 16, choice 2).
 MOST_LEFT = 0.1
 
-#: Least residual of the linear system, relative to the defect at which the method stops. Heuristic.
+#: Least residual to which the linear system is solved, as a fraction of the defect at which the
+#: method stops. A heuristic.
 OVERSOLVED = 0.3
 
-#: Armijo's constant: least decrease of the energy, relative to the slope times the step.
+#: Armijo's constant: least decrease of the energy, divided by the decrease to first order.
 PROMISED = 1e-4
 
 #: The shortest step that is tried, as a fraction of the full step.
@@ -39,11 +40,11 @@ SHORTEST = 1e-12
 
 
 class Iterate(Protocol):
-    """A point of the iteration.
+    """A point of the iteration, with the symbols of this module.
 
     unknown  : eta
-    forces   : p(eta), projected onto the constraints
-    defect   : F
+    forces   : p(eta), which satisfy the constraints, such as a prescribed total
+    defect   : F(eta)
     energy   : Phi(p)
     residual : the largest |F|
     scale    : the unit of residuals
@@ -78,15 +79,15 @@ class Law(Protocol[Point]):
     def unit(self) -> str: ...
 
     def evaluate(self, unknown: Array) -> Point | None:
-        """The state at eta, projected onto the constraints; None if the projection fails."""
+        """The state at `unknown`, eta, moved onto the constraints; None if that is impossible."""
         ...
 
     def direction(self, state: Point, left: float) -> Array:
-        """The step d: the 2-norm of F + F' d is at most about `left` times that of F."""
+        """The step d of eta; the 2-norm of F + F' d is at most about `left` times that of F."""
         ...
 
     def gradient(self, state: Point) -> Array:
-        """dPhi/dp, without the multipliers of the constraints."""
+        """The derivative of the energy, dPhi/dp, without multipliers of the constraints."""
         ...
 
     def energy_rounding(self, state: Point) -> float:

@@ -5,10 +5,10 @@ W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The norma
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-The number beta is 0, or the one for which the loads keep their sum: sum W y = 0. The matrix
-I + W A W is positive definite where the energy is convex. Where it is not, the diagonal `shells` is
-added to A, which makes it so. Conjugate gradients also return A W y, from which the step d of every
-asperity follows, touching or not.
+A is the compliance operator. The number beta is 0, or, if the loads must keep their sum, the one
+for which sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If it
+is not positive definite, diag(`shells`) is added to A, which makes it so. Conjugate gradients also
+return A W y, from which the step d of every asperity follows, touching or not.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from convexrough.influence.coupling import Influence, Smoother
 #: stored matrix and without. Heuristics, from timings.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
-#: Least relative residual that conjugate gradients reach in single and in double precision.
+#: Least relative residual that is asked of conjugate gradients, in single and in double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
-#: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, has
-#: decreased by this factor times the limit.
+#: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, is
+#: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
 MOST_ITERATIONS = 500
@@ -49,10 +49,12 @@ def correct(
 ) -> Array:
     """(n,) the Newton step d: (1) of docs/theory/newton.md.
 
+    shells    : (n,) diagonal to add to A if I + W A W is not positive definite
     root      : (n,) diagonal of W, 0 where open
     defect    : (n,) F
-    balanced  : True to keep the sum of the loads
-    tolerance : largest 2-norm of F + F' d, divided by that of F; a factorisation ignores it
+    balanced  : True to keep the sum of the loads to first order
+    tolerance : largest 2-norm of F + J d, divided by that of F, with the Jacobian J; only conjugate
+        gradients use it
 
     Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
@@ -148,10 +150,11 @@ def _iterate(
 
 
 class _Smoothed:
-    """The preconditioner M; if balanced, projected onto the plane sum W y = 0.
+    """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
 
-    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. The residual is
-    projected, too, and `shift` is the sum of its corrections, so that single precision is enough.
+    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. A call also changes the
+    residual by a multiple of W, so that single precision is enough. The sum of these multiples,
+    `shift`, is the number beta of the step, for a defect that is scaled as the residual is.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
@@ -160,7 +163,10 @@ class _Smoothed:
         self.weight = 0.0 if self.border is None else float(w @ self.border)
 
     def __call__(self, residual: Values) -> tuple[Values, float, float]:
-        """M r of the projected residual, and |A W r| and r' M r of the given residual r."""
+        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
+
+        If balanced, `residual` is changed in place.
+        """
         z, left = self.smooth(residual)
         whole = float(residual @ z)
         if self.border is not None:

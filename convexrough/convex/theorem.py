@@ -2,11 +2,11 @@
 
 docs/theory/one-theorem.md states and proves it, with the symbols of this module. Let x be a trial
 point, e its violations of the first-order conditions, x* the solution, and H a positive diagonal
-matrix. If a box contains x and x*, and on it the Hessian is at least mu H with mu > 0, (1) is
+matrix. If a box contains x and x*, and on it the Hessian is at least mu H with mu > 0, then
 
-    || x - x* ||_H  <=  || e ||_{H^-1} / mu.
+    || x - x* ||_H  <=  || e ||_{H^-1} / mu.                                              (1)
 
-A component that is fixed has x_i = x*_i, and its e_i counts as 0.
+For a fixed component, x_i = x*_i is known, and its e_i counts as 0.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from convexrough.roundoff import SAFETY
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     """(n,) violations e of the first-order conditions.
 
-    residual : (n,) F - beta, the gradient of the energy minus the multiplier of the total
-    inside : (n,) False where x is at a lower bound. At an upper bound True may be given: it gives
-        the violation |F - beta| of an interior point, which is at least as large
+    residual : (n,) F - beta, the gradient F of the energy minus the multiplier beta of the total
+    inside   : (n,) False where x is at a lower bound. At an upper bound True is allowed: the
+        result |F - beta| is then at least as large as the violation
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
@@ -35,9 +35,9 @@ def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
 def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations.
 
-    excess    : (n,) e
-    h         : (n,) the diagonal of H, infinite where x is fixed
-    margin    : mu
+    excess : (n,) or (m, n) the violations e
+    h      : the diagonal of H, of the same shape; infinite where x is fixed
+    margin : mu
     """
     most = largest(excess)
     with np.errstate(all="ignore"):

@@ -1,9 +1,9 @@
 """Elastic shares: the shear forces of asperities that all stick, per unit of the total force.
 
-The shares Y solve  (H + A) Y = the same displacement at every asperity,  sum Y = 1,  with
-H = diag(1/(2 E* a)), the contact modulus E*, contact radii a, and the compliance matrix A. Y is
-(n,), or (n, 2, 2) with the full tangential kernel. The errors of computed shares are bounded in
-docs/theory/shakedown.md, "Elastic shares".
+The shares Y make all displacements (H + A) Y equal, and sum Y = 1. Here H = diag(1/(2 E* a)) with
+the contact modulus E* and the contact radii a, and A is the compliance matrix. Y is (n,), or
+(n, 2, 2) with the full tangential kernel. docs/theory/shakedown.md, "Elastic shares", bounds the
+errors of computed shares.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Shares(NamedTuple):
     """Shares of the n loaded asperities. Errors are proved bounds, infinite without a proof.
 
     values : Y, (n,) or (n, 2, 2)
-    errors : (n,), or (n, 2) for forces along x and along y
+    errors : (n,) bounds on |error of Y|, or (n, 2) for total forces along x and along y
     loads, load_errors : (n,) normal loads and bounds on their errors, in scaled units
     """
 
@@ -65,7 +65,7 @@ def vector_shares(contact: Contact) -> Shares:
 
 
 def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
-    """(n,) bounds on the errors of shares (n, 2), from the residual of their equations."""
+    """(n,) bounds on the errors of shares (n, 2) of one total force (2,), from their residual."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
     moved = exact * compliance + problem.couple(shares).T

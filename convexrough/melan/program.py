@@ -1,10 +1,11 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-This module evaluates the two bounds of docs/theory/shakedown.md, "Melan's program". The lower bound
-is the largest lambda for given residual forces r_i, the upper bound is (3) for given slips. Forces
-and slips come from a solver, which need not be accurate. The bounds include the errors of shares
-and loads. As on that page, shear forces are divided by the coefficient of friction; t0 is the mean
-of the path, P_i are the loads.
+The points of a path of shear forces are t0 + lambda t_v. Melan's program asks for the largest
+lambda for which constant residual forces r_i exist, with the sum t0, such that the sum of r_i and
+lambda times the elastic forces at t_v is at most the load P_i in size, at every point. This module
+computes a lower bound on it from given r_i, and an upper bound, (3) of docs/theory/shakedown.md,
+from given slips. A solver finds both, and need not be accurate. The bounds include the errors of
+shares and loads. All shear forces are divided by the coefficient of friction.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ class Melan(NamedTuple):
     """The largest lambda of Melan's program, with proved bounds.
 
     factor : lambda for the computed residual forces, shares and loads
-    lower, upper : proved bounds; 0 and infinite if shares or loads are not proved
+    lower, upper : proved bounds on the largest lambda; 0 and infinite without a proof
     gross  : lambda at which the path reaches the friction limit of the whole contact
     rest   : (N, 2) [force] r_i minus the elastic shares of the mean force t0
-    slips  : (m, N, 2) slips at each vertex
+    slips  : (m, N, 2) slips at each of the m points of the path, in whole multiples of a unit
     """
 
     factor: float
@@ -48,7 +49,10 @@ class Melan(NamedTuple):
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
-    """The solution with the full kernel, for a mean (2,) and vertices (m, 2) [force] of Q / f."""
+    """The solution of Melan's program with the full tangential kernel.
+
+    mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
+    """
     problem = Loaded.of(contact)
     unit, n = problem.units.force, len(problem)
     shares, m = vector_shares(contact), len(vertices)
@@ -71,7 +75,10 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
 
 
 def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
-    """The cone program in lambda and r - steady; the cone of asperity i is divided by P_i."""
+    """The cone program in lambda and r - `steady`; the cones of asperity i are divided by P_i.
+
+    limits : (n,) P;  steady : (n, 2) elastic forces at t0;  elastic : (m, n, 2) those at t_v
+    """
     from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
 
     m, n, _ = elastic.shape
@@ -99,14 +106,20 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
 
 def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) the residual forces, corrected to the sum t0 and moved slightly into the cones."""
+    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved a little inwards.
+
+    limits : (n,) the friction limits P
+    """
     parts = limits[:, None] / limits.sum()
     state = state + parts * (mean - state.sum(axis=0))
     return np.asarray(state + MARGIN * (parts * mean - state))
 
 
 def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """A lower bound on the largest lambda that the residual forces admit; 0 without a proof."""
+    """A lower bound on the largest lambda that the residual forces `rest` allow, or 0.
+
+    elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
+    """
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
     limits = (shares.loads - shares.load_errors - missing) * (1 - SAFETY)
@@ -136,7 +149,7 @@ def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
 
 
 def _closed(slips: Array) -> Array:
-    """(m, n, 2) slips as whole numbers whose sum over vertices is the same at every asperity."""
+    """(m, n, 2) the slips, changed to whole numbers; the sum over m is equal for all asperities."""
     largest = float(np.abs(slips).max())
     if not largest > 0:
         raise SolverError("the solver found no slips", solver="shakedown")
@@ -149,7 +162,10 @@ def _closed(slips: Array) -> Array:
 
 
 def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """The upper bound on lambda from these slips; infinite if their work is not positive."""
+    """The upper bound (3) on lambda from these slips; infinite if their work may be 0 or less.
+
+    elastic, errors : as for `_lower`
+    """
     sizes = np.hypot(slips[..., 0], slips[..., 1])
     done = slips * elastic
     uncertainty = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(

@@ -1,8 +1,8 @@
 """`shakedown`: the largest factor of a load path at which sliding dies out.
 
-Sliding dies out if, after some cycles, no asperity slides as a whole or opens; slip at the edges of
-contacts goes on. docs/theory/shakedown.md derives the exact limit and the programs of Melan's
-theorem.
+In this module, sliding dies out if after some cycles no asperity slides as a whole, and none that
+touches at the mean load opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
+derives the limit with partial slip, and Melan's limit for asperities that stick until they slide.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class Shakedown(Table, Plottable):
     The path has m points (P0, Q0) + factor (p, q) of normal load and shear force. The scene has n
     asperities and the coefficient of friction f.
 
-    kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
-        asperities that stick until they slide as a whole, with the scalar kernel or the full one;
-        the load must be constant
+    kind    : "exact": with partial slip, for any path. "elastic" and "vector": for asperities that
+        stick until they slide as a whole, by Melan's theorem at constant load. "elastic" uses the
+        scalar tangential kernel, "vector" the full one, with shear forces in the plane
     factor  : the largest factor, at most `gross`, at which after some cycles no asperity that
         touches at P0 slides as a whole or opens; `limited_by` says which of the two happens above
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
-    factors : (n,) the largest factor at which the sliding of each asperity dies out; nan where it
-        is not computed or the asperity does not touch at P0; for "vector" all are equal
+    factors : (n,) the largest factor, for each asperity, at which its own sliding dies out; nan
+        where it is not computed or the asperity does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
     witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
         path scaled by `lower`
@@ -96,7 +96,7 @@ class Shakedown(Table, Plottable):
 
     @property
     def limited_by(self) -> Literal["sliding", "opening"] | None:
-        """What asperities do above the factor; one that opens in every cycle need not slide.
+        """What the critical asperities do above `factor`: slide as a whole, or open in every cycle.
 
         It is None if there is no limit.
         """
@@ -205,7 +205,10 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
     found = {last: worst}
 
     def factor(onset: Fraction) -> float:
-        """The factor at which L* reaches an onset, or at which all slide if that is smaller."""
+        """The factor at which L* = `onset`, or that of gross sliding if that is smaller.
+
+        L* is the load of docs/theory/shakedown.md: what touches at L* stays stuck in part.
+        """
         return min(float(levels.load - onset) / fall if fall > 0 else np.inf, gross)
 
     if len(touching) <= MOST_ONSETS:
@@ -232,19 +235,28 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _fall(p: Array, t: Array) -> float:
-    """The decrease of L* per unit of the factor: the mean of max -(p + t) and max -(p - t)."""
+    """The decrease of the load L* of `_exact` per unit of the factor.
+
+    It is the mean of the maxima of -(p + t) and -(p - t), with t = q / f.
+    """
     return float((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The limit with the scalar kernel: the least of all asperities, or that of gross sliding."""
+    """Melan's limit with the scalar kernel: the least factor of all asperities and gross sliding.
+
+    t0, t : the mean shear force and its (m,) amplitudes, divided by f
+    """
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """The factor at which each asperity's shear force, divided by f, varies by 2 P_i."""
+        """(n,) the factors at which the ranges of the shear forces, divided by f, are 2 `loads`.
+
+        sizes : (n,) sizes of the elastic shares
+        """
         ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
         return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
 
@@ -293,7 +305,7 @@ def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
-    """(m, 2) checked forces. If one vector is expected, a number is taken as its x component."""
+    """(m, 2) checked forces; m = 1 if `dimensions` is 1. Then a number stands for (number, 0)."""
     given = checks.numbers(what, values)
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])

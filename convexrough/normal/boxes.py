@@ -1,9 +1,10 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-In crowded contacts a box may be one of the touching asperities only, with all others assumed open:
-docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). In comments, h is
-the local compliance `NormalProblem.compliance`, H the diagonal matrix of the h, A the compliance
-operator, and mu = 1 - `convexity_number` the margin of convexity.
+In crowded contacts a box may limit the loads of the touching asperities only, and assume all others
+open: docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). Symbols: h is
+the local compliance at the upper ends of a box (`NormalProblem.compliance`), H the diagonal matrix
+of the h, and A the compliance operator. On the box the Hessian of the energy is at least mu H with
+mu = 1 - `convexity_number`, the margin of convexity.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
-#: Shells are fitted to loads whose convexity number is above this. A heuristic.
+#: Shells are fitted to the contact radii if the convexity number is above this. A heuristic.
 FIT_FROM = 0.8
 
 #: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
@@ -36,7 +37,8 @@ MARGINS = (0.1, 1e-3)
 #: plus LEAST_LEEWAY times the largest load. Heuristics: the proof allows any box.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
-#: Number of touching asperities up to which Cholesky costs no more than overlapping shells.
+#: Number of touching asperities up to which a Cholesky factorisation costs no more than a proof by
+#: overlapping shells.
 FACTORISED = 1500
 
 #: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
@@ -46,13 +48,13 @@ CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 class Box(NamedTuple):
     """A box of loads, and the convexity of the energy on it; for one problem or for a stack."""
 
-    scope: Scope
-    problem: NormalProblem | Stack  # with the shells that prove convexity
+    scope: Scope  # "global" if every solution lies in the box
+    problem: NormalProblem | Stack  # its shells may prove the convexity
     loads: Array  # (n,) upper ends of the box; the lower ends are 0
     compliance: Array  # (n,) h at the upper ends
     convexity_number: Any  # 1 - mu
     faces: Array  # (n,) the proof must show that loads are below these; infinite where not needed
-    fixed_open: NDArray[np.bool_]  # (n,) assumed open; the proof must show that they are
+    fixed_open: NDArray[np.bool_]  # (n,) True where assumed open, which the proof must then show
 
     def at(self, rows: Indices, problem: Stack) -> Box:
         """The boxes of some rows of a stack, with `problem` as the stack of these rows."""
@@ -68,11 +70,12 @@ class Box(NamedTuple):
     @property
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self) -> Box:
-        """A box that contains this one, for use at another load or approach.
+        """A box that contains this one, to be tried at another load or approach.
 
-        The solution at that load or approach may lie outside. Where shells prove convexity, the
-        upper ends are raised to the loads at which the convexity number of each asperity is that
-        of the box. So at the rim they are far above the error bounds of the loads.
+        The solution there may lie outside, so `faces` makes the proof show that it is inside.
+        Where shells prove the convexity of this box, an upper end moves up to the load at which
+        the convexity number of its asperity equals that of the box. So also asperities at the rim
+        of the contact, with small loads, get upper ends far above the error bounds of their loads.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -86,7 +89,10 @@ class Box(NamedTuple):
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
-    """At most one box: one that contains every solution if it is convex, else one near `loads`."""
+    """At most one box on which convexity is proved: that of all solutions, else one near `loads`.
+
+    displacement : (n,) A `loads`
+    """
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.compliance(corner)
@@ -112,7 +118,10 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 
 
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """The least known upper bound on the approach at any solution; `displacement` is A `loads`."""
+    """An upper bound on the approach of every solution; `displacement` is A `loads`.
+
+    Under a prescribed load it is the smaller of `problem.approach_bound` and `problem.overhang`.
+    """
     if problem.load is None:
         return problem.approach_bound
     return min(problem.approach_bound, problem.overhang(loads, displacement))
@@ -121,9 +130,11 @@ def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Ar
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """A local box of touching asperities, all others fixed open; None if convexity is not proved.
+    """A local box for the touching asperities, with all others fixed open.
 
-    room : (n,) least increase from `loads` to the upper ends of the box
+    None if convexity on the box is not proved.
+
+    room : (n,) the upper ends of the box exceed `loads` by at least this
     """
     which = np.flatnonzero(touching)
     influence = problem.influence.restricted(which)
@@ -142,7 +153,10 @@ def box_of_touching(
 
 
 def crowded_margin(influence: Influence, compliance: Array) -> float:
-    """The largest of CROWDED_MARGINS that Cholesky or overlapping shells prove; 0 if none."""
+    """The largest mu of CROWDED_MARGINS proved for asperities of this compliance (n,); 0 if none.
+
+    The proof is by Cholesky's factorisation or by overlapping shells.
+    """
     if not influence.stored and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / compliance, CROWDED_MARGINS)
     scaled, error = _scaled(influence, compliance), influence.entry_error + 8 * ROUNDOFF
@@ -159,8 +173,8 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity.
 
-    They are the asperities of pairs too close for convexity. If no pair is, they are those whose
-    shell meets another shell; if no shells meet, all loaded asperities.
+    They are the asperities of pairs that are too close for convexity. If there is no such pair,
+    they are the asperities whose shells meet other shells; if no shells meet, all with a load.
     """
     which = np.flatnonzero(loads)
     if len(which) < 2:
@@ -174,7 +188,10 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
 
 
 def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
-    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved; 0 if none, or A is not stored."""
+    """The first mu of `margins` with  I + H^(-1/2) A H^(-1/2) >= mu I  proved.
+
+    0 if there is none, or if A is not stored as a matrix.
+    """
     if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF

@@ -1,13 +1,13 @@
 """Normal solutions of a scene at total loads L, from which friction and gradients are computed.
 
-At a total load L the scene has one solution in the box where it was proved: loads P_i(L), approach
-D0(L), indentations n_i(L) (minus the gap where open), and the energy
+A proved solution is the only one in a box of loads. At the total load L it has the loads P_i(L),
+the approach D0(L), the indentations n_i(L) (minus the gap where open), and the energy
 
     V(L) = min over sum P = L of  sum (3/5) k P^(5/3) + P'AP/2 - d'P,    so that dV/dL = D0.
 
-Coefficients k, operator A and offsets d are those of `NormalProblem`. The derivatives q = dP/dL and
-S = dD0/dL solve  q / c + A q = S,  sum q = 1  over the touching asperities, with
-c = dP/dn = (3/2) P^(1/3) / k.
+The coefficients k, the operator A and the offsets d are those of `NormalProblem`. The derivatives
+q = dP/dL and S = dD0/dL solve  q_i / c_i + (A q)_i = S,  sum q = 1  for the touching asperities,
+with c = dP/dn = (3/2) P^(1/3) / k; elsewhere q_i = 0.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from convexrough.normal.together import NUMBERS, Rows, solved
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: Largest accepted residual of a response after refinement, divided by that before refinement.
+#: Largest accepted residual of `Level.response` after refinement, divided by that before it.
 SOLVED = 1e-6
 
 #: Largest number of candidates for which levels are solved together: for more this saves no time.
@@ -60,10 +60,11 @@ class Response(NamedTuple):
 class Springs(NamedTuple):
     """The contacts of a level as linear springs, for the system that `Level.response` solves.
 
-    touching  : (n,) True where the compliance is known;  doubtful : (n,) others that may touch
-    slopes    : (n,) c = dP/dn, 0 where not touching;  compliance : (n,) 1/c where touching
-    bound     : (n,) h <= 1/c where the asperity may touch; infinite where open
-    margin    : mu of docs/theory/one-theorem.md, with H = diag(h); 0 where nothing is proved
+    touching  : (n,) True where the asperity touches and bounds on its compliance are known
+    doubtful  : (n,) True for other asperities that may touch
+    slopes    : (n,) c = dP/dn, 0 where not touching;  compliance : (n,) 1/c, 0 where not touching
+    bound     : (n,) h, a lower bound on 1/c where the asperity may touch; infinite where open
+    margin    : mu of docs/theory/one-theorem.md, with H = diag(h); 0 if nothing is proved
     """
 
     touching: NDArray[np.bool_]
@@ -78,9 +79,10 @@ class Springs(NamedTuple):
 class Level:
     """The normal solution at one total load, as balls in scaled units.
 
-    load, approach : () the total load L and D0(L)
+    load, approach : () the total load L and the approach D0(L)
     loads, indentation : (n,) P_i(L) and n_i(L) of the asperities that could touch (candidates)
-    touching, open : (n,) True where the asperity is proved to touch, or to be open
+    touching : (n,) True where the asperity is proved to touch
+    open     : (n,) True where it is proved to be open
     solution : what is proved; None without a proof, and at L = 0
     trial    : the computed loads and their residuals; None at L = 0
     """
@@ -112,7 +114,10 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """A level of loads near which nothing is proved: the radii of the balls are infinite."""
+        """A level of loads near which nothing is proved: its balls have infinite radii.
+
+        A prescribed load or approach is known, so its ball keeps its own radius.
+        """
         unknown = Ball.around(state.loads, np.inf)
         none = np.zeros(len(problem), dtype=bool)
         approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
@@ -136,7 +141,7 @@ class Level:
 
     @cached_property
     def energy(self) -> Ball:
-        """The complementary energy V(L)."""
+        """The energy V(L) of this module's docstring."""
         return energies([self])[0]
 
     @cached_property
@@ -174,11 +179,11 @@ class Level:
         )
 
     def response(self, right: Ball, total: Ball) -> Response:
-        """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
+        """The solution x (n,), beta of  x / c + A x = right + beta,  sum x = total.
 
-        The solution is refined in pairs of float64 numbers until the residual no longer halves.
-        Bounds on its error follow from docs/theory/one-theorem.md. They allow for asperities
-        of which it is not proved whether they touch.
+        The equations hold for touching asperities; x is 0 for others. The solution is refined in
+        pairs of float64 numbers until the residual no longer halves. The bounds on its error
+        (docs/theory/one-theorem.md) allow for asperities that are not proved to touch or be open.
 
         right : (n,) the given right side;  total : the given sum of x
 
@@ -195,7 +200,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and the beta with which its mean, weighted by c, is 0."""
+            """x / c + A x - right - beta, and beta; with it the mean, weighted by c, is 0."""
             above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
@@ -246,9 +251,10 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Bounds on the residual if j takes the missing load, on this load, and on its effect.
+            """Three bounds: on the residual once j carries the missing part of x, on that part, and
+            on the displacements by it and by `others`.
 
-            others : total load of the asperities that are neither proved to touch nor open
+            others : bound on the sum of |x| over asperities not proved to touch or be open
             """
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
@@ -282,7 +288,8 @@ class Level:
 class Levels:
     """The normal solutions of one scene up to the load of the level `top`; `at` caches them.
 
-    top : the level of a pressed contact
+    top      : the level of a pressed contact
+    press    : the function that computes the loads of other levels
     together : True if Newton's method may solve several levels at once, as rows of a stack
     """
 
@@ -292,15 +299,15 @@ class Levels:
 
     @property
     def presses(self) -> int:
-        """The number of levels computed besides `top`."""
+        """The number of levels that `at` and `prepare` have computed."""
         return len(self._known)
 
     def below(self, drop: Ball) -> Level:
-        """The level at the load of `top` minus `drop`, in scaled units."""
+        """The level at the load of `top` minus `drop`, both in scaled units."""
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
-        """The level at a total load. Raises ProofError if an inexact load may be 0 or less."""
+        """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
         key = _key(load)
         if key not in self._known:
             self._known[key] = self._level(load)
@@ -314,7 +321,10 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at k positive loads, solved together; None where only `at` can solve one."""
+        """The levels at k positive loads, solved together; None for a level that is not found.
+
+        `at` may still find such a level.
+        """
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None:
@@ -330,10 +340,11 @@ class Levels:
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The level of `problem`, sought from no initial loads first, then from the loads of `top`.
+        """The level of `problem`, computed first without initial loads, then from those of `top`.
 
-        It is proved in the box of loads in which `top` was proved. If other solutions than that
-        of `top` are possible, only the loads of `top` are tried.
+        The second attempt is made if the first proves nothing. The level is proved in the box of
+        `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only
+        the loads of `top` are tried as initial loads. Without a proof: `Level.unproved`.
         """
         top = self.top.solution
         local = top is not None and top.box.scope == "local"
@@ -349,7 +360,10 @@ class Levels:
     def _sought(
         self, problem: NormalProblem, start: Array | None
     ) -> tuple[Trial, Proved | Obstacle]:
-        """Refined loads, and the solution proved near them in the box of `top`, or the obstacle."""
+        """Refined loads, and the solution proved near them in the box of `top`.
+
+        If nothing is proved, the second is the obstacle to a proof.
+        """
         state = refined_loads(problem, self._press(problem, start))
         boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
         return state, proved(problem, state, boxes)

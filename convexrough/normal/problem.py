@@ -50,8 +50,8 @@ FITTED = 0.9
 #: Number of candidates up to which the prescribed displacements are cached.
 MOST_KEPT = 2**20
 
-#: If no load changes by more than this part of the largest one, a float64 product of A with the
-#: changes updates A P to 29 digits.
+#: If no load changes by more than this part of the largest one, A P is updated by a product of A
+#: with the changes in float64, and keeps 29 digits.
 NEARBY = 1e-13
 
 #: 1 / pi to 66 digits.
@@ -78,10 +78,11 @@ class Data(NamedTuple):
 class NormalProblem:
     """The asperities of a scene that could touch, and what is prescribed, in scaled units.
 
-    candidates    : (n,) their indices in the scene; all others carry no load in any solution
+    candidates    : (n,) indices of these asperities in the scene; no others touch in any solution
     coefficients, offsets, influence : (n,) k, (n,) d, and the compliance operator A
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    shells        : (n,) 1 / (pi E* s_i) for radii s_i; A + diag(shells) is positive semidefinite
+    shells        : (n,) 1 / (pi E* s_i) with the contact modulus E* and radii s_i that make
+        A + diag(shells) positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     approach_bound : upper bound on D0 at any solution
@@ -125,29 +126,29 @@ class NormalProblem:
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
     def at_load(self, load: Ball) -> NormalProblem:
-        """The problem of the same asperities under a load whose approach is <= `approach_bound`."""
+        """The problem of the same asperities under a load that needs at most `approach_bound`."""
         return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
 
     def at_approach(self, approach: Ball) -> NormalProblem:
-        """The problem of the same asperities at an approach, up to `approach_bound`."""
+        """The problem of the same asperities at an approach of at most `approach_bound`."""
         prescribed = float(approach.value)
         return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
 
     def _like(self, other: NormalProblem) -> NormalProblem:
-        """This problem with cached data copied from another problem of the same asperities."""
+        """`other`, a problem of the same asperities, after copying the cached data of this one."""
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
 
     @property
     def total(self) -> Ball:
-        """The prescribed total load: a float64 number unless it is known as a ball."""
+        """The prescribed total load as a ball."""
         assert self.load is not None
         return Ball.exact(self.load) if self.exact_load is None else self.exact_load
 
     @property
     def depth(self) -> Ball:
-        """The prescribed approach: a float64 number unless it is known as a ball."""
+        """The prescribed approach as a ball."""
         assert self.approach is not None
         return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
 
@@ -160,7 +161,7 @@ class NormalProblem:
 
     @property
     def exact_depths(self) -> Ball:
-        """(n,) D = D0 + d, for a prescribed approach D0; cached unless it is large."""
+        """(n,) D = D0 + d for a prescribed approach D0; cached for at most MOST_KEPT candidates."""
         found: Ball | None = self.__dict__.get("_depths")
         if found is None:
             found = self.exact.offsets + self.depth
@@ -180,12 +181,13 @@ class NormalProblem:
         return Ball.around(product, errors * (1 + SAFETY))
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
-        """(n,) the change of the unknowns delta of docs/theory/newton.md in one Newton step.
+        """(n,) one Newton step of the unknowns delta of docs/theory/newton.md: indentations, or
+        minus gaps where open.
 
-        slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) F(delta), which the step reduces to 0
+        slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta), to be reduced to 0
         enough : fraction of the defect that the step may leave;  todo : for `Stack.correct` only
 
-        On a lattice the step leaves out asperities with slope and defect 0, for smaller transforms.
+        If `influence.cheap_sums`, asperities with slope and defect 0 are left out to save time.
         """
         some, influence = np.arange(len(self)), self.influence
         if influence.cheap_sums:
@@ -202,7 +204,7 @@ class NormalProblem:
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(n,) A P for P = `others`; if cheaper, from `product` = A `loads` and the difference."""
+        """(n,) A P for P = `others`, if possible by an update of `product`, which is A `loads`."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:
@@ -334,7 +336,10 @@ class NormalProblem:
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
     def bounds(self, approach_bound: float) -> Array:
-        """(n,) bounds (max(D_i, 0) / k_i)^(3/2) on the loads of solutions, for this bound on D0."""
+        """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on the loads of every solution.
+
+        approach_bound : upper bound on the approach D0 in D_i = D0 + d_i
+        """
         rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
@@ -346,7 +351,9 @@ class NormalProblem:
         return h
 
     def smooth_indentation(self) -> Array:
-        """(n,) initial indentations: offsets less displacement by a smooth sphere, shifted."""
+        """(n,) initial indentations: offset minus the displacement by a smooth sphere, plus a
+        number with which the loads have the prescribed or an estimated total.
+        """
         scene, load = self.scene, self.load
         if load is None:
             load = alone = float(self.bounds(self.approach_bound).sum())
@@ -360,7 +367,11 @@ class NormalProblem:
         return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
-        """theta of (3), docs/theory/convexity.md; if it is below 1, Phi is convex up to `loads`."""
+        """The largest shells_i / h_i with the compliances h at `loads`.
+
+        If it is below 1, the energy is convex for all loads up to these: (3) of
+        docs/theory/convexity.md.
+        """
         return float(self.convexity_at(self.compliance(loads)))
 
     def convexity_at(self, compliance: Array) -> Any:
@@ -368,7 +379,7 @@ class NormalProblem:
         return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
-        """(n,) offsets as pairs of float64 numbers, z - x^2 / (2 Rx) - y^2 / (2 Ry)."""
+        """(n,) offsets z - x^2 / (2 Rx) - y^2 / (2 Ry) as pairs of float64 numbers."""
         return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
 
     def _twofold_offsets(self, which: Indices) -> Pair:
@@ -383,7 +394,7 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """Upper bound on D0 at every solution under load control, as `load_control.approach_bound`.
+        """An upper bound on D0 at every solution under load control: `load_control.approach_bound`.
 
         weights      : (n,) approximate loads, not negative, not all 0
         displacement : (n,) A times weights
@@ -400,7 +411,9 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Mean curvature of the base; in scaled units k^3 for the curvature sum 1, and 1 / (pi E*)."""
+    """Three balls: the mean curvature of the base, k^3 of an asperity whose relative curvature is
+    1, and 1 / (pi E*); the last two in scaled units.
+    """
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

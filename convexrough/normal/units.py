@@ -13,21 +13,26 @@ from convexrough.errors import InputError
 class Units:
     """Scaled units of length and force: numbers of a problem are about 1 in them.
 
-    They are the units of the scene times powers of two (for force, of eight), so that scaling a
-    float64 number, or its 2/3 power, is exact.
+    They are the units of the scene times powers of two (of eight for the force). So scaling a
+    float64 number by them, or a force to the power 2/3, does not round.
     """
 
-    length: float  # [length] of approach
-    force: float  # [force]
+    length: float  # [length] the scaled unit of length
+    force: float  # [force] the scaled unit of force
 
     @property
     def local(self) -> float:
-        """The factor force^(2/3) / length of a local coefficient k, a power of two."""
+        """force^(2/3) / length, a power of two: k in scaled units is k times this factor."""
         return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
-        """Units for an approach [length] and a local coefficient k; InputError if out of range."""
+        """Units of the size of `approach` [length] and of the load whose indentation it is.
+
+        coefficient : k of Hertz's law, indentation = k load^(2/3)
+
+        Raises InputError if the approach is not positive and finite.
+        """
         if not 0 < approach < math.inf:
             raise InputError("scene", found=f"indentations of {approach:g}", expected=SIZED)
         length = 2.0 ** round(math.log2(approach))

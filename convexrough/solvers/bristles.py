@@ -9,26 +9,27 @@ have the stiffness 2 E* per length, and the bristle at x touches at the indentat
 with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
 cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
-In scaled units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
-h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its compliance, and phi_ij / m the force on cell j:
+In scaled units let B_i be the load at which the contact radius of asperity i is b_i. There its
+indentation is d_i = k B_i^(2/3) and its compliance h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let
+phi_ij / m be the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
-P is exact if the contact ends on the edge of a cell. Otherwise its error is at most
-0.375 B_i b / (b_i m^2).
+At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise its error is
+at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
 
-Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator
-A,
+Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator A
+and prescribed displacements D,
 
     minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
 For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
-the contact energy at the upper ends of the box P <= B. The box is that of the a priori bounds if a
-Cholesky factorisation finds A + diag(h) positive definite there. Otherwise it is cut at
-b_i = 0.99 (pi/2) s_i, with half the distance to the nearest neighbour as s_i. There the shell lemma
-of docs/theory/convexity.md proves definiteness. An answer on a cut face of the box is refused.
+the contact energy at the upper ends of the box P <= B. First B are the a priori bounds on the
+loads. If a Cholesky factorisation does not find A + diag(h) positive definite there, the box is cut
+at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. There the shell
+lemma of docs/theory/convexity.md proves definiteness. An answer on a cut face is refused.
 """
 
 from __future__ import annotations
@@ -62,8 +63,9 @@ LARGEST_S = 0.99
 #: matrix is definite. A heuristic, far above rounding.
 MARGIN = 0.001
 
-#: Smallest B_i, divided by the largest. A heuristic: smaller loads need not be resolved, and
-#: compliances, proportional to load^(-1/3), differ by at most a factor of a hundred.
+#: Smallest upper end B_i of a box, divided by the largest, unless a face is below it. A heuristic:
+#: smaller loads need not be resolved, and the compliances, proportional to B^(-1/3), then differ by
+#: at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -73,9 +75,10 @@ class BristleQP:
 
     bristles    : m, number of cells over half the contact width; the error of the loads is about
         0.4 / m^2 of the largest load
-    newton_step : end with one Newton step, which squares the error and costs little
-    tolerance   : absolute and relative tolerance of OSQP, in scaled units; if OSQP finds which
-        bristles carry forces, polishing then computes these to rounding
+    newton_step : True to end with one Newton step, which squares the relative error
+    tolerance   : absolute and relative tolerance of OSQP, in scaled units. If OSQP finds which
+        bristles carry forces, its polishing step computes these forces to rounding
+    max_iterations : largest number of iterations of OSQP
     verbose     : True to print OSQP's table of iterations
 
     Raises TooDenseError where contacts are too crowded for a convex program, and SolverError where
@@ -140,7 +143,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, m, solver, *_convex_box(problem, solver))
 
     def apply(self) -> QuadraticProgram:
-        """The program; it constrains phi_ij, sum_j e_ij / m, and the total load if prescribed."""
+        """The program; its rows are phi_ij >= 0, sum_j e_ij / m = 0, and the prescribed load."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
@@ -167,10 +170,11 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         )
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads; a bristle carries a force where h phi exceeds its multiplier.
+        """The loads, from the forces phi of the bristles and the multipliers of phi >= 0.
 
-        The sign of this difference is clear even where the solver's phi is nearly 0.
-        Raises TooDenseError if the answer lies on a face where the box was cut.
+        A bristle carries a force where h phi exceeds m times the size of its multiplier. The sign
+        of this difference is clear even where the solver's phi is nearly 0. Raises TooDenseError if
+        the answer lies on a face where the box was cut.
         """
         problem, n, m = self.problem, len(self.problem), self.m
         P, e = raw.x[:n], raw.x[n:].reshape(n, m)
@@ -191,7 +195,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The box B; True where it was cut for convexity; and the definite matrix A + diag(h)."""
+    """The upper ends B (n,), True where a box was cut (n,), and the definite matrix A + diag(h)."""
     approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
@@ -216,7 +220,7 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
 
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
-    """A + diag(h) on the box; None unless Cholesky's method finds it definite with `MARGIN`."""
+    """A + diag(h) for B = `box`; None unless Cholesky's method finds it definite with `MARGIN`."""
     root = np.sqrt(1.0 / problem.compliance(box))
     scaled = problem.influence.matrix * root * root[:, None]
     np.fill_diagonal(scaled, 1.0 - MARGIN)

@@ -1,9 +1,10 @@
 """The choice of boxes and the check of answers, for all solvers of the cone program.
 
-docs/theory/exact-cones.md, "Which box" and "Loads and gaps from the answer". The program is exact
-on boxes 0 <= P_i <= B_i of loads with convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i of at
-most 21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the
-solution reaches a cut face, five cones are tried; if it does so again, the scene is refused.
+docs/theory/exact-cones.md, "Which box" and "Loads and gaps from the answer". The loads are limited
+to boxes 0 <= P_i <= B_i. The numbers S_i = (3/2) shell_i B_i^(1/3) / k_i, with the shells and
+coefficients k of `NormalProblem`, must be at most 21/25 for the form with four cones per asperity,
+or 1 for that with five. Where S_i would be larger, B_i is reduced: the box is cut. If a cut box
+limits a load, five cones are tried; if that happens again, the scene is refused.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from convexrough.solvers.programs import ProgramAnswer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Asperities with an a priori bound below this part of the largest are left out of the program; a
-#: Newton step can give them a load. A heuristic: the answer is checked for all asperities.
+#: Asperities whose a priori bound on the load is below this part of the largest such bound are left
+#: out of the program. A Newton step can give them a load. A heuristic: all loads are checked.
 NEGLIGIBLE = 1e-12
 
-#: Contact radius at the end of a box over that of the a priori bound, unless the box is cut. If the
-#: box ended at the bound, an isolated asperity would have a slack and a multiplier of 0, where
-#: interior-point methods lose half their digits. A heuristic: any larger value would do.
+#: Contact radius at the upper end of a box that is not cut, divided by the contact radius at the a
+#: priori bound on the load. If the box ended at this bound, an isolated asperity would have a slack
+#: and a multiplier of 0, and interior-point methods would lose half their digits. A heuristic.
 WIDENED = 1.1
 
-#: With a Newton step: the largest accepted residual max |g|, divided by |D0| + max |d_i|. If the
-#: first step leaves more, a second one follows.
+#: With a Newton step: the largest accepted residual of the contact law, divided by |D0| + max |d_i|
+#: with the approach D0 and the offsets d. If the first step leaves more, a second one follows.
 ACCURATE = 1e-13
 
 #: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
@@ -44,11 +45,11 @@ ROOTS = 10.0
 
 
 class TooDenseError(InputError):
-    """Asperities whose contact radii are too large for a convex program: a_i > (pi/2) s_i.
+    """Some asperities have contact radii too large for a convex program: a_i > (pi/2) s_i.
 
-    asperities : (m,) their indices in the scene
-    ratios     : (m,) contact radius of each divided by (pi/2) s_i, while all others obey their
-        limits; s_i is half the distance to the nearest neighbour
+    asperities : (m,) the indices of these asperities in the scene
+    ratios     : (m,) the contact radius towards which each is pressed, divided by (pi/2) s_i, where
+        s_i is half the distance to the nearest neighbour
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -73,7 +74,8 @@ class ConeBoxes:
     loads   : (m,) B_i, upper ends of the boxes
     S       : (m,) convexity numbers of the boxes
     cut     : (m,) True where B_i is below the a priori bound
-    five    : True for the five-cone form;  limit : largest S for which the form is exact
+    five    : True for the form with five cones per asperity, False for four
+    limit   : largest S for which this form is exact
     """
 
     members: Indices
@@ -85,7 +87,7 @@ class ConeBoxes:
 
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
-        """Boxes a little wider than the a priori bounds, cut where S_i would exceed the limit."""
+        """Boxes that end above the a priori bounds, cut where S_i would exceed `limit`."""
         bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
         bounds, k = bounds[members], problem.coefficients[members]
@@ -97,18 +99,18 @@ class ConeBoxes:
         return cls(members, loads, S, faces < bounds, five, limit)
 
     def energies(self, problem: NormalProblem) -> Array:
-        """(m,) k B^(5/3), the factor of (3/5) t^5 - (S/3) t^6 in the local energy at P = B t^3."""
+        """(m,) k B^(5/3). The local energy at P = B t^3 is k B^(5/3) ((3/5) t^5 - (S/3) t^6)."""
         energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
         return energies
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
-        """(n,) loads of all candidates from those of the members (m,), limited to the boxes."""
+        """(n,) loads of all candidates, from loads (m,) of the members; limited to the boxes."""
         everywhere = np.zeros(len(problem))
         everywhere[self.members] = np.clip(loads, 0.0, self.loads)
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The error that names the members for which `pressed` (m,), their `ratios`, is not 0."""
+        """The error that names the members with `pressed` > 0; `pressed` (m,) gives `ratios`."""
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -118,13 +120,15 @@ class ConeBoxes:
 class ConeSolver(ABC):
     """Base class of the solvers of the cone program; it checks their answers.
 
-    newton_step : end with a step of Newton's method, which reduces errors of some 1e-8 of the
-        largest load to rounding; a second step follows if the first is not accurate enough
+    tolerance   : tolerance of the cone solver, in scaled units
+    newton_step : True to end with a step of Newton's method, which reduces errors of some 1e-8 of
+        the largest load to rounding. If one step is not accurate enough, a second follows
 
-    After Newton steps  |g_i|  where loaded, and  -g_i  elsewhere, must not exceed the limit
-    1e-13 (|D0| + max |d_i|). Without Newton steps,  max |P - P(D - A P)| <= 10 sqrt(tolerance)
-    max P,  where P(delta) is Hertz's load at the indentation delta. Otherwise SolverError is
-    raised, or TooDenseError if the cut boxes do not contain the solution.
+    The checks use the loads P, gaps g, approach D0, offsets d and D = D0 + d. With `newton_step`,
+    |g_i| where loaded and -g_i elsewhere must be at most 1e-13 (|D0| + max |d_i|). Without,
+    |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance) times the largest load, where
+    P(delta) is Hertz's load at the indentation delta. If a check fails, SolverError is raised. If
+    the cut boxes do not contain the solution, TooDenseError is raised.
     """
 
     tolerance: float = 1e-9
@@ -151,7 +155,7 @@ class ConeSolver(ABC):
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The solution by four cones or, if it reaches a face where the box was cut, by five.
+        """The solution by four cones or, if a cut box limits a load, by five.
 
         start : not used
         """
@@ -173,9 +177,10 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> So
 def judged(
     solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes, answer: ProgramAnswer
 ) -> Solution:
-    """The answer as a solution, checked against the contact law. Raises what `ConeSolver` raises.
+    """The solver's answer as a `Solution`, after the checks that `ConeSolver` describes.
 
-    The sign of D - A P separates open asperities from lightly loaded ones.
+    An asperity counts as open where D - A P <= 0, even if its computed load is not exactly 0.
+    Raises SolverError or TooDenseError if a check fails.
     """
     if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
         raise SolverError(
@@ -210,7 +215,10 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) the `ratios` of TooDenseError of members with a load limited by a cut face; else 0."""
+    """(m,) `TooDenseError.ratios` of members whose load a cut box limits; 0 for other members.
+
+    indentation : (n,) D - A P for P = `loads`
+    """
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads
@@ -221,10 +229,13 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps; `alone` is P(D - A P) for P = `loads`.
+    """The solution after one or two Newton steps from `loads`.
 
-    An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
-    So an asperity starts from `alone` where h_i exceeds its row sum of A, and else from `loads`.
+    alone : (n,) Hertz's loads at the indentations D - A P for P = `loads`
+
+    An error e of the loads changes the indentation k_i P_i^(2/3) by h_i e_i, with the compliance
+    h_i, and D - A P by -A e. So asperity i starts from its load in `alone` where h_i exceeds the
+    sum of row i of A, and from its load in `loads` elsewhere.
     """
     light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)

@@ -1,8 +1,8 @@
 """The contact law as one second-order cone program, solved with Clarabel.
 
 docs/theory/exact-cones.md states the program (1) and proves that its solution satisfies the contact
-law. `NormalProblem.shells` are the sigma_i there; D is the approach, or an upper bound on it if the
-load is prescribed, plus the offsets.
+law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
+approach; if the load is prescribed, an upper bound takes the place of the approach.
 """
 
 from __future__ import annotations
@@ -75,8 +75,9 @@ class Conic(ConeSolver):
 class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are p, y2 to y5 and z, in blocks of n. An asperity has four cones, or five for
-    larger boxes of loads. With five cones the block y1 precedes y2.
+    The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity these
+    stand for powers of t = (p / B)^(1/3), where B ends the box: t^2 to t^5, and t^5 - t^6. The form
+    with five cones, for larger boxes, also has y1 for t, before y2.
     """
 
     problem: NormalProblem
@@ -89,7 +90,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:
-        """The program: rows for the total load if prescribed, for p = B y3, and for the cones."""
+        """The program; its rows are the prescribed total load, if any, p = B y3, and the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, boxes = self.problem, self.boxes
@@ -122,7 +123,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads and the approach, which is the multiplier of a prescribed total load."""
+        """The loads and the approach, which follows from the multiplier of a prescribed load."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

@@ -112,7 +112,7 @@ class ConicCVXPY(ConeSolver):
 
 
 def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
-    """The reason why CVXPY cannot use this solver, and what to do; None if it can."""
+    """The reason why CVXPY cannot use this solver, and advice; None if CVXPY can use it."""
     from cvxpy.reductions.solvers import defines  # the cones that each solver accepts
 
     conic = defines.SOLVER_MAP_CONIC
@@ -135,9 +135,10 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
-    """A compiled cone program as CVXPY objects, in the scaled units of `normal`.
+    """The cone program as CVXPY objects, in the scaled units of `normal`.
 
-    settings : the solver;  normal : the contact problem;  boxes : bounds on the loads
+    settings : the solver;  normal : the contact problem
+    boxes    : the boxes 0 <= p <= B of loads
     program  : the cvxpy.Problem
     D0       : cvxpy.Parameter: the approach, or its upper bound if the load is prescribed
     p        : cvxpy.Variable: the loads of `boxes.members`
@@ -224,7 +225,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @property
     def approach(self) -> float:
-        """The prescribed approach, or that from the multiplier of the total load."""
+        """The prescribed approach, or the one from the multiplier of the prescribed load."""
         return float(self.D0.value - (0.0 if self.total is None else self.total.dual_value))
 
     @property

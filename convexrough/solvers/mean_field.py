@@ -1,9 +1,10 @@
 """Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-Asperities are grouped in rings about the axis. All asperities of a ring get the same displacement
-w by the loads of all rings, and by Hertz's law the loads P(w) at the indentations D - w. K holds
-the displacement of each ring by a unit load spread evenly over each ring. Newton's method solves
-w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights and radii).
+Asperities are grouped in rings about the axis. In the approximation, the loads of all rings cause
+the same displacement w at all asperities of a ring. Their indentations are D - w with
+D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). The matrix K
+contains the displacement of each ring by a unit load spread evenly over each ring. Newton's method
+solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights, radii).
 """
 
 from __future__ import annotations
@@ -22,14 +23,18 @@ RINGS, LEAST = 128, 150
 #: Approximate size of the evenly spaced sample of asperities that is used.
 SAMPLE = 50_000
 
-#: A load spread evenly includes the asperity's own load, spread over its share of the area. The
-#: displacement by this part is the factor times that of a disc of the same area: 1.1002 for square
-#: and 1.1061 for hexagonal arrays by Ewald's sums, and a heuristic for other layouts.
+#: If the load of a ring is spread evenly, this includes an asperity's own load, spread over its
+#: share of the area. The displacement by this part, to be subtracted, is OWN_SHARE times that by a
+#: uniformly loaded disc of the same area. Ewald's sums give 1.1002 for square and 1.1061 for
+#: hexagonal arrays; for other layouts the value is a heuristic.
 OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) scaled indentations, negative where open; if this fails, `smooth_indentation`."""
+    """(n,) initial indentations in scaled units, negative where open.
+
+    If the rings lead to no finite solution: `NormalProblem.smooth_indentation`.
+    """
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
@@ -88,7 +93,10 @@ def _mean_field(problem: NormalProblem) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Rings:
-    """For each asperity two neighbouring rings, and its relative position between their middles."""
+    """The two nearest rings of each asperity, and its position between their middles.
+
+    Positions are squared distances from the axis, because the rings have equal areas.
+    """
 
     first: Indices  # (n,) the inner one of the two rings
     share: Array  # (n,) 0 in the middle of this ring, 1 in the middle of the next
@@ -96,12 +104,16 @@ class _Rings:
 
     @classmethod
     def of(cls, places: Array, count: int) -> _Rings:
-        """The rings of asperities at squared distances `places`, in units of a ring's width."""
+        """The rings of n asperities.
+
+        places : (n,) squared distances from the axis, divided by the squared radius of the first
+            ring
+        """
         first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
         return cls(first, places - 0.5 - first, count)
 
     def sums(self, values: Array) -> Array:
-        """(count,) sums over the rings of values (n,), shared by the two rings of each asperity."""
+        """(count,) sums of values (n,) by ring; a value is divided between its two rings."""
         outer = np.clip(self.share, 0.0, 1.0) * values  # beyond its middle an end ring gets all
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]
@@ -113,7 +125,7 @@ class _Rings:
 
 
 def smooth_contact_radius(problem: NormalProblem) -> float:
-    """[length] contact radius of the smooth sphere at the prescribed quantity; infinite if flat."""
+    """[length] contact radius of a smooth sphere at the same approach or load; infinite if flat."""
     scene, units = problem.scene, problem.units
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
     if radius == np.inf:

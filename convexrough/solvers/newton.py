@@ -38,12 +38,12 @@ MARGIN = 0.03
 class Newton:
     """A solver with Newton's method.
 
-    tolerance : stop at  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|);  0 for
-        the accuracy of float64
+    tolerance : stop at  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|),  with
+        the symbols of docs/theory/newton.md;  0 for the accuracy of float64
     max_iterations : largest number of steps; SolverError is raised if they are not enough
 
-    Once that residual is below 1e-12 (|D0| + max_i |d_i|), the method also stops if the residual is
-    small compared with the rounding of A P, or if a step does not halve it.
+    Once the left side is below 1e-12 (|D0| + max_i |d_i|), the method also stops if the residual is
+    small compared with the rounding of A P, or if a step does not halve the left side.
     """
 
     tolerance: float = 0.0
@@ -103,7 +103,7 @@ class Newton:
         near: Indices,
         indentation: Array,
     ) -> tuple[PressingState, int]:
-        """The state in which only the asperities `near` may be loaded, and the number of steps."""
+        """The solution in which only the asperities `near` carry loads, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
@@ -120,9 +120,9 @@ class Newton:
 
 
 def newton_step(problem: NormalProblem, loads: Array) -> Solution:
-    """The solution after one step from the loads (n,) >= 0 of another solver, in scaled units.
+    """The result of one Newton step from the loads (n,) >= 0 of another solver, in scaled units.
 
-    An error e of the loads becomes about e^2, and loads of open asperities become exactly 0.
+    A small relative error e of the loads becomes about e^2, and open asperities get the load 0.
     """
     law = Pressing(problem, float(np.abs(problem.offsets).max()))
     before = law.evaluate(_start(problem, loads))
@@ -132,7 +132,10 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """(n,) initial indentations: by Hertz's law, -1 where a load is 0; for None, estimates."""
+    """(n,) initial indentations: by Hertz's law where `loads` are positive, and -1 elsewhere.
+
+    If `loads` is None, `start_indentation` estimates them.
+    """
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)

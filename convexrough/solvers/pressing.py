@@ -13,19 +13,19 @@ from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton's method may end if the norm of the defect is this fraction of that of the indentations;
-#: one correction by refinement about squares the fraction. A heuristic.
+#: Newton's method may end if the next step is expected to leave a defect whose norm is this
+#: fraction of that of the indentations. Refinement then makes the next correction. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
 
 class PressingState(NamedTuple):
-    unknown: Array  # delta
-    forces: Array  # P(delta)
+    unknown: Array  # delta, the indentation; minus the gap, or 0, where open
+    forces: Array  # the loads P(delta) by Hertz's law
     displacement: Array  # A P
-    gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
-    defect: Array  # F
+    gap: Array  # k P^(2/3) + A P - D, the gradient of the energy Phi
+    defect: Array  # F = delta + A P - D
     approach: float  # D0; under load control the latest estimate
-    energy: float
+    energy: float  # Phi(P)
     residual: float  # max |F|
     scale: float  # |D0| + max |d_i|
 
@@ -34,7 +34,7 @@ class PressingState(NamedTuple):
 class Pressing:
     """The contact law, in the form of `convex.newton`.
 
-    farthest : max |d_i| over all candidates, also those that are not in the problem
+    farthest : max |d_i| over all candidates, also those that `problem` leaves out
     """
 
     problem: NormalProblem
@@ -122,12 +122,15 @@ class Pressing:
 
 
 def negligible(indentation: Array) -> float:
-    """The 2-norm of F at which the iteration may end, because a correction follows."""
+    """The 2-norm of the defect F that the correction after the last step may leave."""
     return NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
 
 
 def on_constraint(problem: NormalProblem, indentation: Array) -> Array:
-    """(n,) indentations, limited to the largest possible D, or shifted to the prescribed load."""
+    """(n,) the indentations, shifted by one number so that their loads have the prescribed total.
+
+    If the approach is prescribed, each is instead limited to D_i = approach + offset.
+    """
     if problem.load is not None:
         return shifted_to_load(indentation, problem.coefficients, problem.load)
     return np.minimum(indentation, problem.approach_bound + problem.offsets)

@@ -26,10 +26,11 @@ Found = TypeVar("Found")
 
 
 class Reduction(ABC, Generic[Data, Raw, Found]):
-    """A problem as a program; the fields are the data that the conversion back needs.
+    """A contact problem as a program; the fields contain what `invert` needs.
 
-    The class method `assemble(problem, ...)` of a subclass creates it. It raises an error that
-    names the asperities for which the program is not exact, or InputError if memory is too small.
+    The class method `assemble(problem, ...)` of a subclass creates it, and raises InputError if
+    memory is too small. `invert` may raise an error that names asperities for which the program is
+    not exact.
     """
 
     @abstractmethod
@@ -46,10 +47,10 @@ class Reduction(ABC, Generic[Data, Raw, Found]):
 
 
 class ConeProgram(NamedTuple):
-    """minimise (1/2) x'P x + q'x  subject to  A x + s = b.
+    """minimise (1/2) x'P x + q'x  subject to  A x + s = b,  over x and s.
 
     The first `equalities` entries of s are 0. All others lie in second-order cones of three entries
-    each, s_1 >= || (s_2, s_3) ||.
+    each, s_1 >= || (s_2, s_3) ||. Of the symmetric matrix P only the upper triangle is stored.
     """
 
     quadratic: csc_matrix  # P, upper triangle
@@ -65,10 +66,10 @@ class ConeProgram(NamedTuple):
     def dual(self) -> ConeProgram:
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
-        The variables are v, one for each variable with an entry in P, then z. Entries of z at
-        equalities are free. At any feasible point minus the objective is a lower bound on the
-        minimum of the program. At the solution it equals the minimum, and the multipliers of the
-        equations are -x.
+        The variables are v, one for each variable whose diagonal entry in P is not 0, then z. The
+        first `equalities` entries of z are free. At any feasible point, minus the objective is a
+        lower bound on the minimum of this program. At the solution it equals this minimum, and the
+        multipliers of the equations are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 
@@ -96,7 +97,7 @@ class ConeProgram(NamedTuple):
 
 
 class QuadraticProgram(NamedTuple):
-    """minimise (1/2) x'P x + q'x,  lower <= A x <= upper."""
+    """minimise (1/2) x'P x + q'x  subject to  lower <= A x <= upper."""
 
     quadratic: csc_matrix  # P, upper triangle
     linear: Array  # q
@@ -121,7 +122,7 @@ class RawAnswer(NamedTuple):
 class ProgramAnswer(NamedTuple):
     """The answer of a program to a normal problem, not yet checked."""
 
-    loads: Array  # those of the asperities in the program, in the problem's order and units
+    loads: Array  # of the asperities in the program, in the order and units of the problem
     approach: float  # prescribed, or from the multiplier of the total load
     iterations: int
 

@@ -18,8 +18,9 @@ from convexrough.record import Record
 class Solution(Record):
     """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
-    residual : residual of the contact law for these loads, which `problem.residual` computes; if
-        `trial` is given, an upper bound on the residual of the loads of `trial`
+    iterations : number of steps of the solver
+    residual : residual of the contact law for these loads, as `NormalProblem.residual`; if `trial`
+        is given, an upper bound on the residual of the loads in `trial`
     refine   : True if the loads may be corrected to more digits; False to certify them unchanged
     trial    : these loads to more digits, if the solver has computed them; else None
     """

@@ -10,7 +10,7 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation, smooth_contact_radius
 
-#: If more asperities could touch, no product with A is used. This number affects speed only.
+#: If more asperities could touch, the start uses no product with A. This affects speed only.
 FEW = 1000
 
 #: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
@@ -25,9 +25,11 @@ def start_indentation(problem: NormalProblem) -> Array:
 
 
 def _on_hertz_pressure(problem: NormalProblem) -> Array:
-    """(n,) D - A P for loads P = x^3 s shaped like Hertz's pressure, s = (1 - r^2 / a^2)^(1/2).
+    """(n,) initial indentations D - A P for loads P distributed like the pressure of a sphere.
 
-    x follows from a prescribed load, or from  x^2 sum k s^(5/3) + x^3 s'A s = D's  (least energy).
+    P = x^3 s with s = (1 - r^2 / a^2)^(1/2), the distance r from the axis, and the contact radius
+    a. The number x follows from a prescribed load. At a prescribed approach it minimises the
+    energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
     """
     reach = smooth_contact_radius(problem) or 1.0
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
