@@ -402,7 +402,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
 def push(
     scene: Scene, box: Box, loads: list[Fraction], tell: Tell
 ) -> tuple[list[Interval], list[Interval]]:
-    """Enclosures of (A P)_i and of sum_j A_ij^2 2 b_j, with sums of integers (1)."""
+    """Enclosures of (A P)_i for P = `loads`, and of sum_j A_ij^2 2 b_j; sums of integers (1)."""
     force = max(loads) / 2**GRID or Fraction(1)
     parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
@@ -441,9 +441,10 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     """An amount by which D0 can decrease from this state while no indentation increases (11).
 
-    `missed` is minus the lower bound on the rate of each asperity. It must be negative for all that
-    may touch; otherwise the amount is 0. Where it is positive for an open asperity, the gap must
-    exceed `missed` times the amount.
+    The rate of an asperity is the derivative of its indentation by D0. `missed` is ONE times minus
+    a lower bound on each rate. It must be negative for all asperities that may touch; otherwise the
+    amount is 0. For an open asperity it may be positive. Then the amount is so small that the gap
+    stays open.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
@@ -470,7 +471,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 def missed_by_inverse(
     rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
-    """The lower bounds (11) on rates, multiplied by -ONE; an approximate inverse gives weights."""
+    """`missed` of `ordered_fall` by the bounds (11), with weights from an approximate inverse."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
     X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
     for k in range(n):  # Gauss-Jordan elimination in place

@@ -407,7 +407,9 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """(n,) [length] the increase of displacements if points move inwards by the part rho / R."""
+    """(m,) the increase of the displacements A P of the touching asperities for P = `loads`, in
+    scaled units, if each point moves towards the axis by the fraction rho / R of its distance.
+    """
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

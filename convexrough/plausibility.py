@@ -44,7 +44,8 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     """Measures of the validity of the model, by name; ratios or counts if no unit is given.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
-    extent       : largest distance of a point of contact from the axis, over the sphere's radius
+    extent       : largest distance of a point of contact from the axis, divided by the radius of
+        the sphere
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities. a and b are the
         half widths of a smooth body's contact at this load. None for a flat or a cylinder, at load
         0, and if the asperities are too few for an array (`is_array`)
@@ -232,7 +233,10 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """`array_extent` of `limits_of`; for a row along one axis, only the ratio of this axis."""
+    """`array_extent` as in `limits_of`.
+
+    For asperities in a row along x or y it is the ratio for this axis.
+    """
     smooth = smooth_reference(scene, load) if load > 0 and is_array(scene) else None
     if smooth is None:
         return None

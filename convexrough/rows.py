@@ -45,6 +45,7 @@ class PressedRows(NamedTuple):
     """Scenes that were proved together: a stack of m rows.
 
     places  : (m,) indices of the scenes;  problem : a problem that has the units of the stack
+    stack, box : the problems, and the boxes of loads in which their solutions were proved
     high    : the solutions;  squares : (m, n) [length^2] squared distances of summits from the axis
     """
 
@@ -107,7 +108,10 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """The pressed scenes that can be proved together; `controls` are (m,) loads or approaches."""
+    """The scenes that can be pressed and proved together, in stacks.
+
+    controls : (m,) loads [force] if `by_load` is True, else approaches [length]
+    """
     if not scenes or len(scenes[0]) > MOST:
         return []
     with threads.one_where(MATRICES):
@@ -142,7 +146,10 @@ def _family(scene: Scene) -> tuple[Any, ...]:
 
 
 def _leader(scene: Scene, control: float, by_load: bool) -> NormalProblem | None:
-    """The problem with all asperities of a scene; None if no asperity can touch."""
+    """The problem in which all asperities of a scene are candidates; None if none can touch.
+
+    control : the load [force] if `by_load` is True, else the approach [length]
+    """
     approach, load = (None, control) if by_load else (control, None)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     return problem.widened(np.arange(len(scene))) if len(problem) else None

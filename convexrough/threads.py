@@ -1,4 +1,4 @@
-"""Work on parts of large arrays in threads; numpy and Fourier transforms run in parallel there."""
+"""Work on parts of large arrays in several threads, where numpy and Fourier transforms allow it."""
 
 from __future__ import annotations
 

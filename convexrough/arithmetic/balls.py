@@ -290,7 +290,10 @@ def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Elementwise:
-    """A concave power f on balls: |f(x) - f(m)| <= min(r f(m) / m, f(r)) if |x - m| <= r."""
+    """The function that computes a concave power f of balls, from f of pairs and of floats.
+
+    |f(x) - f(m)| <= min(r f(m) / m, f(r)) if |x - m| <= r.
+    """
 
     def root(x: Pair, dx: Array) -> tuple[Pair, Array]:
         safe, above = positive(x)
@@ -306,7 +309,7 @@ def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Ele
 
 
 def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
-    """The numbers with 1 in place of each number <= 0, and a mask of the positive numbers."""
+    """The numbers with 1 in place of each number <= 0, and True where they were positive."""
     above = x.high > 0
     if above.all():
         return x, above

@@ -26,8 +26,8 @@ FEW_SCATTERED = 3000
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
     """The compliance operator of the asperities `which` of a scene.
 
-    scale : 1 / (pi E*), with the contact modulus E*, in the units of the loads
-    kind  : None for the cheapest. That is a matrix for few asperities. For more it is Fourier
+    scale : 1 / (pi E*) with the contact modulus E*, in the units of the loads and displacements
+    kind  : None for the cheapest kind. For few asperities it is a matrix. For more it is Fourier
         transforms, on the lattice if the asperities lie on one, and on a mesh if they do not
 
     Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
@@ -63,7 +63,7 @@ def _inverse(layout: Layout) -> Array:
 
 
 def _sums(layout: Layout) -> MatrixSums:
-    """The sums of P_j / r_ij over all points of a layout, which a scene restricts to asperities."""
+    """The map to the sums over j of P_j / r_ij for all points of a layout, shared by its scenes."""
     return MatrixSums(Pair.exact(layout.points))
 
 

@@ -77,8 +77,7 @@ class SiteBox:
 
     @cached_property
     def loss(self) -> float:
-        """Error of one two-dimensional transform relative to the 2-norm, in units of the
-        roundoff."""
+        """Error of one two-dimensional transform relative to the 2-norm, in roundoffs."""
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
@@ -127,7 +126,10 @@ class SiteBox:
         return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box; where several differences meet, the shortest's."""
+        """Values in some rows of the padded box.
+
+        Where several differences of sites fall on one place, the shortest one is used.
+        """
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
         found: list[Array] = []
@@ -272,7 +274,10 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Each distance with its difference (i, j) of sites, nearest first; not (-i, -j) as well."""
+    """The differences (i, j) of sites in a box, each after its length, the shortest first.
+
+    Of (i, j) and (-i, -j) only one is included.
+    """
     rows, columns = box.shape
     reach = 1
     done = 0.0

@@ -19,8 +19,8 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 
-#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. It is 1
-#: for differences, 3 for squares, 4 for their sum, 3 for the root, and 8 for the result.
+#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. A
+#: difference of coordinates has 1, its square 3, the sum of squares 4, its root 3, the result 8.
 ENTRY_ROUNDOFFS = 8
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
@@ -33,8 +33,8 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """Bounds on the error of a computed product A P, for loads of either sign.
 
-    The error of component i is at most  relative * (A |P|)_i + each: eta and rho of
-    docs/theory/operators.md.
+    The error of component i is at most  relative * (A |P|)_i + each.  docs/theory/operators.md
+    calls the two numbers eta and rho.
     """
 
     relative: float
@@ -45,7 +45,10 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """A 2-norm of the residual at which solvers can stop: these bounds are larger."""
+        """A 2-norm of the residual, well below these bounds, at which solvers can stop.
+
+        displacement : A P as computed
+        """
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
@@ -172,12 +175,18 @@ class JointCoupling:
 
 
 def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
-    """(m,) bounds on sqrt(sum_j A_ij^2 v_j), the effect of load errors on displacements."""
+    """(m,) bounds on the square root of sum_j A_ij^2 v_j for v = `variances`.
+
+    They bound |A e|_i for every error e of the loads with sum_j e_j^2 / v_j <= 1.
+    """
     return scale * np.sqrt(coupling.falloff(variances, 2))
 
 
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
-    """The points (n, 2) as pairs, with `tails` as low parts, and a bound on their errors."""
+    """The points (n, 2) as pairs, with `tails` as low parts, and a bound on errors of coordinates.
+
+    Without tails this bound is `point_error`.
+    """
     if tails is None:
         return Pair.exact(points), point_error
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))

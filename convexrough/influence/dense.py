@@ -24,7 +24,8 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: A matrix of 1 / r to other points is cached up to this many entries; beyond, it saves no time.
+#: A matrix of 1 / r between asperities and other points is cached if it has at most so many
+#: entries; for larger ones a cache saves no time.
 KEPT = 2**16
 
 

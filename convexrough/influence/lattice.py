@@ -57,8 +57,9 @@ FILLED = 0.2
 #: For more asperities than this, rarely needed spectra (transforms of kernels) are not cached.
 MOST_KEPT = 2**21
 
-#: 2 log 2, rounded down. The minimum of the symbol (`lattice_symbol`) is -2 log 2 for a row of
-#: points, and at most -2 log 2 for every lattice. The constant affects speed only.
+#: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), a lower bound on the
+#: eigenvalues of A in units of scale / spacing, is -2 log 2 for a row of points, and at most that
+#: for every lattice. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -68,8 +69,9 @@ class LatticeInfluence:
 
     array       : (N, 2) [length] points; each coordinate has an error of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact positions of the summits; `array` contains them times `lattice.shrink`,
-        rounded: 1 in the geometry "summit"; in "closest", R / (R + tip radius) along x and y
+    layout      : the exact positions of the summits. `array` contains them times `lattice.shrink`,
+        rounded. These factors along x and y are 1 in the geometry "summit", and R / (R + tip
+        radius) in "closest", with the radius R of the sphere
     lattice     : the lattice of the points
     scale       : 1 / (pi E*), which is A_ij r_ij
     """
@@ -96,7 +98,7 @@ class LatticeInfluence:
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) flat indices of the sites in an array with rows of padded length."""
+        """The box, and (n,) flat indices of the asperities' sites in an array of padded rows."""
         basis, (i, j) = self.lattice.basis / self.spacing, self.places
         if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
@@ -161,7 +163,7 @@ class LatticeInfluence:
 
     @property
     def _displaced(self) -> float:
-        """[1 / spacing] bound on the norm of the change of 1/r_ij by deviations from the sites."""
+        """[1 / spacing] bound on row sums of the changes of 1/r_ij by deviations from the sites."""
         return self.site_error / self._least * self._kernel.norm**2
 
     @cached_property
@@ -251,7 +253,8 @@ class LatticeInfluence:
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
 
-        Pairs are searched, nearest first, until no farther one can exceed the largest so far."""
+        Pairs are searched, nearest first, until no farther pair can exceed the largest ratio found.
+        """
         if not self._filled:
             return crowding(self.points, radii)
         (rows, columns), places = self.box.shape, self._boxed[1]
@@ -266,7 +269,10 @@ class LatticeInfluence:
         return worst
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """`neighbours` of the box, with lower bounds [length] on the distances of their points."""
+        """The differences (i, j) of `neighbours`, each after a lower bound [length] on distances.
+
+        The bound is for the distance of any two points whose sites have this difference.
+        """
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 

@@ -1,7 +1,8 @@
 """A lower bound on the eigenvalues of the compliance operator of points on a lattice.
 
-Such a bound is the minimum of the symbol f(k) over wave vectors k. The symbol is sigma(q) in
-docs/theory/operators-lattice.md, "The symbol". With any alpha > 0 and E(q) = erfc(q / 2 alpha) / q,
+Such a bound, in units of scale / spacing, is the minimum over wave vectors k of the symbol f(k),
+the Fourier transform of 1 / |d| over the lattice. docs/theory/operators-lattice.md, "The symbol",
+calls it sigma(q). With any alpha > 0 and E(q) = erfc(q / 2 alpha) / q,
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 

@@ -27,8 +27,10 @@ PLACES = 2**12
 class Interpolation:
     """The interpolation W from nodes to points.
 
-    x, y    : (n, width) weights in each direction; a weight of W is the product of two of them
-    patches : of groups of points in one block: first point, point after the last, first node (i, j)
+    x, y    : (n, width) weights in each direction; an entry of W is the product of one of each
+    patches : for each group of consecutive points in one block of mesh cells: the first point, the
+        point after the last, and the indices i and j of the first node
+    shape   : numbers of nodes of the mesh in both directions
     """
 
     x: NDArray[Any]
@@ -76,7 +78,10 @@ class Interpolation:
 
 
 def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
-    """The double-double weights (m, width) in x and y of some points, 0 outside their stencils."""
+    """The double-double weights (m, width) of some points, in x and in y.
+
+    They are 0 except at the nodes from which a point interpolates.
+    """
     stencil = np.arange(splitting.kernel.order)
     factors = []
     for k in (0, 1):

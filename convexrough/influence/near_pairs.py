@@ -1,4 +1,4 @@
-"""The part S = 1 / r^q - L that is not smooth, as a sparse matrix over near pairs of points."""
+"""The matrix S of 1 / r^q - L for near pairs of points, with the smooth L of module `softened`."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Order:
     places : (n,) original indices of the sorted points
     points : (n, 2) [length] the sorted points
     tails  : (n, 2) [length] low parts of the sorted points, or None
-    cells  : (n, 2) mesh cell of each point
-    shares : (n, 2) position of each point in its cell, from 0 to 1
+    cells  : (n, 2) mesh cell of each sorted point
+    shares : (n, 2) position of each sorted point in its cell, from 0 to 1
     keys   : (b,) numbers of the blocks that contain points, sorted
     starts : (b + 1,) first point of each of these blocks, and the number of all points
     shape  : numbers of rows and of columns of blocks
@@ -75,7 +75,10 @@ class Order:
 def _placed(
     points: Array, low: Array, spacing: float, tails: Array | None
 ) -> tuple[Indices, Array]:
-    """(n, 2) the cell of each point, and (n, 2) its position in the cell, rounded once."""
+    """(n, 2) the mesh cell of each point, and (n, 2) its position in the cell, rounded once.
+
+    low : (2,) [length] the origin of the mesh
+    """
     away = Pair(*two_sum(points, -low))
     if tails is not None:
         away += Pair.exact(tails)
@@ -91,7 +94,7 @@ class NearPairs:
     """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
 
     upper   : (n, n) sparse, the entries for pairs of sorted points i < j
-    own     : the entries on the diagonal, -L(0)
+    own     : the number on the diagonal, -L(0), as a point does not displace itself
     terms   : largest number of near neighbours of a point
     nearest : [length] least distance of a near pair that is not 0
     """

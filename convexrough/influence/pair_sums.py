@@ -29,7 +29,12 @@ from convexrough.roundoff import ROUNDOFF
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors."""
+    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors.
+
+    splitting, order : the choice of L and of the mesh; the points sorted by blocks of mesh cells
+    near, weights : the matrix S, and the interpolation W; None if there is no mesh
+    mesh, kernel : the box of the nodes, and L on it, which multiplies by G
+    """
 
     splitting: Splitting
     order: Order
@@ -56,7 +61,9 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """(n,) the sums; a second thread computes the sparse part, as both release the GIL."""
+        """(n,) the sums; a second thread computes the product with S, as both parts release the
+        GIL.
+        """
         ordered = loads[self.order.places]
         if self.weights is None:
             total = self.near.apply(ordered)
@@ -99,7 +106,10 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Bounds on errors outside the mesh: relative to the sums, and to the largest load."""
+        """Bounds on errors except those of `_weighing` and of transforms.
+
+        The first is relative to the sums, the second to the largest load.
+        """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
@@ -139,7 +149,7 @@ class Product:
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:
-    """(n,) upper bounds on the sum of the strengths at points within a distance of each point."""
+    """(n,) for each point an upper bound on the sum of `strengths` at points within `distance`."""
     parts = 4
     side = distance * (1.0 + 1e-9) / parts
     cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)

@@ -1,7 +1,7 @@
 """Sums over near pairs with more digits than float64 has.
 
-docs/theory/operators-mesh.md, "Near pairs to more digits", derives the method. `pair_sums` defines
-the parts S and L of 1 / r.
+docs/theory/operators-mesh.md, "Near pairs to more digits", derives the method. 1 / r is the sum of
+a smooth part L and a part S that is 0 for distances above the "reach" (module `pair_sums`).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """The sums of `pair_sums` with more digits than float64 has, for the products of a certificate.
 
-The product W G W^T P goes from points to the mesh, on the mesh, and back to the points. Each step
-is computed with slices of numbers. First slices have so few bits that their products are exact, and
-the rests are small. The remaining error is mostly due to interpolation
-(docs/theory/operators-mesh.md).
+For loads P, the smooth part of the sums is W G W^T P: W interpolates from the nodes of a mesh to
+the points, and G is the smooth kernel L between nodes. The product goes from points to the mesh, on
+the mesh, and back to the points. Each step is computed with slices of numbers. First slices have so
+few bits that their products are exact, and the rests are small. The remaining error is mostly due
+to interpolation (docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class Slices(NamedTuple):
 def in_slices(
     product: Callable[[Array, Array], Array], a: Slices, b: Slices
 ) -> tuple[Array, Array]:
-    """A bilinear product as two parts: the exact product of the first slices, and all the rest."""
+    """A bilinear `product` of a and b as two parts: that of the first slices, and all the rest."""
     left = product(a.first, b.second)
     left += product(a.second, b.first + b.second)
     return product(a.first, b.first), left
@@ -172,7 +173,10 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W times values on the mesh: whole numbers (n,), rests (n,), their unit, an error bound."""
+    """W times values on the mesh, as whole numbers (n,) plus rests (n,), in a unit.
+
+    Also returned are this unit and a bound on the error, in this unit.
+    """
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
@@ -196,7 +200,10 @@ def _from_nodes(
 def _weighed(
     product: Product, lows: LowWeights
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
-    """Groups of patches: the points of each group, slices for each patch, and the weights."""
+    """For each group of patches: its points, the slices of each patch, and the weights in x and y.
+
+    The slices of a patch are those of its points within the group, and of its nodes in x and y.
+    """
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):

@@ -1,6 +1,7 @@
-"""Shells: spheres about asperities that do not overlap and make the energy convex.
+"""Shells: imagined spheres around the asperities that do not overlap.
 
-docs/theory/convexity.md, "Why (2) is not convex as it stands", proves this.
+With radii s_i, the contact modulus E* and the compliance operator A, A + diag(1 / (pi E* s_i)) is
+positive semidefinite: docs/theory/convexity.md, "Why (2) is not convex as it stands".
 """
 
 from __future__ import annotations
@@ -13,10 +14,9 @@ from convexrough.roundoff import SAFETY
 
 
 def shells(influence: Influence) -> Array:
-    """(n,) 1 / (pi E* s_i), where the shell radius s_i is half the distance to the next neighbour.
+    """(n,) 1 / (pi E* s_i), where s_i is half the distance to the nearest neighbour.
 
-    A + diag(shells) is positive semidefinite. A value is 0 for a single asperity, and infinite for
-    points that may coincide.
+    A value is 0 for a single asperity, and infinite for points that may coincide.
     """
 
     def about(separations: Array) -> Array:
@@ -27,10 +27,10 @@ def shells(influence: Influence) -> Array:
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """(n,) 1 / (pi E* s_i), where the shell radii s_i are adapted to contact radii a_i that differ.
+    """(n,) 1 / (pi E* s_i), where the shell radii s_i are adapted to contact radii a_i = `radii`.
 
-    With a_i = `radii` [length], the largest (a_i + a_j) / r_ij as c, and d_i the distance to the
-    next neighbour, s_i = share a_i / c + (1 - share) d_i / 2: certificate.md, "Which box", 3.
+    s_i = share a_i / c + (1 - share) d_i / 2, where c is the largest (a_i + a_j) / r_ij, and d_i
+    the distance to the nearest neighbour: docs/theory/certificate.md, "Which box", 3.
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

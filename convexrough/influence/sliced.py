@@ -114,7 +114,8 @@ class Sliced:
     """A kernel on a box of sites, divided into slices for products with any loads.
 
     unit    : [length] the unit of distances, a power of two
-    kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more)
+    kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more), with the fields
+        `bits` and `more`
     error   : bound on the relative error of the values
     budget  : largest product of the 2-norms of a slice of loads and a slice of the kernel
     """
@@ -202,7 +203,10 @@ class Sliced:
         return 2.0**-self.bits * sum(norms)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads with which all levels are exact; and the number of bits of the first."""
+        """Slices of loads with which all levels are exact, and the number of bits of the first one.
+
+        shares : (n,) loads divided by a power of two, at most 1
+        """
         count = len(self.kernels)
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
@@ -231,9 +235,9 @@ class Sliced:
 
 
 def each_loss(box: SiteBox, count: int) -> float:
-    """Bound on the error of a component of a level, divided by the product of the 2-norms.
+    """Bound on the error of a component of a level, divided by the 2-norms of its two slices.
 
-    (1) of docs/theory/operators-lattice.md, with 2 `count` + 6 roundoffs instead of 4: up to
-    `count` products are added up before the inverse transform, and the last slices are rounded.
+    It is (1) of docs/theory/operators-lattice.md with 2 `count` + 6 roundoffs instead of 4, because
+    up to `count` products are added up before the inverse transform, and last slices are rounded.
     """
     return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)

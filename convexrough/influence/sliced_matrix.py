@@ -104,7 +104,7 @@ class SlicedMatrix:
         return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
 
     def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
-        """(..., m) high and low parts of products with loads (..., n) <= 1, and error bounds."""
+        """High parts, low parts and error bounds (..., m) of products with loads (..., n) <= 1."""
         sums, rests, left_over = [], [], []
         for columns, bits in self.blocks:
             a, b, c = (part[:, columns].T for part in self.slices)

@@ -5,8 +5,9 @@ If the point c_i of asperity i is moved, the displacement there changes with the
     d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3.
 
 Its two components are sums with odd kernels. They are computed on the boxes and meshes of the
-compliance operator, without error bounds. On a mesh the smooth part is -grad L, which is the
-distance vector times the softened 1 / r^3 whose order is one less.
+compliance operator, without error bounds. On a mesh, 1 / r has a smooth part L (module `softened`).
+The smooth part of the odd kernels is -grad L, the distance vector times the softened 1 / r^3 whose
+order is one less.
 """
 
 from __future__ import annotations
@@ -64,7 +65,10 @@ def _softer(product: Product) -> Softened:
 
 
 def _nearby(product: Product, ordered: Array) -> Array:
-    """(n, 2) the sums over near pairs, with 1 / r^3 minus its smooth part, for sorted points."""
+    """(n, 2) the part of the sums by near pairs, for sorted points: 1 / r^3 minus its smooth part.
+
+    ordered : (n,) the values v_j at the sorted points
+    """
     upper, points, kernel = product.near.upper, product.order.points, _softer(product)
     total, n = np.zeros_like(points), len(points)
     edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + BLOCK, BLOCK))

@@ -25,7 +25,7 @@ CUT_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Softened:
-    """The kernel L of power q, even order p and reach a [length]; L is 0 if a is infinite."""
+    """The kernel L of 1 / r^q with power q, even order p, reach a [length]; 0 if a is infinite."""
 
     power: int
     order: int
@@ -138,7 +138,7 @@ class Softened:
 
 
 def lebesgue(order: int) -> float:
-    """The largest sum of the sizes of Lagrange's polynomials in the middle interval of the nodes.
+    """The largest sum of the absolute values of Lagrange's polynomials between the middle nodes.
 
     In this interval the sum is an even polynomial, and all its roots lie outside. So it is largest
     in the middle.

@@ -1,7 +1,9 @@
 """The choice of the splitting of 1 / r^q into L + S, and of the mesh for the smooth part L.
 
-docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: they affect
-the cost, and how near the error is to the tolerance. The bounds on the error hold for any choice.
+S is 0 for distances r above the reach a. L is interpolated from p x p nodes of a mesh with the
+spacing h: docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics:
+they affect the cost, and how near the error is to the tolerance. The bounds on the error hold for
+any choice.
 """
 
 from __future__ import annotations
@@ -119,6 +121,6 @@ def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
 
 
 def _block(order: int, nodes_per_point: float) -> int:
-    """The side of a block with some tens of points, limited to p / 2 to 2 p cells."""
+    """The side, in mesh cells, of a block with some tens of points; from p / 2 to 2 p."""
     wanted = int(np.ceil(np.sqrt(48.0 * nodes_per_point)))
     return int(np.clip(wanted, order // 2, 2 * order))

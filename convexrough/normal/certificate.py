@@ -165,7 +165,7 @@ def certify(
 
 
 def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
-    """The certificate of loads (n,) [force] of the whole scene, for an assembled problem."""
+    """The certificate of loads (N,) [force] of all asperities of the scene of `problem`."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
@@ -182,9 +182,10 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
 def certificate_of(
     problem: NormalProblem, loads: Array, start: Trial, found: Proved | Obstacle
 ) -> Certificate:
-    """The certificate of loads (n,) [force] of the whole scene, from a solution proved near them.
+    """The certificate of loads (N,) [force] of all asperities of the scene.
 
     start : the loads of the asperities that can touch, scaled to the total if that is prescribed
+    found : a solution proved near them, or the obstacle to a proof
     """
     length, force = problem.units.length, problem.units.force
     others = NO_OTHERS
@@ -245,10 +246,13 @@ def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
 
 
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
-    """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| if Phi is convex from P to P*.
+    """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
-    P are the loads, P* the solution, and e the violations of the contact law at P. Loads q on
-    asperities fixed open add at most e'q, and removing them changes the residuals by A q.
+    It is e'|P - P*| if Phi is convex from P to P*, with the violations e of the contact law at P.
+    Loads q on asperities fixed open add at most e'q, and removing them changes the residuals by
+    A q. If Phi is not proved convex, the bound is infinite.
+
+    moved : (n,) bounds on |P - P*|
     """
     box, loads, excess = found.box, start.loads.high, start.excess
     if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
@@ -271,10 +275,10 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch: D_i <= 0 in every solution, rounding included."""
+    """The asperities that cannot touch: approach plus offset is at most 0 in every solution."""
 
     which: Indices  # their indices in the scene
-    below: NDArray[np.bool_]  # True where D_i < 0, False where D0 = d_i = 0
+    below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
     coupling: Coupling | None  # maps loads to their displacements; None if all can touch
     indentation: Array  # approach plus offset, less displacement: minus the gap
     rounding: Array  # bounds on errors of the indentation
@@ -299,9 +303,10 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy sum (3/5) k s^(5/3) + g's + s'A s / 2 of loads s at the gaps g.
+    """Bound on the energy that loads s on asperities that cannot touch add.
 
-    s are the loads on asperities that cannot touch. The bound is 0 if the load is prescribed.
+    It is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the load is prescribed, these
+    loads are dropped and the bound is 0.
     """
     screened = loads.copy()
     screened[problem.candidates] = 0.0

@@ -11,8 +11,8 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
 #: If contact radii are at most this fraction of the distance to the nearest neighbour, in every
-#: other solution a disc covers a neighbour's summit. It is the root a of m = pi / 4 for b = 1 in
-#: (1), rounded down.
+#: other solution a disc covers a neighbour's summit. In units of this distance it is the radius a
+#: for which (1), with the radius b = 1 in the other solution, gives m = pi / 4; rounded down.
 ROOMY = 0.52
 
 
@@ -25,7 +25,11 @@ class OtherSolutions(NamedTuple):
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """The bounds; `near` (n,) bounds the loads found, `approach_bound` any approach."""
+        """The properties of solutions other than the one found.
+
+        near           : (n,) upper bounds on the loads of the solution found
+        approach_bound : upper bound on the approach of every solution
+        """
 
         def radii(loads: Array) -> Array:
             return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
@@ -45,7 +49,7 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """The mean m of (1) for contact radii a and b; it increases with both."""
+    """(n,) m of (1) for contact radii a and b in two solutions; it increases with both."""
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

@@ -51,7 +51,10 @@ class Overlaps(NamedTuple):
 
 
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
-    """The largest of `margins` mu for which  H + A >= mu H  is proved, else 0; lengths : (n,) t."""
+    """The largest of `margins` mu for which  H + A >= mu H  is proved; 0 if there is none.
+
+    lengths : (n,) t_i = 1 / (pi E* h_i)
+    """
     points = influence.points
     if len(points) > MOST_ELIMINATED:
         return 0.0

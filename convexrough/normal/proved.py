@@ -2,8 +2,8 @@
 
 The theorem of docs/theory/one-theorem.md is applied twice: on a box of loads on which the energy is
 convex (module `boxes`), and on a smaller box, which by the first result contains the solution
-(docs/theory/certificate.md). P are the trial loads, D0 the approach, A the compliance operator,
-H the local Hessian; a star marks the solution.
+(docs/theory/certificate.md). P are the trial loads, D0 the approach, A the compliance operator; a
+star marks the solution. H is diagonal, the local part of the Hessian at the upper ends of the box.
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ class Proved:
     """A proved solution in scaled units: a ball for each of the n asperities of `problem`.
 
     trial     : the loads P from which it was proved
-    box       : a box of loads that holds exactly one solution
-    distance  : bound on || P - P* ||_H
-    compliance : (n,) diagonal of H
-    loads, indentation : (n,) those of the solution; a negative indentation is minus the gap
+    box       : a box of loads that contains exactly one solution
+    distance  : bound on the norm of P - P*, whose square is sum_i h_i (P_i - P*_i)^2
+    compliance : (n,) h, the diagonal of H for the smaller box
+    loads, indentation : (n,) of the solution; a negative indentation is minus the gap
     approach  : approach of the solution
     """
 
@@ -88,7 +88,7 @@ class Proved:
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on the errors of A P at the m points to which `coupling` maps loads."""
+        """(m,) bounds on |A P - A P*| at the m points to which `coupling` maps loads."""
         missing = self.trial.missing.size * self.problem.largest_entry
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
@@ -185,12 +185,10 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
 class _Missing(NamedTuple):
     """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
-    docs/theory/one-theorem.md derives it.
+    docs/theory/one-theorem.md derives it. (1 + t) P has the prescribed total.
 
-    t is the number for which (1 + t) P has the prescribed total.
-
-    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals; 0 if P
-        has this total
+    loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
+        from P to (1 + t) P; 0 if P has this total
     """
 
     loads: Any
@@ -211,14 +209,16 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """Balls of the loads; where a load is inexact, (indentation / k)^(3/2) if that is smaller."""
+    """The balls of the loads; an inexact one is replaced by (indentation / k)^(3/2) if smaller."""
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
     return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
 
 
 def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
-    """The loads P, or (n / k)^(3/2) where P is inexact and that ball is smaller."""
+    """The balls of loads P, or of (n / k)^(3/2) for indentations n where P is inexact and the
+    second ball is smaller; dP, dn and dk are radii.
+    """
     ratio = Ball(n, dn) / Ball(k, dk)
     by_law = ratio.positive_part() * ratio.sqrt()
     better = (dP > POOR * P.high) & (by_law.radius < dP)

@@ -122,7 +122,7 @@ class Stack:
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 
     def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
-        """(m, n) one Newton step; nan in rows with an indefinite matrix.
+        """(m, n) one Newton step of the indentations; nan in rows with an indefinite matrix.
 
         slopes, defect : (m, n) as in `NormalProblem.correct`
         todo   : (m,) rows that need a step; the others get 0

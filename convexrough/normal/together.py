@@ -55,7 +55,10 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The fields of `proved.Proved` for many problems; only rows that are `good` are proved."""
+    """The fields of `proved.Proved` for m problems, one per row.
+
+    good : (m,) True for rows that are proved; the others have no meaning
+    """
 
     trial: Trial
     box: Box
@@ -68,7 +71,7 @@ class Solved:
 
     @cached_property
     def rows(self) -> Rows:
-        """The solution of each row as a level, with the proved statuses."""
+        """The solutions of all rows, with the proved statuses."""
         touching = self.indentation.positive | self.loads.positive
         known = self.approach[:, 0], self.loads, self.indentation
         return Rows(self.total, *known, touching, self.indentation.negative)

@@ -32,15 +32,17 @@ def write_programs(
     formats: Collection[str] = tuple(FORMATS),
     bristles: int = 64,
 ) -> tuple[list[Path], dict[str, Any]]:
-    """Write NAME.FORM.ENDING for each form and format, then index.json; return paths and index.
+    """Write a file NAME.FORM.ENDING for each form and format, and index.json.
+
+    Returned are the paths of all files, and the contents of the index.
 
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     formats        : some of `FORMATS`
     bristles       : number of bristles per asperity
 
-    A program whose bounds do not contain the solution is left out; the index gives the reason.
-    Raises InputError, with the reason for the last one left out, if no program remains, and
-    FileError if a file cannot be written.
+    A program is left out if the solution is not in the box on which it is exact, or if a file would
+    not fit in memory; the index gives the reason. Raises InputError, with the reason for the last
+    one left out, if no program remains, and FileError if a file cannot be written.
     """
     problem, own = solved(scene, approach, load)
     about: dict[str, Any] = {}

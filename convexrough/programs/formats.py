@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 
 def qpsolvers_npz(program: QuadraticProgram) -> bytes:
-    """The file for qpsolvers.Problem.load: min x'Px/2 + q'x with G x <= h and A x = b, dense.
+    """The contents of a file for qpsolvers.Problem.load, with dense matrices.
 
-    Rows whose two bounds are equal become equations; all other rows have a lower bound only.
+    qpsolvers' problem is: minimise x'Px/2 + q'x subject to G x <= h and A x = b. Rows of `program`
+    with two equal bounds become equations; the others must have no upper bound.
     """
     width, height = len(program.linear), len(program.lower)
     checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
@@ -44,7 +45,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """The file for clarabel.load_from_file; Clarabel's package (0.11) has no writer."""
+    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) has no writer in Python."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),
@@ -70,10 +71,11 @@ def _columns(matrix: csc_matrix) -> dict[str, Any]:
 
 
 def cone_npz(program: ConeProgram) -> bytes:
-    """The file with the arrays of a cone program.
+    """The contents of an .npz file with the arrays of a cone program.
 
-    P_data, P_indices and P_indptr are the arguments of scipy's `csc_array` for P, both triangles;
-    A_data, A_indices and A_indptr those for A. q, b and `equalities` are as in the program.
+    P_data, P_indices and P_indptr are the arguments of scipy's `csc_array` for the whole symmetric
+    matrix P; A_data, A_indices and A_indptr those for A. q, b and `equalities` are as in
+    `ConeProgram`.
     """
     from scipy import sparse  # takes 0.1 s to import
 
@@ -90,9 +92,9 @@ def cone_npz(program: ConeProgram) -> bytes:
 
 
 def mps(program: QuadraticProgram) -> bytes:
-    """The file in free MPS with a section QUADOBJ, which HiGHS, Gurobi and CPLEX read.
+    """The contents of a file in free MPS with a section QUADOBJ, for HiGHS, Gurobi and CPLEX.
 
-    Rows whose two bounds are equal become equations; all other rows have a lower bound only.
+    Rows of `program` with two equal bounds become equations; the others must have no upper bound.
     Variables are free.
     """
     equal = program.lower == program.upper
@@ -115,9 +117,10 @@ def mps(program: QuadraticProgram) -> bytes:
 
 
 def cbf(program: ConeProgram) -> bytes:
-    """The file in the Conic Benchmark Format, version 1, whose objective is linear.
+    """The contents of a file in the Conic Benchmark Format, version 1.
 
-    A last variable t replaces x'Px/2. With P = F'F,
+    The objective of this format is linear, so one more variable t, the last, replaces x'Px/2. With
+    P = F'F,
 
         t >= |Fx|^2 / 2    as    t + 1/2 >= |(t - 1/2, Fx)|,
 
@@ -168,6 +171,6 @@ def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
 
 
 def _counted(entries: list[tuple[Any, ...]]) -> list[str]:
-    """The number of nonzero entries, then one line for each of them, without rounding."""
+    """The number of entries whose value, the last item, is not 0; then a line for each of them."""
     lines = [" ".join(map(repr, entry)) for entry in entries if entry[-1] != 0]
     return [str(len(lines)), *lines]

@@ -161,7 +161,9 @@ def program(
 
 
 def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
-    """The problem of a scene with a dense matrix, and the loads that solve it, in scaled units."""
+    """The problem of a scene with a dense matrix, and its loads (n,) by Newton's method, in scaled
+    units.
+    """
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:
         expected = "an approach at which an asperity touches"
@@ -239,10 +241,11 @@ def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:
 
 
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
-    """Estimated error of the loads of the bristle program, relative to the largest load.
+    """Estimated error of the loads of the bristle program, divided by the largest load.
 
-    With m bristles and the box 0 <= load <= B, the load of one asperity has an error of at most
-    0.375 B / m^2. Coupling multiplies it by at most 1 / lambda, the smallest scaled eigenvalue.
+    With m bristles and the box 0 <= load <= B, the load of one asperity at a given indentation has
+    an error of at most 0.375 B / m^2. Coupling multiplies errors by up to about 1 / lambda, with
+    the smallest of the `scaled_eigenvalues` as lambda.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])

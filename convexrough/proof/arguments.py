@@ -19,8 +19,9 @@ from scipy.spatial.distance import cdist
 from convexrough.arrays import Array
 from convexrough.scene.scene import Scene
 
-#: Relative distance from bounds on the radii of any solution to the upper ends of a box, and the
-#: smallest upper end divided by the largest: for accurate radii, then for inaccurate ones.
+#: Two numbers for boxes that contain every solution: the relative distance of their upper ends from
+#: bounds on the radii, and the smallest upper end divided by the largest. The first pair of numbers
+#: is for accurate radii, the second for inaccurate ones.
 ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
 #: Relative room for rounding in this module.
@@ -98,7 +99,10 @@ class TrialState:
 
     @cached_property
     def ceiling(self) -> tuple[float | None, float]:
-        """`Argument.ceiling`, and the bound on the approach of every solution that it gives."""
+        """`Argument.ceiling`, and an upper bound [length] on the approach of every solution.
+
+        The bound follows from the ceiling; if the approach is prescribed, they are None and D0.
+        """
         if self.approach is not None:
             return None, self.approach
         loaded = self.loads > 0
@@ -147,7 +151,7 @@ class TrialState:
         return box
 
     def _crowded(self, box: Array) -> Iterator[Reason]:
-        """An argument by overlapping shells if one is found, else by Cholesky factorisation."""
+        """At most one argument: by overlapping shells, or if none is found by Cholesky's method."""
         able = np.flatnonzero(box)
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:

@@ -1,9 +1,9 @@
 """Proved bounds on the errors of a vector friction state from any source.
 
 docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derives
-the steps 1 to 6 that comments name. Forces q, the displacement eta that each asperity takes up, the
-total T and the rigid displacement X are in scaled units. P are the loads, k the sliding thresholds,
-B the kernel; a star marks the solution for the true loads, which are known as balls.
+the steps 1 to 6 that comments name. The shear forces q, the displacements eta that the asperities
+take up, the total T and the rigid displacement X are in scaled units. P are the loads, k the
+sliding thresholds, B the kernel. A star marks the state for the true loads, known as balls.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from convexrough.friction.levels import AT_THE_END
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
-#: Number of radii tried in step 2, and their ratio. Heuristics.
+#: Number of radii r tried in step 2, and the ratio of each to the one before. Heuristics.
 TRIALS, WIDER = 24, 1.5
 
 #: A bound on the rounding of a unit vector, and of |eta| / k.
@@ -52,7 +52,10 @@ class VectorBounds(NamedTuple):
 
 @quietly
 def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Bounds on the errors of a state from any source; total : (2,) T."""
+    """Bounds on the errors of a state from any source, compared with the exact state.
+
+    total : (2,) the total T, as a ball
+    """
     if problem.scope == "none" or not problem.sure.any():
         return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
@@ -144,7 +147,13 @@ def _steepest(problem: VectorProblem, size: Array) -> Array:
 
 
 def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found."""
+    """The r of step 2: some vector of at most this length, added to all eta, restores the total.
+
+    The result is infinite if no r is found.
+
+    turned  : (n,) each eta_i may also change by a vector of up to this length
+    missing : bound on the difference of the sum of the forces from the total
+    """
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
@@ -176,9 +185,13 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
 
 def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
-    """Bound on E(q) - E(q*) for |q_i| <= P_i up to rounding; infinite if X is infinite.
-    e_i is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the
-    ray of all eta with this force.
+    """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
+
+    It is the sum of e_i |q_i - q*_i|, for |q_i| <= P_i up to rounding. e_i is the distance of
+    X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the ray of all eta with this
+    force.
+
+    errors : (n,) bounds on |q - q*|
     """
     q, X = state.increments, state.displacement
     if not np.isfinite(X).all() or problem.margin == 0.0:

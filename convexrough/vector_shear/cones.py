@@ -1,10 +1,11 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-docs/theory/vector-friction.md, "Cones", derives it. For a force q and a load P, |q| / P = 1 - t^3
-and u = 1 - t. S is the share of the shift in the local compliance, epsilon the elastic estimate of
-|q| / P. The variables are q / (epsilon P), and those of order u^k divided by epsilon^k. The
-multiplier of the total is the rigid displacement. The multiplier of |q_i| <= P_i (1 - t^3) is the
-sum of the slip and of the slope of the local energy.
+docs/theory/vector-friction.md, "Cones", derives it. For the shear force q and the load P of an
+asperity, |q| / P = 1 - t^3 defines t, and u = 1 - t. The kernel becomes positive semidefinite if a
+diagonal, the shift, is added; S is the shift divided by the local compliance. epsilon is an
+estimate of |q| / P for asperities that all stick. The variables are q / (epsilon P), and those of
+order u^k divided by epsilon^k. The multiplier of the total is the rigid displacement. The
+multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope of the local energy.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ class _Lift(NamedTuple):
 
     orders : (k,) order of each variable in u; the first variable is the number 1
     cones  : (cones, 3, k) coefficients of x, y, w
-    share  : (k,) coefficients of m / P = 1 - t^3, with the bound m on |q|
-    energy : (2, k) the coefficients of the local energy are the first row plus S times the second
+    share  : (k,) coefficients of m / P = 1 - t^3, where m is a bound on |q|
+    energy : (2, k) the first row plus S times the second gives the coefficients of the local energy
     """
 
     orders: Array
@@ -135,9 +136,11 @@ class FrictionConic:
 class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     """The cone program, scaled so that its numbers are about 1.
 
-    The variables are q / (epsilon P) (x_1, y_1, x_2, ...), then those of the cones by asperity.
+    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., then those of the cones,
+    asperity by asperity.
 
-    total  : (2,) T;  lift : the cones;  small : (n,) epsilon;  energy : the unit of energy
+    total  : (2,) the total shear force T
+    lift   : the cones of an asperity;  small : (n,) epsilon;  energy : the unit of energy
     """
 
     problem: VectorProblem
@@ -169,7 +172,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic and linear parts: (1/2) q'(B + shift)q, and the local energies."""
+        """The quadratic part (1/2) q'(B + shift) q with the kernel B, and the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
@@ -201,7 +204,10 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) rows of the cones over epsilon^order, with m / P >= |(x, y)| first."""
+        """(n, rows, k) the rows of all cones, for variables divided by epsilon^order.
+
+        The first three rows of each asperity are m / P >= |q| / P, divided by epsilon.
+        """
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
         powers = np.maximum(lift.orders - leading, 0.0)

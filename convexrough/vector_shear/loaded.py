@@ -1,9 +1,9 @@
 """The loaded asperities of a contact: Mindlin's law of each, and bounds on their loads.
 
 An asperity with the load P and the shear force u has the deflection
-eta = threshold deflection(u / P), and slides beyond threshold = k P^(2/3). Shear forces are in
-units of f times the unit of loads, displacements of c_t f times the unit of lengths, with the
-coefficient of friction f and Mindlin's ratio c_t.
+eta = threshold [1 - (1 - u / P)^(2/3)], and slides beyond threshold = k P^(2/3). With the
+coefficient of friction f and Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)), shear forces are in
+units of f times the unit of loads, and displacements in units of c_t f times the unit of lengths.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import annulus
 
-#: Below this fraction of P the state is proportional to the force to all digits.
+#: If the shear force over f is below this fraction of the total load, the state is proportional to
+#: the force to all digits.
 ELASTIC = Fraction(1, 10**15)
 
 
@@ -39,7 +40,7 @@ class Loaded:
     scope    : scope of the contact's certificate; "none" without a proof
     touching : indices of the loaded asperities in the scene
     loads, errors : P, and bounds on the errors;  thresholds : k P^(2/3)
-    influence : operator A;  shells : A + diag(shells) is positive semidefinite
+    influence : operator A;  shells : a diagonal; A + diag(shells) is positive semidefinite
     sure     : True where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
     stiffness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
@@ -163,7 +164,10 @@ class Loaded:
 
     @cached_property
     def elastic(self) -> Ball:
-        """(n,) parts of the total carried if all stick: derivatives of the loads by their sum."""
+        """(n,) parts of a shear force that the asperities carry if all stick.
+
+        They are the derivatives of the loads with respect to the total load.
+        """
         return self.levels.top.tangent.loads[self.places]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:

@@ -1,12 +1,12 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-docs/theory/vector-friction.md, "Newton's method", in scaled units. The unknown eta_i is the sum of
+docs/theory/vector-friction.md, "Newton's method", describes it. The unknown eta_i is the sum of
 deflection and slip of asperity i. For the forces q, their total T, the kernel B and the rigid
-displacement X, `convex.newton` solves
+displacement X, all in scaled units, `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-With dq_i/deta_i = W_i W_i' a step solves
+With the derivative dq_i/deta_i = W_i W_i' (2, 2) of each asperity, a step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
 """

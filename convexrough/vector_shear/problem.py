@@ -1,15 +1,15 @@
 """The friction problem with the full tangential kernel: docs/theory/vector-friction.md.
 
-Forces are in units of the coefficient of friction f, displacements of c_t f and energies of
-c_t f^2, with Mindlin's ratio c_t. With the compliance operator A and bias = nu / (2 - nu) the
-kernel is, by (1) of that page,
+Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
+in units of c_t f^2, with Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). With the compliance
+operator A and bias = nu / (2 - nu) the kernel is, by (1) of that page,
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
-for the unit vector d from j to i and Poisson's ratio nu. Under the total T = Q / f the forces q_i,
-|q_i| <= P_i, and the slips satisfy, with the rigid displacement X,
+for the unit vector d from j to i and Poisson's ratio nu. Under the shear force Q, T = Q / f. The
+forces q_i, of size |q_i| <= P_i and sum T, and the slips satisfy, with the rigid displacement X,
 
-    X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i deflection(|q| / P_i) q / |q|.
+    X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i [1 - (1 - |q| / P_i)^(2/3)] q / |q|.
 """
 
 from __future__ import annotations
