@@ -43,10 +43,10 @@ def compare(
     SCS and QOCO also solve the cone program if they are installed. With --solver, only the named
     solvers are compared with Newton's method.
 
-    Exit status: 0 if all results agree; 2 wrong input; 3 if no result is certified, if a load
-    differs from Newton's by more than --within, if a solver does not accept the scene, or if a
-    certified result contradicts another that is proved to be the only solution; 4 if a solver
-    failed and there is no contradiction. A contradiction would reveal a mistake in the mathematics
+    Exit status: 0 if all results agree; 2 wrong input; 3 if a certified result
+    contradicts another that is proved to be the only solution; else 4 if a solver failed; else 3
+    if no result is certified, if a load differs from Newton's by more than --within, or if a
+    solver does not accept the scene. A contradiction would reveal a mistake in the mathematics
     or the code.
     """
     from convexrough.compare import compare as compare_solvers
