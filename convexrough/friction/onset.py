@@ -51,8 +51,8 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
     In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
     (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. It
-    is also nan if the indentation of some asperity falls while the load rises from the first touch
-    of this asperity to the load of the contact: it may then start to slide at another force.
+    is also nan if the order (see `prove_order`) "fails" between the load of the asperity's first
+    touch and the load of the contact: the asperity may then start to slide at another force.
 
     which : indices of the asperities, in the order of the result; default all. Each asperity needs
         several normal solutions
@@ -138,7 +138,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def _short(load: Fraction) -> Fraction:
-    """The load as a sum of two float64 numbers: a rounded fraction with a short numerator."""
+    """The load, rounded to a sum of two float64 numbers: a fraction with few digits."""
     high = Fraction(float(load))
     return high + Fraction(float(load - high))
 

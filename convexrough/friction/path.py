@@ -151,7 +151,7 @@ def load_path(
     influence : how the compliance matrix is stored, as in `press`; None chooses by speed
     general_steps : number of general steps per segment. These steps hold also if an indentation
         falls as the load rises (docs/theory/without-order.md), but their results are not proved.
-        None uses the memory curve, or, if an indentation falls, 4 to 64 general steps per segment
+        None uses the memory curve or, if an indentation falls, 16, 32 or 64 steps per segment
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.
