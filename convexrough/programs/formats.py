@@ -45,7 +45,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) has no writer in Python."""
+    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) cannot write it."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),

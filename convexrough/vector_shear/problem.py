@@ -9,7 +9,7 @@ operator A and bias = nu / (2 - nu) the kernel is, by (1) of that page,
 for the unit vector d from j to i and Poisson's ratio nu. Under the shear force Q, T = Q / f. The
 forces q_i, of size |q_i| <= P_i and sum T, and the slips satisfy, with the rigid displacement X,
 
-    X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i [1 - (1 - |q| / P_i)^(2/3)] q / |q|.
+    X = own(q_i) + (B q)_i + slip_i,   own(q) = threshold_i [1 - (1 - |q| / P_i)^(2/3)] q / |q|.
 """
 
 from __future__ import annotations
