@@ -77,8 +77,8 @@ class Influence(Coupling, Protocol):
     """The compliance operator A among asperities, A_ij = scale / r_ij.
 
     name   : "dense", "lattice" or "scattered"
-    points : (n, 2) [length]
-    scale  : 1 / (pi E*) in the units of the problem
+    points : (n, 2) [length] the contact points
+    scale  : 1 / (pi E*) with the contact modulus E*, in the units of loads and displacements
     stored : True if the matrix is stored. If it is not, float32 loads make products cheaper
     cheap_sums : True if `sums` takes only a few times as long as `apply`. Newton's method then ends
         early, and `refine` makes the last steps

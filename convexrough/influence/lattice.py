@@ -43,7 +43,8 @@ from convexrough.scene.neighbours import crowding, separations
 
 Made = TypeVar("Made")
 
-#: Relative error, in roundoffs, of a computed scale / |i b1 + j b2| on a reduced basis b1, b2.
+#: Bound on the relative error, in roundoffs, of a computed scale / |i b1 + j b2|, where b1, b2 is a
+#: reduced basis of the lattice.
 ENTRY_ROUNDOFFS = 24
 
 #: Number of array elements in a block, chosen to fit into a processor's cache.

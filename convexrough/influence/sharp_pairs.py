@@ -21,7 +21,7 @@ from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.roundoff import ROUNDOFF
 
-#: Number of binary places of the whole numbers, in units of 2^-FIXED, with which L is computed.
+#: L is computed with whole numbers, in units of 2^-FIXED.
 FIXED = 160
 
 #: Least number of nodes of the table of L, and number of terms of Taylor's series at each node.
@@ -29,9 +29,10 @@ NODES, TERMS = 1024, 8
 
 
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
-    """`count` terms of Taylor's series of reach times L in (r / reach)^2, each (nodes,).
+    """The first `count` coefficients of Taylor's series of reach times L, each (nodes,).
 
-    The nodes are r^2 = 0, step, 2 step, ... The terms are whole numbers, in units of 2^-FIXED.
+    The variable is (r / reach)^2, and the series are about the nodes r^2 = 0, step, 2 step, ... The
+    coefficients are whole numbers, in units of 2^-FIXED.
     """
     one, apart = 1 << FIXED, step / Fraction(kernel.reach) ** 2
     t = one - np.arange(nodes, dtype=object) * one * apart.numerator // apart.denominator

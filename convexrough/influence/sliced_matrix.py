@@ -96,7 +96,7 @@ class SlicedMatrix:
         return cls(slices, blocks, losses.reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
-        """The matrix among some of the points, with increasing indices; errors are no larger."""
+        """The matrix among points with increasing indices `which`; its errors are no larger."""
         first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
         columns = (slice(*edges) for edges in pairwise([0, *stops]))

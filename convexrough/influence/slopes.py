@@ -1,4 +1,4 @@
-"""The slope of the surface at each asperity: the derivative of its displacement by its point.
+"""The slope of the surface at each asperity: the derivative of displacement by position.
 
 If the point c_i of asperity i is moved, the displacement there changes with the derivative
 

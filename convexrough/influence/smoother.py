@@ -1,8 +1,8 @@
 """An approximate inverse of I + W A W, to precondition conjugate gradients.
 
 It is the matrix M of docs/theory/newton.md, "The preconditioner", for the compliance operator A and
-a diagonal W:  M = I - v G (1 - (1 + q A)^-1) G v.  G^2 takes means with Gaussian weights. v is
-W / d^(1/2) for a local mean d of W^2, and q the median of d. The Gaussian is as wide as a window of
+a diagonal W:  M = I - v G (1 - (1 + b A)^-1) G v.  G^2 takes means with Gaussian weights. v is
+W / d^(1/2) for a local mean d of W^2, and b the median of d. The Gaussian is as wide as a window of
 cells: those of the asperities' lattice, or squares. The code computes M on blocks of m x m cells,
 smaller than a window, with the mean of A over pairs of blocks. The constants are heuristics: they
 change the number of steps of conjugate gradients, not the answer.
@@ -43,7 +43,8 @@ WINDOW = 8
 #: with points are at most WIDEST_GAP cells apart; larger distances are shortened to this.
 MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
-#: Lower limit of the factors of 1 + q A, because those of A are negative for short waves.
+#: Lower limit of the eigenvalues of 1 + b A in the code, because A has negative ones for short
+#: waves.
 LEAST = 0.2
 
 
@@ -110,7 +111,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     q = np.divide(w, np.sqrt(mean).ravel()[block], out=np.zeros_like(w), where=w > 0)
 
     middle = np.float32(np.sqrt(np.median(mean[touching])))
-    displacement = np.float32(scale) * middle * spectrum  # q^(1/2) A, for each wave
+    displacement = np.float32(scale) * middle * spectrum  # b^(1/2) A, for each wave
     removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
     removed *= passed
     energies = displacement * displacement

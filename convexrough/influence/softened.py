@@ -120,7 +120,10 @@ class Softened:
         return float(_interpolated(self.order) * worst * ratio * nearer**self.power)
 
     def sway(self, spacing: float) -> float:
-        """[length] bound on |d - r| for the distance d of nodes in the stencils of two points."""
+        """[length] bound on |d - r| for two points at the distance r.
+
+        d is the distance of any two nodes from which the values at the two points interpolate.
+        """
         return math.sqrt(2.0) * self.order * spacing if np.isfinite(self.reach) else 0.0
 
     @property
@@ -140,14 +143,17 @@ class Softened:
 def lebesgue(order: int) -> float:
     """The largest sum of the absolute values of Lagrange's polynomials between the middle nodes.
 
-    In this interval the sum is an even polynomial, and all its roots lie outside. So it is largest
-    in the middle.
+    Between these two nodes the sum equals a polynomial that is even about the middle, and all its
+    roots lie outside. So it is largest in the middle.
     """
     return float(np.abs(lagrange(np.array([0.5]), order)).sum())
 
 
 def lagrange(places: Array, order: int) -> Array:
-    """(n, p) Lagrange's polynomials of the nodes 1 - p/2, ..., p/2 at places from 0 to 1."""
+    """(n, p) values of Lagrange's polynomials for the nodes 1 - p/2, ..., p/2.
+
+    places : (n,) from 0 to 1
+    """
     weights: Array = twofold_lagrange(places, order).high
     return weights
 

@@ -114,9 +114,10 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """A level of loads near which nothing is proved: its balls have infinite radii.
+        """A level of loads near which nothing is proved.
 
-        A prescribed load or approach is known, so its ball keeps its own radius.
+        The balls of loads and indentations have infinite radii. So has that of the approach, unless
+        the approach is prescribed; then its radius is 0.
         """
         unknown = Ball.around(state.loads, np.inf)
         none = np.zeros(len(problem), dtype=bool)
@@ -179,7 +180,7 @@ class Level:
         )
 
     def response(self, right: Ball, total: Ball) -> Response:
-        """The solution x (n,), beta of  x / c + A x = right + beta,  sum x = total.
+        """The solution x (n,) and beta, a number, of  x / c + A x = right + beta,  sum x = total.
 
         The equations hold for touching asperities; x is 0 for others. The solution is refined in
         pairs of float64 numbers until the residual no longer halves. The bounds on its error

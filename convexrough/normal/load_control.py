@@ -21,8 +21,8 @@ from convexrough.sphere import hertz
 #: The approach is bounded on a scene whose radius is WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
-#: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on
-#: the shift.
+#: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
+#: certificates do not rely on the shift.
 STRAIGHT = 1e-11
 
 
@@ -30,9 +30,9 @@ STRAIGHT = 1e-11
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
     """Indentations delta + tau, with the tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
 
-    For m problems delta is (m, n) and the load (m, 1). The sum to the power 2/3 is a norm of
-    (delta + tau)+ / k, so it is convex and nearly straight in tau, and Newton's method
-    converges to the root from the right.
+    The sign + means max(., 0). For m problems delta is (m, n) and the load (m, 1). The sum to the
+    power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in tau. So
+    Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, inverse = indentation - highest, 1.0 / coefficients
@@ -63,7 +63,8 @@ def approach_bound(
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
-    (2) of docs/theory/certificate.md with q = weights / sum(weights), alpha = q k and c = A q.
+    It is (2) of docs/theory/certificate.md with q = weights / sum(weights), alpha = q k, c = A q,
+    and nearly the lambda for which this bound is least.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) upper bounds on A times weights
@@ -129,7 +130,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] Hertz's loads of this total, if the surface sinks as under a smooth sphere."""
+    """(n,) [force] loads of this total by Hertz's law, for the displacement by a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)

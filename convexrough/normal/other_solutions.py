@@ -1,4 +1,7 @@
-"""Bounds that every other solution satisfies: docs/theory/crowded.md, "Other solutions" and (1)."""
+"""Properties of solutions that a local certificate does not exclude.
+
+docs/theory/crowded.md, "Other solutions", derives them; (1) is an equation of that page.
+"""
 
 from __future__ import annotations
 

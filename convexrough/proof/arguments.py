@@ -82,6 +82,7 @@ class TrialState:
 
     @cached_property
     def local(self) -> Array:
+        """(n,) [length] indentations a^2 / R by the asperities' own loads."""
         return self.radii**2 / self.scene.relative_radii
 
     @cached_property

@@ -125,7 +125,7 @@ class ConeSolver(ABC):
         the largest load to rounding. If one step is not accurate enough, a second follows
 
     The checks use the loads P, gaps g, approach D0, offsets d and D = D0 + d. With `newton_step`,
-    |g_i| where loaded and -g_i elsewhere must be at most 1e-13 (|D0| + max |d_i|). Without,
+    |g_i| where loaded and -g_i elsewhere must be at most 1e-13 (|D0| + max |d_i|). Without it,
     |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance) times the largest load, where
     P(delta) is Hertz's load at the indentation delta. If a check fails, SolverError is raised. If
     the cut boxes do not contain the solution, TooDenseError is raised.

@@ -10,7 +10,7 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation, smooth_contact_radius
 
-#: If more asperities could touch, the start uses no product with A. This affects speed only.
+#: If more than FEW asperities could touch, the start uses no product with A, for speed only.
 FEW = 1000
 
 #: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.

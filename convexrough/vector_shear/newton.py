@@ -31,8 +31,8 @@ class FrictionNewton:
     """A solver of `shear_vector` by Newton's method, which starts from the state of `shear`.
 
     The method stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not
-    halve this residual. `shear_vector` then raises SolverError if this takes more than
-    `max_iterations` steps. docs/theory/vector-friction.md defines the symbols.
+    halve this residual. If this takes more than `max_iterations` steps, `shear_vector` raises
+    SolverError. docs/theory/vector-friction.md defines the symbols.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
     >>> state.residual < 1e-12

@@ -56,9 +56,10 @@ class VectorShearState(Table, Plottable):
         length of the difference
     solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P the forces are f P_i along Q. Unless they displace all asperities equally
-    across Q, this state is reached only in the limit of an infinite displacement. The displacement,
-    the slips, `residual` and `duality_gap` are then infinite.
+    At |Q| = f P the forces are f P_i along Q. If the displacements by these forces, in the
+    direction across Q, are not the same at all asperities, this state is reached only in the limit
+    of an infinite displacement. The displacement, the slips, `residual` and `duality_gap` are then
+    infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.holds
@@ -181,8 +182,8 @@ def _vector(force: ArrayLike) -> Array:
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """The state at |T| = sum P, where all forces and slips are along T.
 
-    If the displacements B q of these forces q differ across T, forces tend to this state only as
-    the displacement X along T goes to infinity.
+    If the components across T of the displacements B q by these forces q differ, forces tend to
+    this state only as the displacement X along T goes to infinity.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
