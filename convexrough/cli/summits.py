@@ -19,7 +19,7 @@ from convexrough.cli.speech import (
     say_aside,
     written,
 )
-from convexrough.errors import InputError, blamed_on
+from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
@@ -155,6 +155,8 @@ def summits(
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
     folder = out or Path(f"{surface.stem}-summits")
+    if folder.suffix.lower() in (".csv", ".npz"):
+        raise FileError(f"{folder}: expected the name of a folder, which gets summits.csv")
     reads = [surface, *([how.scene] if how.scene else [])]
     inputs = {str(each): digest(each) for each in reads}
     said: dict[str, Any] = {"inputs": inputs, "versions": versions()}

@@ -20,6 +20,14 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
+#: A unit of length anywhere in a comment ("um" is also a German word), and words before a scale.
+_UNIT = re.compile(
+    r"(?<![^\W\d])(?:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)(?!\w)"
+    r"|(?:[\d(\[,:=]|\bin)\s*um(?!\w)|纳米|微米|毫米",
+    re.I,
+)
+_SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
+
 #: Largest accepted distance of a coordinate from the grid, in pixels.
 OFF_GRID = 0.05
 
@@ -54,12 +62,15 @@ def read_grid(path: Path) -> HeightGrid:
 
 
 def _unclear(comment: str) -> bool:
-    """True for a comment such as "# Breite: 50 µm", "# z unit: nm" or "# Pixel size = 0.5"."""
-    key, marked, value = comment.replace("=", ":").rpartition(":")
+    """True for a comment that seems to state a scale, such as "# Breite: 50 µm" or "# z in nm"."""
+    if _SAID.fullmatch(comment):
+        return False
+    _, marked, value = comment.replace("=", ":").rpartition(":")
     length = _LENGTH.fullmatch(value.strip())
     unit = parsed(length[2] if length else value.strip())
-    stated = unit.kind == "length" if unit else length and "pixel" in key.lower()
-    return bool(marked and stated and not _SAID.fullmatch(comment))
+    if marked and unit and unit.kind == "length":
+        return True
+    return bool(_UNIT.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment)))
 
 
 def _map(path: Path, table: TextTable) -> HeightGrid:

@@ -206,6 +206,26 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
     assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("z [nm]", "height (nm)", "all lengths in nm", "heights in nanometres", "Height map, nm"),
+        *("values in Angstrom", "scale factor 0.001", "dx = 0.5", "lateral resolution 0.5 µm/px"),
+        *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
+    ],
+)
+def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
+    path, made = tmp_path / "map.txt", f"# {said}\n{matrix()}"
+    with pytest.raises(cr.InputError, match="comments: found # "):
+        raw(path, made, pixel=1.0, unit="µm")
+    assert raw(path, made, pixel=1.0, unit="µm", height_unit="µm").pixel == (1.0, 1.0)
+
+
+def test_other_comments_are_ignored(tmp_path: Path) -> None:
+    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 2 Hz, 20 °C\n"
+    assert raw(tmp_path / "map.txt", said + matrix(), pixel=1.0).pixel == (1.0, 1.0)
+
+
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     said = r"a\.gwy: needs SurfaceTopography: pip install SurfaceTopography"
