@@ -81,7 +81,7 @@ class Cycle(Table, Plottable):
     balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
         docs/theory/losses.md, as a check of rounding; nan if P varies or order fails
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
-        nu Poisson's ratio, G the shear modulus, a_H the contact radius of the sphere if smooth
+        nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere
     smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
         if no asperity is loaded, or if no smooth solution is known for the shape
     displacement_amplitude : [length] half the range of the displacement of one body relative to the
@@ -159,9 +159,9 @@ class Cycle(Table, Plottable):
     def asperity_losses(self) -> Array:
         """(n,) [force length] energy lost at each asperity per cycle; nan if `order` is "fails".
 
-        Where the load varies, these losses are integrals over about 64 intervals, each from normal
-        solutions at its ends. Their errors are about 0.1 %; the proved bounds on these errors are
-        some per cent.
+        Where the load varies, these losses are sums over about 64 intervals, each computed from
+        the normal solutions at its ends. Their errors are about 0.1 %; the proved bounds on these
+        errors are some per cent.
         """
         return self._shares[2]
 
@@ -216,7 +216,7 @@ class Cycle(Table, Plottable):
             points. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if several asperities are the last to slide, at one force.
+        approach is kept constant, or if several asperities slide last, at the same force.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -315,7 +315,7 @@ def cycles(
 ) -> list[Cycle]:
     """The steady cycles of several ranges of shear force at constant load, computed together.
 
-    maximum, minimum, displacement : (m,) as in `cycle`, which says what InputError is raised for
+    maximum, minimum, displacement : (m,) as in `cycle`; the errors are those of `cycle`, too
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
     ['0.00021', '0.0028', '0.048']
@@ -458,7 +458,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """The result, from `spent`, the losses of cycles 1 and 2, and `moved`, the displacements."""
+    """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5

@@ -70,9 +70,9 @@ class LatticeInfluence:
 
     array       : (N, 2) [length] points; each coordinate has an error of at most `point_error`
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact positions of the summits. `array` contains them times `lattice.shrink`,
-        rounded. These factors along x and y are 1 in the geometry "summit", and R / (R + tip
-        radius) in "closest", with the radius R of the sphere
+    layout      : the exact positions of the summits. `array` contains them, rounded, times the
+        factors `lattice.shrink` along x and y: 1 in the geometry "summit", and R / (R + tip radius)
+        in "closest", with the radius R of the sphere
     lattice     : the lattice of the points
     scale       : 1 / (pi E*), which is A_ij r_ij
     """
@@ -143,7 +143,7 @@ class LatticeInfluence:
         return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(m,) upper bounds on sum_j strengths_j / r_ij^power, computed in single precision."""
+        """(n,) upper bounds on sum_j strengths_j / r_ij^power, from sums in single precision."""
         kernel = self.box.kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
@@ -357,7 +357,7 @@ class LatticeInfluence:
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:
-    """The largest sum of `field` at two sites i rows and j columns apart; 0 if none is larger."""
+    """The largest sum of `field` at two sites i rows and j columns apart; 0 if none is positive."""
     here, there = field[i:], field[: len(field) - i]
     if j >= 0:
         here, there = here[:, j:], there[:, : there.shape[1] - j]

@@ -36,7 +36,7 @@ from convexrough.sphere import hertz
 
 
 def press_figures(contact: Contact) -> Figures:
-    """The figures of a pressed contact, by stems of file names.
+    """The figures of a pressed contact; keys are file names without suffix.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
         sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, peak pressures of
@@ -72,8 +72,8 @@ def pressure_figure(scale: Scale) -> Figure:
 def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
     """Draw a map of contact pressures with a colour bar; return the colours and the window.
 
-    Each pressure p0 sqrt(1 - s^2) is a stack of discs in equal steps of pressure. If there are
-    many discs, each has the colour of the peak.
+    The pressure p0 sqrt(1 - (r/a)^2) of a contact is a stack of discs in equal steps of pressure.
+    If many asperities touch, it is one disc with the colour of the peak pressure.
     """
     contact = scale.contact
     peaks = scale.pressure.of(fields.peak_pressures(contact))

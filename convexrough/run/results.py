@@ -1,8 +1,8 @@
 """The results folder, which is written under a temporary name and then renamed.
 
 If the folder exists already, the complete new files are moved into it one by one, `files.json`
-last. A folder with contents is accepted only with `force`; then the files that `files.json` of the
-earlier run lists, and this file first, are deleted before. Other files stay. If the process dies
+last. A folder with contents is accepted only with `force`. Before the move, `files.json` of
+the earlier run is deleted, and then the files that it lists. Other files stay. If the process dies
 while files are moved, the folder has only some of the new files, and no `files.json`.
 """
 

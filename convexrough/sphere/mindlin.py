@@ -1,8 +1,8 @@
 """The tangential law of one sphere at constant normal load (Cattaneo and Mindlin).
 
-Arguments are t = Q / (f P), the shear force over the friction limit. Displacements are in units of
-c_t f threshold and energies in units of c_t f^2 P threshold, with the indentation
-threshold = k P^(2/3) and c_t from `ratio`. The polynomials of `annulus` keep the relative accuracy
+The argument t is Q / (f P), the shear force over the friction limit. With the indentation
+n = k P^(2/3) and c_t from `ratio`, displacements are in units of c_t f n, and the potential energy
+is in units of c_t f^2 P n. The polynomials of `annulus` keep the relative accuracy
 of each result, also where it is of third order in t.
 Source: Johnson, Contact Mechanics (1985), chapter 7.
 """

@@ -29,7 +29,9 @@ HEIGHTS = ("heights", "height", "z")
 #: Names that say in an .npz or .mat file what its heights and pixels are, and parts of other names
 #: that probably do, which `read` refuses.
 STATED = ("pixel", "unit", "height_unit")
-SCALES = re.compile("unit|scale|factor|gain|offset|pixel|spacing|step|resol|calib|^d[xyz]$", re.I)
+SCALES = re.compile(
+    "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
+)
 
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)

@@ -87,9 +87,11 @@ class Keys(FileTable):
                 yield f"{where}.{key}", "expected a key of a scene"
             elif name in FIXED:
                 yield f"{where}.{key}", f"values of [{name}] name columns, so they cannot vary"
-            elif key in first or (key == "asperities.seed" and "seeds" in keys):
-                also = f"in [sweep.{first[key]}]" if key in first else "by seeds"
-                yield f"{where}.{key}", f"swept twice, {also} too"
+            elif key == "asperities.seed" and "seeds" in keys:
+                yield f"{where}.{key}", "swept twice, by seeds too"
+            for other in first:  # a key, or a table that contains it
+                if f"{key}.".startswith(f"{other}.") or other.startswith(f"{key}."):
+                    yield f"{where}.{key}", f"swept twice, in [sweep.{first[other]}] {other} too"
             first[key] = where
         lists = _dict(keys.get("together")).values()
         if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:

@@ -73,8 +73,8 @@ def failures(table: SweepTable) -> list[str]:
 def cautions(table: SweepTable) -> list[str]:
     """Warnings: tables with loads of their own, and the certified scenes that have a message."""
     own = [
-        f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep the key "
-        f'"{name}.reference" with it, in [sweep.together]'
+        f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
+        f"{name}.reference, a factor on them, with it in [sweep.together]"
         for name in table.manifest["own_loads"]
     ]
     said = _messages(table, "certified")

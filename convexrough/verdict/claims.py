@@ -91,7 +91,7 @@ def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
     order. Pressures, with areas or on a regular grid, are integrated over the points nearest to
     each asperity.
 
-    Raises TableError with every mistake, and FileError.
+    Raises TableError, which lists every mistake, or FileError if the file cannot be read.
     """
     return _read(path, scene, "load", how, how.floor)
 
@@ -198,7 +198,7 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
 
 
 def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
-    """A note for each column of statuses on unknown words: which have a load, and which none."""
+    """A note on each column of statuses: the unknown words of rows with and without a load."""
     for name, header in _claims(table):
         found = np.array([each.strip() for each in table.columns[name]], dtype=str)
         other = np.array([each.lower() not in (*CLAIMS[name], "", "undecided") for each in found])

@@ -101,8 +101,12 @@ WRONG = [
     (sweeping(over={"sweep.seeds": [1, 2]}), "over.sweep.seeds: expected a key of a"),
     (sweeping(over={"normal.load": [1e-7, 1e-7]}), "values, none of them twice"),
     (
+        sweeping(over={"material.sphere.poisson_ratio": [0.2]}, together={"material.sphere": [1]}),
+        "over.material.sphere.poisson_ratio: swept twice, in [sweep.together] material.sphere too",
+    ),
+    (
         sweeping(over={"normal.load": [1e-7]}, together={"normal.load": [2e-7]}),
-        "over.normal.load: swept twice, in [sweep.together] too",
+        "over.normal.load: swept twice, in [sweep.together] normal.load too",
     ),
     (
         sweeping(seeds=3, over={"asperities.seed": [1], "asperities.height_std": [1e-7]}),
