@@ -213,7 +213,7 @@ def _loss(contact: Contact, force: float | None) -> Gradient:
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter; for "force" of a cycle, that by maximum minus by minimum."""
+    """The derivative by a parameter; by `force` it is twice that by the maximum of the cycle."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

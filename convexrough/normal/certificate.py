@@ -303,7 +303,7 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy that loads s on asperities that cannot touch add.
+    """Bound on the energy of loads s on asperities that cannot touch.
 
     It is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the load is prescribed, these
     loads are dropped and the bound is 0.

@@ -143,7 +143,7 @@ def program(
     """The contact problem of a scene as a convex program in standard form.
 
     form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
-        program, with an error of about 0.4 / bristles^2 of the largest load without coupling)
+        program; without coupling its error is about 0.4 / bristles^2 of the largest load)
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 

@@ -1,10 +1,11 @@
 """The choice of boxes and the check of answers, for all solvers of the cone program.
 
 docs/theory/exact-cones.md, "Which box" and "Loads and gaps from the answer". The loads are limited
-to boxes 0 <= P_i <= B_i. The numbers S_i = (3/2) shell_i B_i^(1/3) / k_i, with the shells and
-coefficients k of `NormalProblem`, must be at most 21/25 for the form with four cones per asperity,
-or 1 for that with five. Where S_i would be larger, B_i is reduced: the box is cut. If a cut box
-limits a load, five cones are tried; if that happens again, the scene is refused.
+to boxes 0 <= P_i <= B_i. The numbers S_i = (3/2) sigma_i B_i^(1/3) / k_i, with the coefficients k
+and sigma_i = 1 / (pi E* s_i) of `NormalProblem` (its field `shells`), must be at most 21/25 for the
+form with four cones per asperity, or 1 for that with five. Where S_i would be larger, B_i is
+reduced: the box is cut. If a cut box limits a load, five cones are tried; if that happens again,
+the scene is refused.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class TooDenseError(InputError):
     """Some asperities have contact radii too large for a convex program: a_i > (pi/2) s_i.
 
     asperities : (m,) the indices of these asperities in the scene
-    ratios     : (m,) the contact radius towards which each is pressed, divided by (pi/2) s_i, where
+    ratios     : (m,) an estimate of the contact radius that each would need, divided by (pi/2) s_i;
         s_i is half the distance to the nearest neighbour
     """
 

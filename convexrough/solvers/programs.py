@@ -66,8 +66,8 @@ class ConeProgram(NamedTuple):
     def dual(self) -> ConeProgram:
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
-        The variables are v, one for each variable whose diagonal entry in P is not 0, then z. The
-        first `equalities` entries of z are free. At any feasible point, minus the objective is a
+        The variables are (v, z). v has one entry for each variable of this program whose diagonal
+        entry in P is not 0. The first `equalities` entries of z are free. At any feasible point, minus the objective is a
         lower bound on the minimum of this program. At the solution it equals this minimum, and the
         multipliers of the equations are -x.
         """
@@ -120,7 +120,7 @@ class RawAnswer(NamedTuple):
 
 
 class ProgramAnswer(NamedTuple):
-    """The answer of a program to a normal problem, not yet checked."""
+    """The answer to a `NormalProblem`, from that to its program, not yet checked."""
 
     loads: Array  # of the asperities in the program, in the order and units of the problem
     approach: float  # prescribed, or from the multiplier of the total load
@@ -172,7 +172,7 @@ def run_osqp(
     max_iterations: int,
     verbose: bool = False,
 ) -> RawAnswer:
-    """The answer of OSQP, a first-order method that then polishes the active set."""
+    """The answer of OSQP, a first-order method that at the end solves for the active set."""
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
         what = f"OSQP {osqp.__version__} is too old"
