@@ -67,9 +67,9 @@ class ConeProgram(NamedTuple):
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
         The variables are (v, z). v has one entry for each variable of this program whose diagonal
-        entry in P is not 0. The first `equalities` entries of z are free. At any feasible point, minus the objective is a
-        lower bound on the minimum of this program. At the solution it equals this minimum, and the
-        multipliers of the equations are -x.
+        entry in P is not 0. The first `equalities` entries of z are free. At any feasible point,
+        minus the objective is a lower bound on the minimum of this program. At the solution it
+        equals this minimum, and the multipliers of the equations are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 
