@@ -75,7 +75,7 @@ def cautions(table: SweepTable) -> list[str]:
     own = [
         f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
         f"{name}.reference, a factor on them, with it in [sweep.together]"
-        for name in table.manifest["own_loads"]
+        for name in table.manifest.get("own_loads", [])  # sweeps begun earlier do not have it
     ]
     said = _messages(table, "certified")
     first, count = next(said, ""), 1 + sum(1 for _ in said)
