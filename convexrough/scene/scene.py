@@ -17,7 +17,6 @@ from convexrough.record import Record
 from convexrough.scene import base
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.layout import MANY
 from convexrough.scene.material import Material
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.tabular.units import NAMELESS, UnitNames, parsed
@@ -68,7 +67,9 @@ class Scene(Record):
         if own and named and own.into(named) != 1:
             expected = f'units=("{unit}", ...), or Surface.to_unit("{self.units.length}")'
             raise InputError("units", found=f"summits in {unit}", expected=expected)
-        if self.geometry == "closest" and (len(self) <= MANY or self.lattice is None):
+        # Equal tips, smaller than the sphere, only shrink the positions, which are distinct.
+        tips, sphere = self.asperities.tip_radii, min(base.along(self.sphere_radius))
+        if self.geometry == "closest" and ((tips != tips[0]).any() or tips[0] > sphere):
             refuse_coincident(self.contact_points)
 
     def __len__(self) -> int:
