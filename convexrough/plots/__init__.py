@@ -7,35 +7,6 @@ names its units, axes are in SI units with prefixes. No global state of matplotl
 `plot` draws the main picture of a result into given axes; `contact.plot()` is the same.
 """
 
-from convexrough.plots.axes import plot, thumbnail
-from convexrough.plots.between import between
-from convexrough.plots.cycle import cycle_figures
-from convexrough.plots.fretting import fretting_figures
-from convexrough.plots.gradient import gradient_figures
-from convexrough.plots.load_plane import phase_figures, steady_figures
-from convexrough.plots.notebook import save
-from convexrough.plots.path import path_figures
-from convexrough.plots.press import press_figures
-from convexrough.plots.shakedown import shakedown_figures
-from convexrough.plots.shear import shear_figures
-from convexrough.plots.surface import provability_figure, surface_figures
-from convexrough.plots.verdict import verdict_figures
+import lazy_loader
 
-__all__ = [
-    "between",
-    "cycle_figures",
-    "fretting_figures",
-    "gradient_figures",
-    "path_figures",
-    "phase_figures",
-    "plot",
-    "press_figures",
-    "provability_figure",
-    "save",
-    "shakedown_figures",
-    "shear_figures",
-    "steady_figures",
-    "surface_figures",
-    "thumbnail",
-    "verdict_figures",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,60 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from importlib import import_module
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.fretting import Fretting
 from convexrough.friction.path import LoadPath
-from convexrough.friction.phases import PhaseLosses
-from convexrough.friction.shear import ShearState
-from convexrough.friction.side_by_side import PathComparison, PathEntry
-from convexrough.gradients.gradient import Gradient
-from convexrough.melan.shakedown import Shakedown
-from convexrough.plots.asperity_map import (
-    Layer,
-    draw_contact,
-    draw_map,
-    even_radii,
-    status_handles,
-    status_layers,
-)
-from convexrough.plots.between import between
-from convexrough.plots.cycle import draw_loop, smooth_loop
-from convexrough.plots.fretting import draw_slip
-from convexrough.plots.gradient import draw_gradient
-from convexrough.plots.load_plane import draw_closed, draw_curve, draw_losses, draw_path
-from convexrough.plots.measure import Scale, measure
+from convexrough.plots.asperity_map import draw_contact, status_handles, status_layers
+from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, image_tag, new_axes
-from convexrough.plots.path import draw_loop as draw_path_loop
-from convexrough.plots.press import draw_pressure
-from convexrough.plots.shakedown import draw_factors
-from convexrough.plots.shear import State, draw_state, legend_handles, state_title
-from convexrough.plots.style import (
-    ROUGH,
-    SINGLE,
-    TICK,
-    UNSURE,
-    few_ticks,
-    label,
-    legend_below,
-    say_nothing,
-)
-from convexrough.plots.surface import SUMMIT, draw_provability, draw_surface
-from convexrough.plots.verdict import draw_claim
-from convexrough.surface.provability import Provability
-from convexrough.surface.summits import Summits
-from convexrough.surface.surface import Surface
-from convexrough.vector_shear.state import VectorShearState
-from convexrough.verdict import Verdict
+from convexrough.plots.style import SINGLE, legend_below, say_nothing
+
+#: The module and function that draw a result into axes, by the name of its class. A module is
+#: imported when such a result is drawn.
+PICTURES = {
+    "Contact": "press.draw_pressure",
+    "ShearState": "shear.draw_one_state",
+    "VectorShearState": "shear.draw_one_state",
+    "Cycle": "cycle.draw_cycle",
+    "Fretting": "fretting.draw_slip",
+    "LoadPath": "path.draw_loop_or_plane",
+    "MemoryCurve": "load_plane.draw_curve",
+    "PhaseLosses": "load_plane.draw_losses",
+    "Shakedown": "shakedown.draw_factors",
+    "Gradient": "gradient.draw_gradient",
+    "Verdict": "verdict.draw_verdict",
+    "Comparison": "times.draw_times",
+    "PathComparison": "times.draw_times",
+    "Surface": "surface.draw_surface",
+    "Summits": "surface.draw_summit_map",
+    "Provability": "surface.draw_provability",
+}
 
 
 def plot(result: object, axes: Axes | None = None) -> Axes:
@@ -72,8 +52,9 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
     Raises InputError for anything else.
     """
-    draw = next((draw for kind, draw in PICTURES.items() if isinstance(result, kind)), None)
-    if draw is None:
+    kinds = [kind for kind in type(result).__mro__ if kind.__module__.startswith("convexrough.")]
+    where = next((PICTURES[it.__name__] for it in kinds if it.__name__ in PICTURES), None)
+    if where is None:
         expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
@@ -82,7 +63,8 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)
     else:
-        draw(result, axes)
+        module, function = where.split(".")
+        getattr(import_module(f"convexrough.plots.{module}"), function)(axes, result)
     return axes
 
 
@@ -98,76 +80,3 @@ def thumbnail(result: object) -> str:
     else:
         plot(result, axes)
     return image_tag(type(result).__name__, figure, 80)
-
-
-def _draw_state(state: State, axes: Axes) -> None:
-    scale = Scale(state.contact)
-    draw_state(axes, state, scale)
-    axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
-    legend_below(axes, handles=legend_handles([state], scale))
-
-
-def _draw_cycle(cycle: Cycle, axes: Axes) -> None:
-    if np.ptp(cycle.loads) > 0:
-        return draw_closed(axes, cycle)
-    scale = Scale(cycle.contact)
-    loop = cycle.loop(asperities=[])
-    draw_loop(axes, scale, loop.displacements, loop.forces)
-    if scale.sphere is not None:
-        draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
-    axes.legend(fontsize=TICK, frameon=False, loc="upper left")
-    return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
-
-
-def _draw_path(path: LoadPath, axes: Axes) -> None:
-    if path.load_constant:
-        draw_path_loop(axes, path, Scale(path.contact), between(path))
-    else:
-        draw_path(axes, path)
-
-
-def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
-    rows = [_took(entry) for entry in comparison.entries]
-    for place, (_, seconds, outcome) in enumerate(rows):
-        if seconds is None:
-            axes.text(0.02, place, outcome, transform=axes.get_yaxis_transform(),
-                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
-        else:
-            axes.plot(seconds, place, "o", color=ROUGH)
-    axes.set(xscale="log", ylim=(len(rows) - 0.5, -0.5))
-    axes.set_yticks(range(len(rows)), [name for name, *_ in rows], fontsize=TICK)
-    few_ticks(axes.xaxis)
-    label(axes, "time [s]", "")
-
-
-def _took(entry: Any) -> tuple[str, float | None, str]:
-    if isinstance(entry, PathEntry):
-        return entry.way, entry.seconds if entry.path else None, entry.outcome
-    return entry.solver, entry.contact.seconds if entry.contact else None, entry.outcome
-
-
-def _draw_summits(summits: Summits, axes: Axes) -> None:
-    every = np.ones(len(summits), dtype=bool)
-    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
-
-
-#: The function that draws each kind of result.
-PICTURES: dict[type, Callable[..., Any]] = {
-    Contact: lambda it, axes: draw_pressure(axes, Scale(it)),
-    ShearState: _draw_state,
-    VectorShearState: _draw_state,
-    Cycle: _draw_cycle,
-    Fretting: lambda it, axes: draw_slip(axes, it, Scale(it.contact)),
-    LoadPath: _draw_path,
-    MemoryCurve: lambda it, axes: draw_curve(axes, it),
-    PhaseLosses: lambda it, axes: draw_losses(axes, it),
-    Shakedown: lambda it, axes: draw_factors(axes, it),
-    Gradient: lambda it, axes: draw_gradient(axes, it, Scale(it.contact)),
-    Verdict: lambda it, axes: draw_claim(axes, it, it.scene),
-    Comparison: _draw_times,
-    PathComparison: _draw_times,
-    Surface: lambda it, axes: draw_surface(axes, it),
-    Summits: _draw_summits,
-    Provability: lambda it, axes: draw_provability(axes, it),
-}

@@ -13,6 +13,7 @@ from matplotlib.patheffects import withStroke
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
+from convexrough.plots.load_plane import draw_closed
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
@@ -139,6 +140,19 @@ def loops_figure(
     elastic = ",   $k = 3fP/(2X_0)$" if x.said and not x.symbol else ""
     figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
     return figure
+
+
+def draw_cycle(axes: Axes, cycle: Cycle) -> None:
+    """Draw the loop of a cycle, or its path in the plane of loads if the normal load varies."""
+    if np.ptp(cycle.loads) > 0:
+        return draw_closed(axes, cycle)
+    scale = Scale(cycle.contact)
+    loop = cycle.loop(asperities=[])
+    draw_loop(axes, scale, loop.displacements, loop.forces)
+    if scale.sphere is not None:
+        draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
+    axes.legend(fontsize=TICK, frameon=False, loc="upper left")
+    return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
 def draw_loop(

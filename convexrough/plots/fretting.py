@@ -40,8 +40,9 @@ def fretting_figures(worn: Fretting) -> Figures:
     return Figures({"fretting": figure})
 
 
-def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
+def draw_slip(axes: Axes, worn: Fretting, scale: Scale | None = None) -> None:
     """Draw the map of slip amplitudes."""
+    scale = scale or Scale(worn.contact)
     most = _largest(worn.slip_amplitudes)
     slip = measure(most if scale.units.length else scale.travel, scale.units.length, "X_0")
     _draw(axes, scale, worn.slip_amplitudes, slip, "slip amplitude at the rim", "s_i")

@@ -19,15 +19,20 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     of : symbol of J, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
-    scale = Scale(gradient.contact)
-    draw_gradient(figure.subplots(), gradient, scale, of)
+    draw_gradient(figure.subplots(), gradient, of)
     return Figures({"gradient": figure})
 
 
-def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
+def draw_gradient(axes: Axes, gradient: Gradient, of: str = "J") -> None:
     """Draw derivatives with respect to heights: negative ones dark, positive ones light."""
     parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"
-    draw_values(axes, scale, parts, f"$D_0\\,\\partial {of}/\\partial z{per}$", signed=True)
+    draw_values(
+        axes,
+        Scale(gradient.contact),
+        parts,
+        f"$D_0\\,\\partial {of}/\\partial z{per}$",
+        signed=True,
+    )
     title(axes, f"{gradient.holding} kept constant")

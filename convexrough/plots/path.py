@@ -18,10 +18,10 @@ from convexrough.plots.asperity_map import (
     status_handles,
     status_layers,
 )
-from convexrough.plots.between import MOST_POINTS, between
 from convexrough.plots.load_plane import draw_path
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.points_between import MOST_POINTS, between
 from convexrough.plots.style import (
     DOUBLE,
     MOST_NUMBERS,
@@ -68,6 +68,14 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
         title(cost, "energy lost since the beginning")
         return Figures({"history": figure})
     return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
+
+
+def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
+    """Draw the loop of a path, or the plane of loads if the normal load varies."""
+    if path.load_constant:
+        draw_loop(axes, path, Scale(path.contact), between(path))
+    else:
+        draw_path(axes, path)
 
 
 def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:

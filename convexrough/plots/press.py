@@ -56,7 +56,7 @@ def pressure_figure(scale: Scale) -> Figure:
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     chart.set_anchor("E")
     label(profile, scale.length.label("x"), scale.pressure.label("p"))
-    colours, window = draw_pressure(chart, scale)
+    colours, window = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
     crossed = (np.abs(contact.scene.contact_points[:, 1]) < contact.contact_radii).sum()
     touching = np.count_nonzero(contact.loads)
@@ -69,13 +69,15 @@ def pressure_figure(scale: Scale) -> Figure:
     return figure
 
 
-def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
+def draw_pressure(
+    axes: Axes, contact: Contact, scale: Scale | None = None
+) -> tuple[ScalarMappable, Window]:
     """Draw a map of contact pressures with a colour bar; return the colours and the window.
 
     The pressure p0 sqrt(1 - (r/a)^2) of a contact is a stack of discs in equal steps of pressure.
     If many asperities touch, it is one disc with the colour of the peak pressure.
     """
-    contact = scale.contact
+    scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))
     top = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
     colours = ScalarMappable(Normalize(0.0, top), COLOURS)

@@ -29,6 +29,7 @@ from convexrough.plots.style import (
     SINGLE,
     SMOOTH,
     TICK,
+    legend_below,
     legend_outside,
     no_contact,
     not_proved,
@@ -77,6 +78,14 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
     legend_outside(figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4)
     return Figures({"stick_slip": figure})
+
+
+def draw_one_state(axes: Axes, state: State) -> None:
+    """Draw the map of a state, with a title and a legend."""
+    scale = Scale(state.contact)
+    draw_state(axes, state, scale)
+    axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
+    legend_below(axes, handles=legend_handles([state], scale))
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:

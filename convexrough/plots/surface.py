@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
-from convexrough.plots.asperity_map import Layer, draw_discs, draw_outline
+from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
 from convexrough.plots.measure import Scale, literal, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
@@ -89,6 +89,13 @@ def _label_places(axes: Axes, surface: Surface) -> None:
     most = axes.get_xlim()[1]
     label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
           _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
+
+
+def draw_summit_map(axes: Axes, summits: Summits) -> None:
+    """Draw a disc at each summit."""
+    every = np.ones(len(summits), dtype=bool)
+    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
+    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
 
 
 def draw_summits(axes: Axes, positions: Array) -> None:

@@ -49,6 +49,11 @@ def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Fi
     return Figures({"verdict": figure})
 
 
+def draw_verdict(axes: Axes, verdict: Verdict) -> None:
+    """Draw the map of the claim on loads."""
+    draw_claim(axes, verdict, verdict.scene)
+
+
 def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
     """Draw the map of one claim."""
     status, points = claim.status, scene.asperities.positions

@@ -1,0 +1,18 @@
+"""The public names and their modules; `__init__.py` imports each when it is first used."""
+
+from .axes import plot as plot
+from .axes import thumbnail as thumbnail
+from .cycle import cycle_figures as cycle_figures
+from .fretting import fretting_figures as fretting_figures
+from .gradient import gradient_figures as gradient_figures
+from .load_plane import phase_figures as phase_figures
+from .load_plane import steady_figures as steady_figures
+from .notebook import save as save
+from .path import path_figures as path_figures
+from .points_between import between as between
+from .press import press_figures as press_figures
+from .shakedown import shakedown_figures as shakedown_figures
+from .shear import shear_figures as shear_figures
+from .surface import provability_figure as provability_figure
+from .surface import surface_figures as surface_figures
+from .verdict import verdict_figures as verdict_figures
