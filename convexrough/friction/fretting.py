@@ -99,7 +99,7 @@ def fretting(cycle: Cycle) -> Fretting:
     rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
     in_part = rim * rim_gap(np.minimum(_over(cycle.stick_radii, a), 1.0))
     mean = largest = np.full(len(scene), unknown)
-    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces, strict=True):
+    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces.value, strict=True):
         bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]
         radii = [stick_radii(levels, levels.at(load))[0] for load, _ in bends]
         here = stick_radii(levels, levels.at(curve.load))[0]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,16 +173,9 @@ class FrictionLevels:
         made: Made = self._cache[name]
         return made
 
-    def snapshot(self, load: Fraction) -> Snapshot:
-        """The level at a load in the scene's units, for all asperities of the scene."""
-        level = self.at(load)
-        return Snapshot(
-            load=float(load),
-            loads=self.to_scene(level.loads.value * self.units.force),
-            indentations=self.indentations(level).value * self.units.length,
-            touching=self.to_scene(level.touching),
-            open=~self.to_scene(~level.open),
-        )
+    def depths(self, load: Fraction) -> Array:
+        """(N,) [length] the indentations at a load, or minus the gap where open."""
+        return self.indentations(self.at(load)).value * self.units.length
 
     def loads(self, level: Level) -> Ball:
         """(N,) the loads P_i of a level, in scaled units."""
@@ -259,21 +252,6 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """
     checks.instance("contact", contact, Contact)
     return contact.cached(FrictionLevels).order([Fraction(0)], checks.whole("most", most, 0))
-
-
-class Snapshot(NamedTuple):
-    """A normal solution in the scene's units. Arrays are (N,).
-
-    load, loads    : [force] total load, and load of each asperity
-    indentations   : [length] indentations, or minus the gap where open
-    touching, open : True where the asperity is proved to touch, or to be open
-    """
-
-    load: float
-    loads: Array
-    indentations: Array
-    touching: NDArray[np.bool_]
-    open: NDArray[np.bool_]
 
 
 def exactly(values: Sequence[Fraction]) -> Ball:

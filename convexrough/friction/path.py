@@ -1,6 +1,10 @@
-"""`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
+"""Friction states along a path of load P and shear force Q: `load_path`; `history`: at constant P.
 
-The friction state is a memory curve, a polygon over load levels: docs/theory/paths.md derives it.
+With the coefficient of friction f, the points of a path are (P, T = Q / f). The friction state is a
+memory curve, a polygon over load levels: docs/theory/paths.md derives it. A level is also the
+normal solution at one load. States are sums over the levels of the memory curve, and losses are
+integrals over the pieces of each segment (`curve.Piece`). If an indentation falls as the load
+rises, general steps compute the results, without proofs.
 """
 
 from __future__ import annotations
@@ -8,24 +12,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import TINY, UP, Ball
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import Stepper
-from convexrough.friction.levels import FrictionLevels, height_at
+from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.general_step import SteppedPath, Stepper, followed
+from convexrough.friction.levels import FrictionLevels, height_at, rounded
+from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import Point
-from convexrough.friction.walk import Walk
+from convexrough.friction.state import Point, States, states_of, statuses_of
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
+from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -33,6 +41,96 @@ if TYPE_CHECKING:
 
 #: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A path from a memory curve through m points, with straight segments between them.
+
+    levels  : the normal solutions of the contact
+    start   : the memory curve before the first segment
+    points  : the m points (P, T)
+    steps   : number of general steps per segment; None takes general steps only if order fails
+    stepper : solver of the general steps
+    """
+
+    levels: FrictionLevels
+    start: MemoryCurve
+    points: Sequence[Point]
+    steps: int | None = None
+    stepper: type[Stepper] = Stepper
+
+    @cached_property
+    def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:
+        curve, found = self.start, list[tuple[MemoryCurve, list[Piece]]]()
+        for load, height in self.points:
+            curve, pieces = curve.go(load, height)
+            found.append((curve, pieces))
+        return found
+
+    @property
+    def curves(self) -> list[MemoryCurve]:
+        """The memory curve after each point."""
+        return [curve for curve, _ in self._segments]
+
+    @property
+    def pieces(self) -> list[list[Piece]]:
+        """The pieces of the loss on each segment."""
+        return [pieces for _, pieces in self._segments]
+
+    @cached_property
+    def needed(self) -> set[Fraction]:
+        """The loads of all levels needed for states, statuses and losses."""
+        bent = {load for curve in self.curves for load, bend in curve.bends if bend}
+        fronts = {curve.front for curve in self.curves if curve.front is not None}
+        return bent | fronts | {x for each in self.pieces for piece in each for x in piece[2:]}
+
+    @cached_property
+    def order(self) -> Order:
+        """What is proved about order, from the lowest of the needed loads to the contact's load."""
+        return self.levels.order(self.needed)
+
+    @cached_property
+    def general(self) -> SteppedPath | None:
+        """Results of general steps, if these are requested or order fails; else None."""
+        if self.steps is None and (self.order != "fails" or not self.levels.proved):
+            return None
+        return followed(self.levels, self.start, self.points, self.steps, self.stepper)
+
+    def states(self) -> States:
+        if self.general is not None:
+            return self.general.states
+        found = states_of(self.levels, self.curves)
+        return found.unproved() if self.order == "fails" else found
+
+    def status(self) -> NDArray[np.str_]:
+        """(m, N) the statuses at each point."""
+        if self.general is not None:
+            return self.general.status
+        each = [statuses_of(self.levels, curve, self.order) for curve in self.curves]
+        return frozen(np.array(each))
+
+    def losses(self) -> tuple[Array, Array]:
+        """(m,) [force length] energy lost since the start, and proved bounds on the errors."""
+        unknown = frozen(np.full(len(self.points), np.inf))
+        if self.general is not None:
+            return self.general.losses, unknown
+        each = losses(self.levels, self.pieces)
+        spent, errors = rounded(_cumulated(each) * self.levels.loss_unit)
+        return spent, errors if self.order == "proved" else unknown
+
+
+def _cumulated(each: Ball) -> Ball:
+    """(m,) the cumulative sums of m balls."""
+    total, error, sums = Pair(0.0, 0.0), 0.0, []
+    for high, low, radius in zip(
+        *(part.tolist() for part in (*each.mid, each.radius)), strict=True
+    ):
+        total = total + Pair(high, low)
+        error += radius + PAIR_ROUNDOFF * abs(total.high) + TINY
+        sums.append((*total, error * UP))
+    found = np.array(sums).reshape(-1, 3).T
+    return Ball(Pair(found[0], found[1]), found[2] * (1 + SAFETY))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -243,7 +341,8 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
 def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
-    found, (losses, loss_errors) = walk.states(), walk.losses()
+    (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
+    (displacements, displacement_errors), (asperity_forces, force_errors), *others = found
     here = [levels.at(load) for load in points]
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
     loads = np.array([level.loads.value for level in here]) * levels.units.force
@@ -252,16 +351,16 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
         contact=contact,
         loads=frozen(np.array(points, dtype=np.float64)),
         forces=frozen(np.array(forces)),
-        displacements=found.displacements,
-        displacement_errors=found.displacement_errors,
+        displacements=displacements,
+        displacement_errors=displacement_errors,
         approaches=frozen(approaches),
         losses=losses,
         loss_errors=loss_errors,
-        asperity_forces=found.forces,
-        asperity_force_errors=found.force_errors,
+        asperity_forces=asperity_forces,
+        asperity_force_errors=force_errors,
         asperity_loads=frozen(levels.to_scene(loads)),
-        asperity_displacements=found.asperity_displacements,
-        drifts=found.drifts,
+        asperity_displacements=others[0][0],
+        drifts=others[1][0],
         fronts=frozen(np.array(fronts)),
         status=walk.status(),
         curves=tuple(walk.curves),

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
+from convexrough.friction.path import Walk
 from convexrough.friction.state import stick_radii
-from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -210,41 +211,38 @@ def _state(
     if walk.general is not None and displacement is not None:
         walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
     found, order = walk.states(), walk.order
+    moved, carried, asperities, drifts = (each[0] for each in found)
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
-        total = float(walk.points[0][1]) * checks.friction(contact.scene.friction)
-        force_uncertainty = 0.0
+        total = Ball.exact(walk.points[0][1]) * levels.coefficient
     else:
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
-        size, off = rounded((levels.top.load - level.load) * levels.force_unit)
-        total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
-    error = float(found.displacement_errors[0]) if displacement is None else 0.0
+        total = (levels.top.load - level.load) * levels.force_unit
+        total = total if (displacement or 0.0) >= 0 else -total
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
-    most = np.abs(found.drifts[0]) + found.drift_errors[0]  # its slip is 0 if it does not touch
-    slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
-    if order == "fails":
-        error = force_uncertainty = np.inf
-        slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
+    most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
+    slip_errors = np.where(loaded, drifts.error, 0.0) + np.where(unsure, most, 0.0)
+    unknown = np.inf if order == "fails" else 0.0
     status = walk.status()[0]
     certificate = ShearCertificate(
         scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
         order=order,
         status=frozen(np.where(status == "stuck", "partial", status)),
-        force_errors=found.force_errors[0],
-        slip_errors=frozen(slip_errors),
-        stick_radius_errors=frozen(radius_errors),
-        force_error=force_uncertainty if force is None else 0.0,
-        displacement_error=error,
+        force_errors=frozen(carried.error),
+        slip_errors=frozen(slip_errors + unknown),
+        stick_radius_errors=frozen(radius_errors + unknown),
+        force_error=float(total.error) + unknown if force is None else 0.0,
+        displacement_error=float(moved.error) + unknown if displacement is None else unknown,
     )
     return ShearState(
         contact=contact,
-        force=total if force is None else force,
-        displacement=float(found.displacements[0]) if displacement is None else displacement,
-        forces=found.forces[0],
-        displacements=frozen(np.where(loaded, found.asperity_displacements[0], 0.0)),
-        slips=frozen(np.where(loaded, found.drifts[0], 0.0)),
+        force=float(total.value) if force is None else force,
+        displacement=float(moved.value) if displacement is None else displacement,
+        forces=frozen(carried.value),
+        displacements=frozen(np.where(loaded, asperities.value, 0.0)),
+        slips=frozen(np.where(loaded, drifts.value, 0.0)),
         stick_radii=frozen(radii),
         certificate=certificate,
     )
@@ -258,7 +256,7 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
     def beyond(part: float) -> float:
         height = Fraction(part) * levels.load
-        moved = followed(levels, start, [(levels.load, height)]).states.displacements[0]
+        moved = followed(levels, start, [(levels.load, height)]).states.displacements.value[0]
         return float(moved - displacement)
 
     root = brentq(beyond, -1.0, 1.0, xtol=1e-12)

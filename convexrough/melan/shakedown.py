@@ -216,19 +216,20 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
     factors = np.full(len(scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
-    sure, beyond = levels.snapshot(worst.upper), levels.snapshot(worst.lower)
+    sure = levels.at(worst.upper)
     order = levels.order({worst.lower, worst.upper})
-    proved = order == "proved" and bool(sure.touching[touching].all())
+    proved = order == "proved" and bool(levels.to_scene(sure.touching)[touching].all())
     lower, upper = factor(worst.upper), factor(worst.lower)
     height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
-    gaps = np.maximum(-beyond.indentations, 0.0) * (contact.loads > 0)
+    gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
+    rest = levels.to_scene(sure.loads.value * levels.units.force)
     return limit(
         factor=float(factors[last]),
         lower=lower * (1 - SAFETY) if proved else 0.0,
         upper=upper * (1 + SAFETY) if proved else np.inf,
         factors=frozen(factors),
         gross=gross,
-        witness=frozen(f * height / (sure.load or 1.0) * sure.loads),
+        witness=frozen(f * height / (float(worst.upper) or 1.0) * rest),
         mechanism=frozen(gaps / (gaps.max() or 1.0)),
         order=order,
     )
