@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve
@@ -94,7 +94,7 @@ def states_of(
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
-    loads = Ball.stacked([levels.loads(level)[some] for level in solved])
+    loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[some] for level in solved])
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
     travel = levels.travel_unit
     return States(
