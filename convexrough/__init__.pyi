@@ -30,8 +30,8 @@ from .friction.path import LoadPath as LoadPath
 from .friction.path import history as history
 from .friction.path import load_path as load_path
 from .friction.phases import PhaseLosses as PhaseLosses
+from .friction.phases import elliptic_path as elliptic_path
 from .friction.phases import phase_losses as phase_losses
-from .friction.shapes import elliptic_path as elliptic_path
 from .friction.shear import ShearCertificate as ShearCertificate
 from .friction.shear import ShearState as ShearState
 from .friction.shear import certify_shear as certify_shear

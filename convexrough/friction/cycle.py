@@ -329,36 +329,26 @@ def cycles(
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         checks.some("displacement", amplitudes)
-        heights = [levels.load - levels.displaced(x) for x in amplitudes]
-        ends = [(height, -height) for height in heights]
-        return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
-    assert maximum is not None  # exactly_one
-    upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
-    checks.some("maximum", upper)
-    lower = -upper
-    if minimum is not None:
-        lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
-        lower = checks.bearable("minimum", lower, limit)
-    if (upper < lower).any():
-        i = int(np.argmax(upper < lower))
-        expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
-        raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
-    forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
-    LOGGER.info("pressing at the level of a cycle")
-    return _at_the_load(contact, [[levels.height(Q) for Q in each] for each in forces], forces)
-
-
-def _at_the_load(
-    contact: Contact,
-    heights: Sequence[Sequence[Fraction]],
-    forces: Sequence[tuple[float, float]],
-) -> list[Cycle]:
-    """The cycles at the load of the contact; each goes between two values of T = Q / f."""
-    load = contact.cached(FrictionLevels).load
-    paths = [[(load, T) for T in each] for each in heights]
-    load_twice = np.full(2, float(load))
-    asked = [(path, load_twice.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
-    return _cycles(contact, MemoryCurve.pressed(load), asked)
+        tops = [levels.load - levels.displaced(x) for x in amplitudes]
+        heights, upper = [(T, -T) for T in tops], np.array([float(f * T) for T in tops])
+        lower = -upper
+    else:
+        assert maximum is not None  # exactly_one
+        upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
+        checks.some("maximum", upper)
+        lower = -upper
+        if minimum is not None:
+            lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
+            lower = checks.bearable("minimum", lower, limit)
+        if (upper < lower).any():
+            i = int(np.argmax(upper < lower))
+            expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
+            raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
+        ends = zip(upper.tolist(), lower.tolist(), strict=True)
+        heights = [(levels.height(high), levels.height(low)) for high, low in ends]
+        LOGGER.info("pressing at the level of a cycle")
+    paths = [[(levels.load, T) for T in each] for each in heights]
+    return _cycles(contact, MemoryCurve.pressed(levels.load), paths, np.stack((upper, lower), 1))
 
 
 def steady(
@@ -383,8 +373,7 @@ def steady(
     """
     points = points_of(scene, loads, forces)
     contact = pressed_for(scene, [load for load, _ in points], influence)
-    P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
-    return _cycles(contact, MemoryCurve(), [(points, P, Q)])[0]
+    return _cycles(contact, MemoryCurve(), [points], [np.array(forces, dtype=np.float64)])[0]
 
 
 class _Closed(Walk):
@@ -427,29 +416,27 @@ class _Closed(Walk):
 
 
 def _cycles(
-    contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
+    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]], forces: Sequence[Array]
 ) -> list[Cycle]:
     """The steady cycles of several closed paths that begin from the same memory curve.
 
-    asked : for each path the points (P, T), the loads P and the shear forces Q
+    paths, forces : for each path the points (P, T) and the shear forces Q
     """
     levels = contact.cached(FrictionLevels)
-    closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
+    closed = [_Closed.around(levels, start, points) for points in paths]
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
         levels.order(needed)  # a proof for the widest range of loads holds for the others
     spent = losses(levels, [pieces for each in closed for pieces in each.cycles]) * levels.loss_unit
     moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
-    ends = np.cumsum([0, *(each.once for each in closed)]).tolist()
+    ends = np.cumsum([0, *map(len, paths)]).tolist()
     return [
-        _cycle(contact, *path[1:], each, spent[2 * k : 2 * k + 2], moved[slice(*far)])
-        for k, (path, each, far) in enumerate(zip(asked, closed, pairwise(ends), strict=True))
+        _cycle(contact, closed[k], forces[k], spent[2 * k : 2 * k + 2], moved[start:stop])
+        for k, (start, stop) in enumerate(pairwise(ends))
     ]
 
 
-def _cycle(
-    contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
-) -> Cycle:
+def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved: Ball) -> Cycle:
     """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
     levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
     (first, loss), (first_error, error) = rounded(spent)
@@ -468,7 +455,7 @@ def _cycle(
     )
     slip_errors = np.where(doubtful, slip_errors, 0.0)
     radii, radius_errors = stick_radii(levels, rest)
-    loaded, heights = zip(*closed.points, strict=True)
+    loaded, heights = zip(*closed.points[: closed.once], strict=True)
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     defect = smooth = np.nan
     if set(loaded) == {levels.load}:
@@ -487,7 +474,7 @@ def _cycle(
         amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
     found = Cycle(
         contact=contact,
-        loads=frozen(loads),
+        loads=frozen(np.array([float(load) for load in loaded])),
         forces=frozen(forces),
         loss=float(loss),
         loss_error=float(error),
