@@ -145,11 +145,10 @@ def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
              "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()
     for each in worn:
-        here = np.flatnonzero(each.contact.loads)
-        x, y = each.contact.scene.asperities.positions[here].T
-        ends = {name: np.full(len(here), getattr(each, name)) for name in ("maximum", "minimum")}
-        values = {name: column[here] for name, column in each.columns(*names).items()}
-        rows.append({**ends, "asperity": here, "x": x, "y": y, **values})
+        x, y = each.contact.scene.asperities.positions.T
+        every = {name: np.full(len(x), getattr(each, name)) for name in ("maximum", "minimum")}
+        every |= {"asperity": np.arange(len(x)), "x": x, "y": y, **each.columns(*names)}
+        rows.append({name: column[each.contact.loads > 0] for name, column in every.items()})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -13,14 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import TINY, UP, Ball
-from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
@@ -33,7 +33,6 @@ from convexrough.friction.state import Point, States, states_of, statuses_of
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
-from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -116,21 +115,9 @@ class Walk:
         if self.general is not None:
             return self.general.losses, unknown
         each = losses(self.levels, self.pieces)
-        spent, errors = rounded(_cumulated(each) * self.levels.loss_unit)
+        since_start = Ball.stacked([*accumulate(each[k] for k in range(len(each)))])
+        spent, errors = rounded(since_start * self.levels.loss_unit)
         return spent, errors if self.order == "proved" else unknown
-
-
-def _cumulated(each: Ball) -> Ball:
-    """(m,) the cumulative sums of m balls."""
-    total, error, sums = Pair(0.0, 0.0), 0.0, []
-    for high, low, radius in zip(
-        *(part.tolist() for part in (*each.mid, each.radius)), strict=True
-    ):
-        total = total + Pair(high, low)
-        error += radius + PAIR_ROUNDOFF * abs(total.high) + TINY
-        sums.append((*total, error * UP))
-    found = np.array(sums).reshape(-1, 3).T
-    return Ball(Pair(found[0], found[1]), found[2] * (1 + SAFETY))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

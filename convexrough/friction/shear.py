@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,33 +180,18 @@ def shear(
     friction = checks.friction(contact.scene.friction)
     checks.exactly_one("force", force, "displacement", displacement)
     LOGGER.info("pressing at the load P - Q / f")
-    levels = contact.cached(FrictionLevels)
+    levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
+    start = MemoryCurve.pressed(levels.load)
     if displacement is None:
-        force = one_force("force", force, friction * contact.load)
+        if shape := np.shape(force):
+            raise InputError("force", found=f"shape {shape}", expected="one number")
+        force = checks.finite("force", force)
+        checks.bearable("force", force, friction * contact.load)
         height = levels.height(force)
     else:
         displacement = checks.finite("displacement", displacement)
         height = levels.load - levels.displaced(abs(displacement))
         height = height if displacement >= 0 else -height
-    return _state(contact, levels, height, force, displacement)
-
-
-def one_force(what: str, value: Any, limit: float) -> float:
-    """The shear force as a number, after a check that it does not exceed the friction limit."""
-    if shape := np.shape(value):
-        raise InputError(what, found=f"shape {shape}", expected="one number")
-    return float(checks.bearable(what, np.asarray(checks.finite(what, value)), limit))
-
-
-def _state(
-    contact: Contact,
-    levels: FrictionLevels,
-    height: Fraction,
-    force: float | None,
-    displacement: float | None,
-) -> ShearState:
-    """The state at T = Q / f: by normal solutions, or by general steps if order fails."""
-    start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
     walk = Walk(levels, start, [(levels.load, height)])
     if walk.general is not None and displacement is not None:
         walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
@@ -252,15 +237,12 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
     """The value of T = Q / f for which general steps give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
-    start = MemoryCurve.pressed(levels.load)
-
     def beyond(part: float) -> float:
-        height = Fraction(part) * levels.load
-        moved = followed(levels, start, [(levels.load, height)]).states.displacements.value[0]
-        return float(moved - displacement)
+        points = [(levels.load, Fraction(part) * levels.load)]
+        found = followed(levels, MemoryCurve.pressed(levels.load), points)
+        return float(found.states.displacements.value[0] - displacement)
 
-    root = brentq(beyond, -1.0, 1.0, xtol=1e-12)
-    return Fraction(root) * levels.load
+    return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load
 
 
 def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
