@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
@@ -24,15 +24,10 @@ from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
-from convexrough.roundoff import SAFETY
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
-
-#: An asperity keeps the status "sliding" of the solution if the error bound of its given force is
-#: smaller than this fraction of the friction limit f P_i.
-NEAR_SLIDING = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -243,44 +238,3 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
         return float(found.states.displacements.value[0] - displacement)
 
     return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load
-
-
-def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
-    """The certificate of given shear forces after monotonic shear.
-
-    forces : (n,) [force] shear forces in the order of the scene's asperities
-    force  : [force] the prescribed sum of the shear forces
-
-    `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity gets the status that it has in the solution if it is open there, or if its entry of
-    `force_errors` is small enough. For "sliding" it must be below 1 % of the friction limit f P_i;
-    for "partial" it must be below the margin f P_i - |Q_i|, with the force Q_i of the solution.
-    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
-
-    Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
-    the forces are not finite numbers.
-
-    >>> force = 0.25 * contact.load
-    >>> state = cr.shear(contact, force=force)
-    >>> cr.certify_shear(contact, state.forces, force=force).holds
-    True
-    """
-    checks.instance("contact", contact, Contact)
-    checks.in_order("forces", forces)
-    given = checks.array("forces", forces, length=len(contact.scene))
-    return against(shear(contact, force=checks.finite("force", force)), given)
-
-
-def against(state: ShearState, given: Array) -> ShearCertificate:
-    """The certificate of given forces (n,) [force], from a comparison with a proved state."""
-    contact = state.contact
-    apart = np.abs(given - state.forces)
-    errors = (apart + state.certificate.force_errors) * (1 + SAFETY)
-    limits = checks.friction(contact.scene.friction) * contact.loads
-    left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
-    implied = (errors < left) | (state.status == "open")
-    return replace(
-        state.certificate,
-        status=frozen(np.where(implied, state.status, "undecided")),
-        force_errors=frozen(errors),
-    )
