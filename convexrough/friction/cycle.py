@@ -26,7 +26,6 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.loss import losses, shared, trapezoid_loss
@@ -260,6 +259,7 @@ class Loop(Table):
     _along: ClassVar[Along] = {
         ("point",): ("forces", "displacements"),
         ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+        ("asperity",): ("asperities",),
     }
 
     asperities: Indices
@@ -267,9 +267,6 @@ class Loop(Table):
     displacements: Array
     asperity_forces: Array
     asperity_displacements: Array
-
-    def _variables(self) -> Variables:
-        return super()._variables() | {"asperity": (("asperity",), self.asperities)}
 
     @property
     def area(self) -> float:
