@@ -291,17 +291,14 @@ class Stepper:
         """
         size, load = float(np.abs(step.indentations).max()), float(step.loads.sum())
         eta = step.taken(step.total / load * step.own)
-        tried = [self._iterate(step, eta, float(eta @ step.loads) / load)]
+        tried = [self._iterate(step, np.append(eta, eta @ step.loads / load))]
         for _ in range(ITERATIONS):
-            if tried[-1].residual <= ACCURATE * size:
-                break
             iterate, worst = tried[-1], max(each.residual for each in tried[-RECENT:])
-            change, shift = iterate.newton(self.A)
+            if iterate.residual <= ACCURATE * size:
+                break
+            change = self._newton(iterate)
             for k in range(HALVINGS):
-                part = 2.0**-k
-                following = self._iterate(
-                    step, iterate.eta + part * change, iterate.x + part * shift
-                )
+                following = self._iterate(step, iterate.unknown + 2.0**-k * change)
                 if following.residual < worst:
                     break
             else:
@@ -311,18 +308,27 @@ class Stepper:
         if best.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {best.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
-        return best.eta, best.x
+        return best.unknown[:-1], float(best.unknown[-1])
 
-    def _iterate(self, step: Step, eta: Array, x: float) -> _Iterate:
-        own = step.at(eta)
-        defect = eta + self.A @ (own.forces - step.now.own.forces) - x
-        excess = float(own.forces.sum()) - step.total
-        slopes = step.parts * own.stiffness
-        total, rounding = float(slopes.sum()), len(eta) * ROUNDOFF
+    def _iterate(self, step: Step, unknown: Array) -> _Iterate:
+        own, x = step.at(unknown[:-1]), float(unknown[-1])
+        defect = unknown[:-1] + self.A @ (own.forces - step.now.own.forces) - x
+        excess, slopes = float(own.forces.sum()) - step.total, step.parts * own.stiffness
+        total, rounding = float(slopes.sum()), len(slopes) * ROUNDOFF
         missing = abs(excess) / total if total > 0 else np.inf
         beyond = abs(excess) > rounding * float(np.abs(own.forces).sum())
         residual = max(float(np.abs(defect).max()), missing if beyond else 0.0)
-        return _Iterate(eta, x, slopes, defect, excess, residual)
+        return _Iterate(unknown, slopes, np.append(defect, excess), residual)
+
+    def _newton(self, iterate: _Iterate) -> Array:
+        """The change of the unknown in a Newton step."""
+        slopes, n = iterate.slopes, len(iterate.slopes)
+        rows = np.column_stack((self.A * slopes + np.eye(n), -np.ones(n)))
+        try:
+            matrix = np.vstack((rows, np.append(slopes, 0.0)))
+            return np.asarray(np.linalg.solve(matrix, -iterate.defect))
+        except np.linalg.LinAlgError as error:
+            raise SolverError("everything slides", solver="general step") from error
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
@@ -331,27 +337,10 @@ class Stepper:
 
 
 class _Iterate(NamedTuple):
-    eta: Array  # (n,) displacements of the asperities in the step
-    x: float  # displacement of the bodies in the step
-    slopes: Array  # dT_i / deta_i
-    defect: Array  # (n,) defects of the first equation of (1)
-    excess: float  # sum of T_i minus T
-    residual: float  # the largest defect, or the displacement that corrects `excess` if larger
-
-    def newton(self, A: Array) -> tuple[Array, float]:
-        """The changes of eta and x in a Newton step."""
-        n = len(self.eta)
-        matrix = np.empty((n + 1, n + 1))
-        matrix[:n, :n] = A * self.slopes
-        matrix[np.diag_indices(n)] += 1.0
-        matrix[:n, n] = -1.0
-        matrix[n, :n] = self.slopes
-        matrix[n, n] = 0.0
-        try:
-            step = np.linalg.solve(matrix, -np.append(self.defect, self.excess))
-        except np.linalg.LinAlgError as error:
-            raise SolverError("everything slides", solver="general step") from error
-        return step[:n], float(step[n])
+    unknown: Array  # (n + 1,) eta, the displacements of the asperities in the step; then x
+    slopes: Array  # (n,) dT_i / deta_i
+    defect: Array  # (n + 1,) the left sides of (1) minus the right sides
+    residual: float  # the largest defect, or the displacement that corrects that of T if larger
 
 
 class SteppedPath(NamedTuple):
