@@ -18,7 +18,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import SolverError
-from convexrough.friction.general_step import Step, Stepper
+from convexrough.friction.general_step import OwnStep, Step, Stepper
 from convexrough.influence import couple
 from convexrough.influence.shells import shells
 from convexrough.solvers.programs import ConeProgram, run_clarabel
@@ -144,15 +144,16 @@ def pieces_of(levels: Array, heights: Array, own: float, k: float) -> list[ConeP
 class ConicStepper(Stepper):
     """General steps that Clarabel solves as cone programs."""
 
-    def _solve(self, step: Step) -> tuple[Array, float]:
-        """eta and x, from the forces of the asperities that touch and the multiplier of T."""
+    def _solve(self, step: Step) -> tuple[Array, float, OwnStep]:
+        """eta, x and own steps, from the forces of touching asperities and the multiplier of T."""
         which = np.flatnonzero(step.loads)
         program, unit = self._program(step, which)
         raw = run_clarabel(program, "conic step", TOLERANCE, max_step_fraction=STEP)
         forces = np.zeros(len(step.loads))
         forces[which] = np.clip(raw.x[: len(which)], -1.0, 1.0) * step.loads[which]
         x = float(-raw.multipliers[0]) * unit / float(step.loads.sum())
-        return x - self.A @ (forces - step.now.own.forces), x
+        eta = x - self.A @ (forces - step.now.forces)
+        return eta, x, step.at(eta)
 
     def _program(self, step: Step, which: Indices) -> tuple[ConeProgram, float]:
         """The program in T_i / N_i and the variables of each piece, and the unit of its objective.
@@ -177,7 +178,7 @@ class ConicStepper(Stepper):
         each = [pieces_of(*values) for values in zip(*vertices, strict=True)]
         owner = np.repeat(np.arange(n), [len(pieces) for pieces in each])
         pieces = [piece for some in each for piece in some]
-        around = self.A[which] @ step.now.own.forces
+        around = self.A[which] @ step.now.forces
         linear = [-N * (step.now.deflections[which] / parts + around) / unit]
         linear += [
             piece.objective(shifts[i]) * (energies[i] / unit)
@@ -185,13 +186,17 @@ class ConicStepper(Stepper):
         ]
         names = range(1 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 2, LIFT)
         lift = power_cones([np.array([name]) for name in names], LIFT, ones=np.zeros(1, dtype=int))
-        cones = sparse.block_diag([piece.rows(lift.matrix.toarray()) for piece in pieces])
-        of_asperity = sparse.csr_array((np.ones(len(owner)), (owner, np.arange(len(owner)))))
-        weights = sparse.kron(of_asperity, np.eye(1, LIFT))
-        forces = of_asperity @ sparse.block_diag([piece.force_row[None] for piece in pieces])
+        powers = lift.matrix.toarray()
+        cones = sparse.block_diag([piece.rows(powers) for piece in pieces])
+        weights, forces = np.zeros((2, n, len(pieces), LIFT))
+        weights[owner, range(len(pieces)), 0] = 1.0
+        forces[owner, range(len(pieces))] = [piece.force_row for piece in pieces]
+        sums = np.vstack((weights.reshape(n, -1), forces.reshape(n, -1)))
         A = self.A[np.ix_(which, which)] + np.diag(wells)
         quadratic = np.triu(A * N * (N[:, None] / unit))
-        rows = [[N[None] / N.sum(), None], [None, weights], [-np.eye(n), forces], [None, cones]]
+        rows = [[N[None] / N.sum(), None], [-np.eye(2 * n, n, -n), sums], [None, cones]]
+        constraints = sparse.csc_matrix(sparse.block_array(rows))
+        constraints.eliminate_zeros()  # `block_diag` keeps them
         constant = np.zeros(1 + 2 * n + cones.shape[0])
         constant[0], constant[1 : n + 1] = step.total / N.sum(), 1.0
         program = ConeProgram(
@@ -199,7 +204,7 @@ class ConicStepper(Stepper):
                 sparse.block_diag((quadratic, sparse.csc_array((cones.shape[1],) * 2)))
             ),
             linear=np.concatenate(linear),
-            constraints=sparse.csc_matrix(sparse.block_array(rows)),
+            constraints=constraints,
             constant=constant,
             equalities=1 + 2 * n,
         )

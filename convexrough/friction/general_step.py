@@ -20,9 +20,11 @@ whose left side does not decrease with L.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +60,12 @@ FEWEST, MOST = 4, 64
 #: the loss plus NEGLIGIBLE times the largest loss.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
+#: A point on each of n curves: index of the next vertex, level and height, (n,) each.
+Front: TypeAlias = tuple[Indices, Array, Array]
 
-class OwnCurves(NamedTuple):
+
+@dataclass(frozen=True, eq=False)
+class OwnCurves:
     """The memory curves of n asperities: polygons of m vertices, of which the last may be repeated.
 
     coefficients : (n,) k of Hertz's law
@@ -76,18 +82,19 @@ class OwnCurves(NamedTuple):
         levels = np.column_stack((np.zeros(len(indentations)), indentations))
         return cls(coefficients, levels, np.zeros(levels.shape))
 
-    @property
+    @cached_property
     def layers(self) -> tuple[Array, Array, Array]:
-        """(n, m) loads at the vertices; (n, m - 1) slopes of the layers, and their shear forces."""
+        """(n, m) loads and shear forces at the vertices; (n, m - 1) slopes of the layers."""
         run, added = np.diff(self.levels), np.diff(self.heights)
         slopes = np.divide(added, run, out=np.zeros(run.shape), where=run > 0)
         loads = hertz.load(self.levels, self.coefficients[:, None])
-        return loads, slopes, slopes * np.diff(loads)
+        forces = np.cumsum(slopes * np.diff(loads), axis=1)
+        return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
 
     def cut(self, indentations: Array) -> OwnCurves:
         """The curves up to these indentations (n,); curves that end below them are unchanged."""
         front = self._front(np.zeros(len(indentations)), indentations)
-        return self._ended(*front, *front[1:])
+        return self.ended(front, front[1:])
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
         """A straight step that ends here, (n,) each; the curves must be cut at `indentations`."""
@@ -95,31 +102,30 @@ class OwnCurves(NamedTuple):
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
         front = self._front(sign, np.where(sign == 0, base, indentations - sign * deflections))
-        curves, level = self._ended(*front, indentations, deflections), front[1]
-        loads, k = hertz.load(indentations, self.coefficients), self.coefficients
+        (after, level, _), k = front, self.coefficients
+        loads, forces, slopes = (each[np.arange(len(k)), after - 1] for each in self.layers)
+        low, high = hertz.load(level, k), hertz.load(indentations, k)
         grown = np.where(sticks, indentations - base, 1.0)
-        stuck = (loads - hertz.load(level, k)) / grown
-        stiffness = np.where(sticks, stuck, 1.5 * np.sqrt(level / k**3))
+        slope = np.where(sticks, moved / grown, sign)
+        stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(level / k**3))
         return OwnStep(
-            curves,
+            self,
+            front,
+            (indentations, deflections),
             fronts=np.where(sign != 0, level, indentations),
-            forces=curves.layers[2].sum(axis=1),
+            forces=forces + slopes * (low - loads) + slope * (high - low),
             stiffness=np.where(np.abs(deflections) < indentations, stiffness, 0.0),
         )
 
     def energies(self) -> Array:
         """(n,) elastic energy of the own deflections, divided by c_t f^2."""
-        loads, slope, forces = self.layers
-        below = np.cumsum(forces, axis=1) - forces
-        plain = slope * (below - slope * loads[:, :-1]) * np.diff(self.levels)
+        loads, forces, slope = self.layers
+        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.levels)
         power = np.diff(loads * self.levels)
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
-    def _front(self, sign: Array, wanted: Array) -> tuple[Indices, Array, Array]:
-        """The point on each curve at which  level - sign * height  reaches `wanted` (n,).
-
-        It is given by the index of the next vertex, its level and its height; (n,) each.
-        """
+    def _front(self, sign: Array, wanted: Array) -> Front:
+        """The point on each curve at which  level - sign * height  reaches `wanted` (n,)."""
         keys, rows = self.levels - sign[:, None] * self.heights, np.arange(len(sign))
         below = (keys < wanted[:, None]).sum(axis=1)
         after = np.clip(below, 1, keys.shape[1] - 1)
@@ -133,35 +139,42 @@ class OwnCurves(NamedTuple):
         )
         return after, level, height
 
-    def _ended(
-        self, after: Indices, level: Array, height: Array, last: Array, last_height: Array
-    ) -> OwnCurves:
-        """The curves up to the point (level, height) before vertex `after`, then a line."""
+    def ended(self, front: Front, end: tuple[Array, Array]) -> OwnCurves:
+        """The curves up to their fronts, then a line to `end`: levels and heights."""
+        after, *at_front = front
         columns, after = np.arange(int(after.max()) + 2), after[:, None]
         kept = np.minimum(columns, self.levels.shape[1] - 1)
-        below, here = columns < after, columns == after
-        levels = np.where(here, level[:, None], last[:, None])
-        heights = np.where(here, height[:, None], last_height[:, None])
-        return OwnCurves(
-            self.coefficients,
-            np.where(below, self.levels[:, kept], levels),
-            np.where(below, self.heights[:, kept], heights),
+        parts = (
+            np.where(columns == after, here[:, None], last[:, None])
+            for here, last in zip(at_front, end, strict=True)
         )
+        whole = (
+            np.where(columns < after, old[:, kept], part)
+            for old, part in zip((self.levels, self.heights), parts, strict=True)
+        )
+        return OwnCurves(self.coefficients, *whole)
 
 
 class OwnStep(NamedTuple):
-    """The result of a straight step of n asperities, each along its own curve.
+    """A straight step of n asperities from their curves `old`; arrays are (n,).
 
-    curves    : the curves after the step
-    fronts    : (n,) indentation at the slip front; the whole indentation where nothing slips
-    forces    : (n,) shear forces T_i
-    stiffness : (n,) derivatives of the forces with respect to the deflections
+    front     : where the old curves end;  end : indentations and deflections after the step
+    fronts    : indentation at the slip front; the whole indentation where nothing slips
+    forces    : shear forces T_i
+    stiffness : derivatives of the forces with respect to the deflections
     """
 
-    curves: OwnCurves
+    old: OwnCurves
+    front: Front
+    end: tuple[Array, Array]
     fronts: Array
     forces: Array
     stiffness: Array
+
+    @property
+    def curves(self) -> OwnCurves:
+        """The curves after the step."""
+        return self.old.ended(self.front, self.end)
 
 
 class Bundle(NamedTuple):
@@ -169,7 +182,9 @@ class Bundle(NamedTuple):
 
     load, height : [force] P and T = Q / f
     indentations : (n,) at P; minus the gap where open
-    own       : the last step of each asperity
+    curves    : the memory curves of the asperities
+    fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
+    forces    : (n,) T_i, the shear forces of the asperities divided by f
     positions : (n,) deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
@@ -178,7 +193,9 @@ class Bundle(NamedTuple):
     load: Fraction
     height: Fraction
     indentations: Array
-    own: OwnStep
+    curves: OwnCurves
+    fronts: Array
+    forces: Array
     positions: Array
     displacement: float = 0.0
     work: float = 0.0
@@ -186,7 +203,7 @@ class Bundle(NamedTuple):
     @property
     def deflections(self) -> Array:
         """(n,) the own deflection of each asperity, divided by c_t f."""
-        return self.own.curves.heights[:, -1]
+        return self.curves.heights[:, -1]
 
 
 class Step(NamedTuple):
@@ -210,7 +227,7 @@ class Step(NamedTuple):
     def to(cls, now: Bundle, indentations: Array, total: float) -> Step:
         own, gaps = np.maximum(indentations, 0.0), np.maximum(-now.indentations, 0.0)
         parts = np.divide(own, own + gaps, out=np.zeros_like(own), where=own > 0)
-        curves = now.own.curves.cut(own)
+        curves = now.curves.cut(own)
         loads = hertz.load(own, curves.coefficients)
         return cls(now, total, indentations, own, loads, curves, parts)
 
@@ -242,7 +259,7 @@ class Stepper:
         found = self.levels.depths(load)
         own, zero = np.maximum(found, 0.0), np.zeros(len(found))
         curves = OwnCurves.pressed(own, self.coefficients)
-        return Bundle(load, Fraction(0), found, OwnStep(curves, own, zero, zero), zero)
+        return Bundle(load, Fraction(0), found, curves, own, zero, zero)
 
     def along(self, start: MemoryCurve, points: Sequence[Point], steps: int) -> list[Bundle]:
         """The state at each point, with `steps` general steps per segment."""
@@ -267,7 +284,7 @@ class Stepper:
             return self.start(load)._replace(work=now.work - lost)
         step = Step.to(now, self.levels.depths(load), float(height))
         try:
-            eta, x = self._gross(step) if abs(height) == load else self._solve(step)
+            eta, x, own = self._gross(step) if abs(height) == load else self._solve(step)
         except SolverError:
             if cuts == 0:
                 raise
@@ -275,17 +292,18 @@ class Stepper:
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
         work = now.work + float(now.height + height) / 2 * x
         moved, displacement = now.positions + eta, now.displacement + x
-        return Bundle(load, height, step.indentations, step.at(eta), moved, displacement, work)
+        known = step.indentations, own.curves, own.fronts, own.forces
+        return Bundle(load, height, *known, moved, displacement, work)
 
-    def _gross(self, step: Step) -> tuple[Array, float]:
-        """eta and x at the smallest displacement at which all asperities slide."""
+    def _gross(self, step: Step) -> tuple[Array, float, OwnStep]:
+        """eta, x and the own steps at the smallest displacement at which all asperities slide."""
         sign, on = np.sign(step.total), step.own > 0
-        coupled = self.A @ (sign * step.loads - step.now.own.forces)
+        coupled = self.A @ (sign * step.loads - step.now.forces)
         x = sign * float((sign * (step.taken(sign * step.own) + coupled)[on]).max())
-        return x - coupled, x
+        return x - coupled, x, step.at(x - coupled)
 
-    def _solve(self, step: Step) -> tuple[Array, float]:
-        """eta and x by Newton's method.
+    def _solve(self, step: Step) -> tuple[Array, float, OwnStep]:
+        """eta, x and the own steps by Newton's method.
 
         It starts with deflections that are an equal fraction of the indentations.
         """
@@ -308,17 +326,17 @@ class Stepper:
         if best.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {best.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
-        return best.unknown[:-1], float(best.unknown[-1])
+        return best.unknown[:-1], float(best.unknown[-1]), best.own
 
     def _iterate(self, step: Step, unknown: Array) -> _Iterate:
         own, x = step.at(unknown[:-1]), float(unknown[-1])
-        defect = unknown[:-1] + self.A @ (own.forces - step.now.own.forces) - x
+        defect = unknown[:-1] + self.A @ (own.forces - step.now.forces) - x
         excess, slopes = float(own.forces.sum()) - step.total, step.parts * own.stiffness
         total, rounding = float(slopes.sum()), len(slopes) * ROUNDOFF
         missing = abs(excess) / total if total > 0 else np.inf
         beyond = abs(excess) > rounding * float(np.abs(own.forces).sum())
         residual = max(float(np.abs(defect).max()), missing if beyond else 0.0)
-        return _Iterate(unknown, slopes, np.append(defect, excess), residual)
+        return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
 
     def _newton(self, iterate: _Iterate) -> Array:
         """The change of the unknown in a Newton step."""
@@ -332,12 +350,13 @@ class Stepper:
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
-        own, forces = float(state.own.curves.energies().sum()), state.own.forces
-        return own + 0.5 * float(forces @ self.A @ forces)
+        own = float(state.curves.energies().sum())
+        return own + 0.5 * float(state.forces @ self.A @ state.forces)
 
 
 class _Iterate(NamedTuple):
     unknown: Array  # (n + 1,) eta, the displacements of the asperities in the step; then x
+    own: OwnStep  # the steps of the asperities that are displaced by eta
     slopes: Array  # (n,) dT_i / deta_i
     defect: Array  # (n + 1,) the left sides of (1) minus the right sides
     residual: float  # the largest defect, or the displacement that corrects that of T if larger
@@ -400,7 +419,7 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
     travel = float((levels.coefficient * levels.ratio).value)
     positions = travel * np.array([each.positions for each in bundles])
     own = travel * np.array([each.deflections for each in bundles])
-    forces = f * np.array([each.own.forces for each in bundles])
+    forces = f * np.array([each.forces for each in bundles])
     spent = np.array([each.work - stepper.stored(each) for each in bundles])
     displacements = travel * np.array([each.displacement for each in bundles])
     parts = (displacements, forces, positions, positions - own)
@@ -408,5 +427,5 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
         states=States(*(Ball.around(part, np.inf) for part in parts)),
         losses=frozen(f * travel * spent),
         status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
-        fronts=np.array([each.own.fronts for each in bundles]),
+        fronts=np.array([each.fronts for each in bundles]),
     )
