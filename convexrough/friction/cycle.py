@@ -224,11 +224,7 @@ class Cycle(Table, Plottable):
 
         return cycle_gradient(self, holding=holding)
 
-    def loop(
-        self,
-        points: int = 200,
-        asperities: ArrayLike | None = None,
-    ) -> Loop:
+    def loop(self, points: int = 200, asperities: ArrayLike | None = None) -> Loop:
         """The loop of shear force against displacement, with points denser at its ends.
 
         points     : approximate number of points; half of them on each branch
@@ -349,11 +345,7 @@ def cycles(
 
 
 def steady(
-    scene: Scene,
-    *,
-    loads: ArrayLike,
-    forces: ArrayLike,
-    influence: Kind | None = None,
+    scene: Scene, *, loads: ArrayLike, forces: ArrayLike, influence: Kind | None = None
 ) -> Cycle:
     """The steady state of a closed path of load and shear force that is repeated.
 
@@ -500,9 +492,7 @@ def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved:
 
 
 def loops(
-    cycles: Sequence[Cycle],
-    points: int = 200,
-    asperities: ArrayLike | None = None,
+    cycles: Sequence[Cycle], points: int = 200, asperities: ArrayLike | None = None
 ) -> list[Loop]:
     """The force-displacement loops of several cycles of one contact at constant load.
 

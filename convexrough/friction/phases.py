@@ -109,7 +109,7 @@ class PhaseLosses(Table, Plottable):
     _along: ClassVar[Along] = {
         ("ellipse",): (
             *("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding"),
-        ),
+        )
     }
 
     scene: Scene

@@ -151,10 +151,7 @@ class ShearState(Table, Plottable):
 
 
 def shear(
-    contact: Contact,
-    *,
-    force: float | None = None,
-    displacement: float | None = None,
+    contact: Contact, *, force: float | None = None, displacement: float | None = None
 ) -> ShearState:
     """The friction state of a pressed contact after monotonic shear at constant load P.
 
