@@ -11,7 +11,7 @@ of c_t f with Mindlin's ratio c_t: docs/theory/without-order.md, "The step as on
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -187,7 +187,7 @@ class ConicStepper(Stepper):
         names = range(1 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 2, LIFT)
         lift = power_cones([np.array([name]) for name in names], LIFT, ones=np.zeros(1, dtype=int))
         powers = lift.matrix.toarray()
-        cones = sparse.block_diag([piece.rows(powers) for piece in pieces])
+        cones: Any = sparse.block_diag([piece.rows(powers) for piece in pieces])
         weights, forces = np.zeros((2, n, len(pieces), LIFT))
         weights[owner, range(len(pieces)), 0] = 1.0
         forces[owner, range(len(pieces))] = [piece.force_row for piece in pieces]

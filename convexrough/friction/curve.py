@@ -154,7 +154,7 @@ class MemoryCurve(Table, Plottable):
             reach = (sign * run - above) / (shear - sign * added)
             start, lean = done, shear - slope * added
             meets = (slope * run - above) / lean if sign * lean < 0 else Fraction(2)  # 2: never
-            met = start < meets <= min(reach, 1)
+            met = start < meets <= reach and meets <= 1
             done = meets if met else min(reach, Fraction(1))
             if done < reach:
                 front = high - (high - front) * (done - start) / (reach - start)

@@ -341,7 +341,8 @@ def cycles(
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]
         LOGGER.info("pressing at the level of a cycle")
     paths = [[(levels.load, T) for T in each] for each in heights]
-    return _cycles(contact, MemoryCurve.pressed(levels.load), paths, np.stack((upper, lower), 1))
+    forces = [np.array(both) for both in zip(upper, lower, strict=True)]
+    return _cycles(contact, MemoryCurve.pressed(levels.load), paths, forces)
 
 
 def steady(

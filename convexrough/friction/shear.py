@@ -175,6 +175,7 @@ def shear(
     levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
     start = MemoryCurve.pressed(levels.load)
     if displacement is None:
+        assert force is not None  # exactly_one
         if shape := np.shape(force):
             raise InputError("force", found=f"shape {shape}", expected="one number")
         force = checks.finite("force", force)

@@ -13,7 +13,7 @@ a the contact radius. All shear forces are divided by the coefficient of frictio
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -131,11 +131,11 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
     of_asperities = sparse.kron(sparse.diags_array(-1.0 / limits), np.eye(3, 2, -1))
     balance = sparse.kron(np.ones((1, n)), np.eye(2))
     rests = sparse.kron(np.ones((m, 1)), of_asperities)
-    rows = sparse.block_array([[None, balance], [scaled.reshape(-1, 1), rests]])
+    rows: list[list[Any]] = [[None, balance], [scaled.reshape(-1, 1), rests]]
     return ConeProgram(
         quadratic=sparse.csc_matrix((unknowns, unknowns)),
         linear=np.append(-1.0, np.zeros(2 * n)),
-        constraints=sparse.csc_matrix(rows),
+        constraints=sparse.csc_matrix(sparse.block_array(rows)),
         constant=np.append(np.zeros(2), constant.reshape(-1)),
         equalities=2,
     )
