@@ -19,7 +19,6 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
 from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, energies
@@ -115,7 +114,9 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     which = [[place[load] for load in end] for end in ends]
     (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
     softest = np.array([_stiffest(known[k]) for k in which[1]])
-    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), _over(run.upper, softest)))
+    with np.errstate(divide="ignore"):
+        most = run.upper / softest * (1 + SAFETY)
+    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), most))
     m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
     first, last = D2 - D1, D3 - D1
     larger = where(fall.value >= 0.0, first, last)
@@ -132,11 +133,6 @@ def _stiffest(level: Level) -> float:
     k = level.problem.exact.coefficients.upper
     stiffness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
     return float(stiffness.max(initial=0.0)) * (1 - SAFETY)
-
-
-@np.errstate(divide="ignore")
-def _over(size: Array, divisor: Array) -> Array:
-    return np.asarray(size / divisor * (1 + SAFETY))
 
 
 def _hull(a: Ball, b: Ball) -> Ball:

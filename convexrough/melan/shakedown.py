@@ -176,21 +176,15 @@ def shakedown(
         limit = _exact(contact, float(t0), p, t)
     else:
         limit = _elastic(contact, float(t0), t) if kind == "elastic" else solve(contact, t0, t)
+    arrays = {"factors": limit.factors, "witness": f * limit.witness, "mechanism": limit.mechanism}
     return Shakedown(
         scene=scene,
         kind=kind,
-        factor=limit.factor,
-        lower=limit.lower,
-        upper=limit.upper,
-        factors=frozen(limit.factors),
-        gross=limit.gross,
-        witness=frozen(f * limit.witness),
-        mechanism=frozen(limit.mechanism),
+        **limit._asdict() | {name: frozen(values) for name, values in arrays.items()},
         load=P0,
         force=frozen(f * t0) if kind == "vector" else float(f * t0),
         load_amplitudes=frozen(p),
         force_amplitudes=frozen(q),
-        order=limit.order,
     )
 
 
