@@ -144,26 +144,28 @@ class MemoryCurve(Table, Plottable):
         again, and the slip ends there.
         """
         added, shear = load - self.load, height - self.height
-        pieces, done, front, k = list[Piece](), Fraction(0), Fraction(0), 0
+        rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0
+        pieces, met = list[Piece](), False
         for k in reversed(range(len(self.slopes))):
-            slope = self.slopes[k]
-            if slope == sign:
+            if (slope := self.slopes[k]) == sign:
                 continue
             front, high = self.levels[k], self.levels[k + 1]
             above, run = self.height - self.heights[k], self.load - front
-            reach = (sign * run - above) / (shear - sign * added)
-            start, lean = done, shear - slope * added
-            meets = (slope * run - above) / lean if sign * lean < 0 else Fraction(2)  # 2: never
-            met = start < meets <= reach and meets <= 1
-            done = meets if met else min(reach, Fraction(1))
+            reach = (sign * run - above) / rate
+            start, done = done, min(reach, Fraction(1))
+            if added < 0 and sign * (nears := slope * added - shear) > 0:
+                meets = (above - slope * run) / nears
+                if met := start < meets <= done:
+                    done = meets
             if done < reach:
                 front = high - (high - front) * (done - start) / (reach - start)
             if front < high:
                 loads = self.load + start * added, self.load + done * added
                 pieces.append(Piece(sign, slope, high, front, *loads))
-            if done == 1 or met:
+            if met or done == 1:
                 break
-        load, height = self.load + done * added, self.height + done * shear
+        if met:
+            load, height = self.load + done * added, self.height + done * shear
         curve = self._cut(k)
         if front > curve.load:
             at_front = curve.height + self.slopes[k] * (front - curve.load)
