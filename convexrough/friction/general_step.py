@@ -52,8 +52,8 @@ ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 #: this limit it may grow, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
-#: The smallest and the largest number of steps per segment.
-FEWEST, MOST = 4, 64
+#: The numbers of steps per segment that are tried.
+COUNTS = (4, 8, 16, 32, 64)
 
 #: The number of steps is doubled until each loss changes by less than SETTLED of itself, and the
 #: displacements by less than SETTLED_MOTION of the largest. The change of a loss is compared with
@@ -393,39 +393,35 @@ def followed(
         until losses and displacements settle, up to 64
     """
     by = (stepper or Stepper)(levels)
+    f = float(levels.coefficient.value)
+    travel = float((levels.coefficient * levels.ratio).value)
 
     def found(count: int) -> SteppedPath:
         LOGGER.info(f"solving {count} general steps per segment, as order is not proved")
-        return _found(levels, by, by.along(start, points, count))
+        bundles = by.along(start, points, count)
+        positions = travel * np.array([each.positions for each in bundles])
+        own = travel * np.array([each.deflections for each in bundles])
+        forces = f * np.array([each.forces for each in bundles])
+        spent = np.array([each.work - by.stored(each) for each in bundles])
+        displacements = travel * np.array([each.displacement for each in bundles])
+        parts = (displacements, forces, positions, positions - own)
+        return SteppedPath(
+            states=States(*(Ball.around(part, np.inf) for part in parts)),
+            losses=frozen(f * travel * spent),
+            status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
+            fronts=np.array([each.fronts for each in bundles]),
+        )
 
     if steps is not None:
         return found(steps)
-    count, before, best = 2 * FEWEST, found(FEWEST), np.full(len(points), np.inf)
-    while True:
-        here = found(count)
-        last, best = best, (4.0 * here.losses - before.losses) / 3.0
+    here, best = found(COUNTS[0]), np.full(len(points), np.inf)
+    for count in COUNTS[1:]:
+        before, here, last = here, found(count), best
+        best = (4.0 * here.losses - before.losses) / 3.0
         settled = np.abs(best - last) <= SETTLED * (best + NEGLIGIBLE * best.max(initial=0.0))
         far = here.states.displacements.value
         moved = far - before.states.displacements.value
-        near = np.abs(moved).max() <= SETTLED_MOTION * np.abs(far).max()
-        if (settled.all() and near) or count >= MOST:
-            known = np.maximum.accumulate(np.maximum(best, 0.0))
-            return here._replace(losses=frozen(np.where(settled, known, np.nan)))
-        count, before = 2 * count, here
-
-
-def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) -> SteppedPath:
-    f = float(levels.coefficient.value)
-    travel = float((levels.coefficient * levels.ratio).value)
-    positions = travel * np.array([each.positions for each in bundles])
-    own = travel * np.array([each.deflections for each in bundles])
-    forces = f * np.array([each.forces for each in bundles])
-    spent = np.array([each.work - stepper.stored(each) for each in bundles])
-    displacements = travel * np.array([each.displacement for each in bundles])
-    parts = (displacements, forces, positions, positions - own)
-    return SteppedPath(
-        states=States(*(Ball.around(part, np.inf) for part in parts)),
-        losses=frozen(f * travel * spent),
-        status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
-        fronts=np.array([each.fronts for each in bundles]),
-    )
+        if settled.all() and np.abs(moved).max() <= SETTLED_MOTION * np.abs(far).max():
+            break
+    known = np.maximum.accumulate(np.maximum(best, 0.0))
+    return here._replace(losses=frozen(np.where(settled, known, np.nan)))
