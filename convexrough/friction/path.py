@@ -329,22 +329,20 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
     levels.prepare([*walk.needed, *points])
     (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
     (displacements, displacement_errors), (asperity_forces, force_errors), *others = found
-    here = [levels.at(load) for load in points]
+    rows = levels.rows(points)
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
-    loads = np.array([level.loads.value for level in here]) * levels.units.force
-    approaches = np.array([float(level.approach.value) for level in here]) * levels.units.length
     return LoadPath(
         contact=contact,
         loads=frozen(np.array(points, dtype=np.float64)),
         forces=frozen(np.array(forces)),
         displacements=displacements,
         displacement_errors=displacement_errors,
-        approaches=frozen(approaches),
+        approaches=frozen(rows.approach.value * levels.units.length),
         losses=losses,
         loss_errors=loss_errors,
         asperity_forces=asperity_forces,
         asperity_force_errors=force_errors,
-        asperity_loads=frozen(levels.to_scene(loads)),
+        asperity_loads=frozen(levels.to_scene(rows.loads.value * levels.units.force)),
         asperity_displacements=others[0][0],
         drifts=others[1][0],
         fronts=frozen(np.array(fronts)),

@@ -107,9 +107,7 @@ class PhaseLosses(Table, Plottable):
     """
 
     _along: ClassVar[Along] = {
-        ("ellipse",): (
-            *("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding"),
-        )
+        ("ellipse",): ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
     }
 
     scene: Scene
@@ -159,8 +157,8 @@ def phase_losses(
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
-    for what, values in (("phases", turns), ("factors", sizes)):
-        checks.some(what, values)
+    checks.some("phases", turns)
+    checks.some("factors", sizes)
     for i, turn in enumerate(turns):
         checks.phase(f"phases[{i}]", turn)
     alone = _smooth_alone(scene, load)
