@@ -339,14 +339,17 @@ class Stepper:
         return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
 
     def _newton(self, iterate: _Iterate) -> Array:
-        """The change of the unknown in a Newton step."""
-        slopes, n = iterate.slopes, len(iterate.slopes)
-        rows = np.column_stack((self.A * slopes + np.eye(n), -np.ones(n)))
+        """The change of the unknown in a Newton step, from those whose forces change."""
+        some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
+        slopes, moved = iterate.slopes[some], wanted[:-1]
+        coupled, ones = self.A[:, some] * slopes, np.ones(len(some))
+        rows = np.column_stack((coupled[some] + np.eye(len(some)), -ones))
+        matrix = np.vstack((rows, np.append(slopes, 0.0)))
         try:
-            matrix = np.vstack((rows, np.append(slopes, 0.0)))
-            return np.asarray(np.linalg.solve(matrix, -iterate.defect))
+            found = np.linalg.solve(matrix, np.append(moved[some], wanted[-1]))
         except np.linalg.LinAlgError as error:
             raise SolverError("everything slides", solver="general step") from error
+        return np.append(moved + found[-1] - coupled @ found[:-1], found[-1])
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
