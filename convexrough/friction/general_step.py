@@ -144,13 +144,12 @@ class OwnCurves:
         after, *at_front = front
         columns, after = np.arange(int(after.max()) + 2), after[:, None]
         kept = np.minimum(columns, self.levels.shape[1] - 1)
-        parts = (
-            np.where(columns == after, here[:, None], last[:, None])
-            for here, last in zip(at_front, end, strict=True)
-        )
+        parts = zip((self.levels, self.heights), at_front, end, strict=True)
         whole = (
-            np.where(columns < after, old[:, kept], part)
-            for old, part in zip((self.levels, self.heights), parts, strict=True)
+            np.select(
+                (columns < after, columns == after), (old[:, kept], here[:, None]), last[:, None]
+            )
+            for old, here, last in parts
         )
         return OwnCurves(self.coefficients, *whole)
 
