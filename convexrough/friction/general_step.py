@@ -144,12 +144,10 @@ class OwnCurves:
         after, *at_front = front
         columns, after = np.arange(int(after.max()) + 2), after[:, None]
         kept = np.minimum(columns, self.levels.shape[1] - 1)
-        parts = zip((self.levels, self.heights), at_front, end, strict=True)
+        unchanged, at = columns < after, columns == after
         whole = (
-            np.select(
-                (columns < after, columns == after), (old[:, kept], here[:, None]), last[:, None]
-            )
-            for old, here, last in parts
+            np.where(unchanged, old[:, kept], np.where(at, here[:, None], last[:, None]))
+            for old, here, last in zip((self.levels, self.heights), at_front, end, strict=True)
         )
         return OwnCurves(self.coefficients, *whole)
 
@@ -340,10 +338,10 @@ class Stepper:
     def _newton(self, iterate: _Iterate) -> Array:
         """The change of the unknown in a Newton step, from those whose forces change."""
         some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
-        slopes, moved = iterate.slopes[some], wanted[:-1]
-        coupled, ones = self.A[:, some] * slopes, np.ones(len(some))
-        rows = np.column_stack((coupled[some] + np.eye(len(some)), -ones))
-        matrix = np.vstack((rows, np.append(slopes, 0.0)))
+        slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)
+        coupled, matrix = self.A[:, some] * slopes, np.zeros((n + 1, n + 1))
+        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = coupled[some], -1.0, slopes
+        matrix[range(n), range(n)] += 1.0
         try:
             found = np.linalg.solve(matrix, np.append(moved[some], wanted[-1]))
         except np.linalg.LinAlgError as error:
