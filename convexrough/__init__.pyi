@@ -30,15 +30,15 @@ from .friction.path import LoadPath as LoadPath
 from .friction.path import history as history
 from .friction.path import load_path as load_path
 from .friction.phases import PhaseLosses as PhaseLosses
+from .friction.phases import elliptic_path as elliptic_path
 from .friction.phases import phase_losses as phase_losses
-from .friction.shapes import elliptic_path as elliptic_path
 from .friction.shear import ShearCertificate as ShearCertificate
 from .friction.shear import ShearState as ShearState
-from .friction.shear import certify_shear as certify_shear
 from .friction.shear import shear as shear
 from .friction.side_by_side import PathComparison as PathComparison
 from .friction.side_by_side import PathEntry as PathEntry
 from .friction.side_by_side import compare_paths as compare_paths
+from .friction.verdict import certify_shear as certify_shear
 from .gradients.change import ContactChange as ContactChange
 from .gradients.change import Direction as Direction
 from .gradients.change import ShearChange as ShearChange

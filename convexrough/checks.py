@@ -158,20 +158,21 @@ def friction(coefficient: float | None) -> float:
     return coefficient
 
 
-def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
+def bearable(what: str, forces: ArrayLike, limit: float | Array) -> Array:
     """The shear forces Q as an array of any shape; raises InputError unless |Q| <= limit = f P."""
     given = numbers(what, forces)
-    good = np.abs(given) <= limit * (1 + 1e-15)  # False for nan
+    limits = np.broadcast_to(limit, given.shape)
+    good = np.abs(given) <= limits * (1 + 1e-15)  # False for nan
     if not good.all():
         place = np.unravel_index(int(np.argmin(good)), given.shape)
         name = f"{what}[{', '.join(map(str, place))}]" if place else what
-        worst = float(given[place])
+        worst, limit = float(given[place]), float(limits[place])
         found = f"{worst!r}"
         if math.isfinite(worst) and limit > 0:
             times = abs(worst) / limit
             found += f" ({times:.4g} f P" if times > 1.001 else f" ((1 + {times - 1:.1g}) f P"
             found += ": gross sliding)"
-        raise InputError(name, found=found, expected=f"at most f P = {float(limit)!r} in size")
+        raise InputError(name, found=found, expected=f"at most f P = {limit!r} in size")
     return given
 
 

@@ -93,8 +93,7 @@ class Contacts(Table):
             lower = checks.array("minimum", minimum, length=m, one="scene")
         f = np.array([checks.friction(scene.friction) for scene in self.scenes])
         for name, forces in (("maximum", upper), ("minimum", lower)):
-            for k in np.flatnonzero(np.abs(forces) > f * self.loads).tolist():
-                checks.bearable(f"{name}[{k}]", forces[k], float(f[k] * self.loads[k]))
+            checks.bearable(name, forces, f * self.loads)
         if (upper < lower).any():
             k = int(np.argmax(upper < lower))
             expected = f"at least the minimum, {lower[k]:g} (-maximum by default)"

@@ -126,62 +126,46 @@ class MemoryCurve(Table, Plottable):
         added, shear = load - self.load, height - self.height
         if added > 0 and abs(shear) <= added:
             return self._with(shear / added, load, height), []
-        if added >= 0:
-            return self._slip(1 if shear > 0 else -1, load, height)
-        lean = shear - self.slopes[-1] * added  # positive if the path starts above the old curve
-        sign = 1 if lean > 0 else -1
-        if lean == 0:
-            return self._run_back(load, height), []
-        return self._slip(sign, *self._crossing(sign, load, height))
-
-    def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
-        """The state after unloading along the top layer, down to `load` or the layer's end."""
-        last = len(self.slopes) - 1
+        # If the load falls, this is positive if the path starts above the old curve.
+        lean = shear if added >= 0 else shear - self.slopes[-1] * added
+        if lean != 0:
+            return self._slip(1 if lean > 0 else -1, load, height)
+        last = len(self.slopes) - 1  # the path runs back along the top layer
         below = self._cut(last)
-        if load <= self.levels[last]:
-            return below
-        return below._with(self.slopes[last], load, height)
-
-    def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
-        """The point where a segment of falling load meets the old curve again; else its end."""
-        direction = (height - self.height) / (load - self.load)
-        over = Fraction(0)  # sign times (path - old curve)
-        for k in reversed(range(len(self.slopes))):
-            high, end = self.levels[k + 1], max(self.levels[k], load)
-            before = over
-            over = before - sign * (direction - self.slopes[k]) * (high - end)
-            if over <= 0 < before:
-                level = high - (high - end) * before / (before - over)
-                return level, self.heights[k] + self.slopes[k] * (level - self.levels[k])
-            if end == load:
-                break
-        return load, height
+        return below if load <= below.load else below._with(self.slopes[last], load, height), []
 
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
         """The state after slip of this sign on the segment, and the pieces of its loss.
 
         The line of slope `sign` through the moving point (P, T) meets the old curve at the front.
-        When the front reaches the lower end of a layer, the fraction `part` of the segment is
+        The front reaches the lower end of a layer when a fraction `reach` of the segment is
         covered. Within a layer this fraction is linear in the level of the front. The front passes
-        a layer of slope `sign` at once.
+        a layer of slope `sign` at once. If the load falls, the point itself may meet the curve
+        again, and the slip ends there.
         """
-        added = load - self.load
-        rate = (height - self.height) - sign * added
-        pieces: list[Piece] = []
-        done, front, k = Fraction(0), Fraction(0), 0
+        added, shear = load - self.load, height - self.height
+        rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0
+        pieces, met = list[Piece](), False
         for k in reversed(range(len(self.slopes))):
-            if self.slopes[k] == sign:
+            if (slope := self.slopes[k]) == sign:
                 continue
             front, high = self.levels[k], self.levels[k + 1]
-            part = (self.heights[k] - self.height + sign * (self.load - front)) / rate
-            if part > 1:
-                front = high - (high - front) * (1 - done) / (part - done)
-            at, done = done, min(part, Fraction(1))
+            above, run = self.height - self.heights[k], self.load - front
+            reach = (sign * run - above) / rate
+            start, done = done, min(reach, Fraction(1))
+            if added < 0 and sign * (nears := slope * added - shear) > 0:
+                meets = (above - slope * run) / nears
+                if met := start < meets <= done:
+                    done = meets
+            if done < reach:
+                front = high - (high - front) * (done - start) / (reach - start)
             if front < high:
-                loads = self.load + at * added, self.load + done * added
-                pieces.append(Piece(sign, self.slopes[k], high, front, *loads))
-            if done == 1:
+                loads = self.load + start * added, self.load + done * added
+                pieces.append(Piece(sign, slope, high, front, *loads))
+            if met or done == 1:
                 break
+        if met:
+            load, height = self.load + done * added, self.height + done * shear
         curve = self._cut(k)
         if front > curve.load:
             at_front = curve.height + self.slopes[k] * (front - curve.load)

@@ -26,13 +26,12 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.path import points_of, pressed_for
+from convexrough.friction.path import Walk, points_of, pressed_for
 from convexrough.friction.state import (
     LevelSums,
     Point,
@@ -41,7 +40,6 @@ from convexrough.friction.state import (
     states_of,
     stick_radii,
 )
-from convexrough.friction.walk import Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -176,7 +174,7 @@ class Cycle(Table, Plottable):
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, unknown, frozen(np.full(n, np.inf))
-        slip, slide = shared(levels, self._walk.later, CELLS)
+        slip, slide = shared(levels, self._walk.cycles[1], CELLS)
         both = slip + slide
         partial, gross, lost = (frozen(levels.to_scene(it.value)) for it in (slip, slide, both))
         uncertainty = 0.0 if self.order == "proved" else np.inf
@@ -226,11 +224,7 @@ class Cycle(Table, Plottable):
 
         return cycle_gradient(self, holding=holding)
 
-    def loop(
-        self,
-        points: int = 200,
-        asperities: ArrayLike | None = None,
-    ) -> Loop:
+    def loop(self, points: int = 200, asperities: ArrayLike | None = None) -> Loop:
         """The loop of shear force against displacement, with points denser at its ends.
 
         points     : approximate number of points; half of them on each branch
@@ -261,6 +255,7 @@ class Loop(Table):
     _along: ClassVar[Along] = {
         ("point",): ("forces", "displacements"),
         ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+        ("asperity",): ("asperities",),
     }
 
     asperities: Indices
@@ -268,9 +263,6 @@ class Loop(Table):
     displacements: Array
     asperity_forces: Array
     asperity_displacements: Array
-
-    def _variables(self) -> Variables:
-        return super()._variables() | {"asperity": (("asperity",), self.asperities)}
 
     @property
     def area(self) -> float:
@@ -330,44 +322,31 @@ def cycles(
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         checks.some("displacement", amplitudes)
-        heights = [levels.load - levels.displaced(x) for x in amplitudes]
-        ends = [(height, -height) for height in heights]
-        return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
-    assert maximum is not None  # exactly_one
-    upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
-    checks.some("maximum", upper)
-    lower = -upper
-    if minimum is not None:
-        lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
-        lower = checks.bearable("minimum", lower, limit)
-    if (upper < lower).any():
-        i = int(np.argmax(upper < lower))
-        expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
-        raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
-    forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
-    LOGGER.info("pressing at the level of a cycle")
-    return _at_the_load(contact, [[levels.height(Q) for Q in each] for each in forces], forces)
-
-
-def _at_the_load(
-    contact: Contact,
-    heights: Sequence[Sequence[Fraction]],
-    forces: Sequence[tuple[float, float]],
-) -> list[Cycle]:
-    """The cycles at the load of the contact; each goes between two values of T = Q / f."""
-    load = contact.cached(FrictionLevels).load
-    paths = [[(load, T) for T in each] for each in heights]
-    load_twice = np.full(2, float(load))
-    asked = [(path, load_twice.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
-    return _cycles(contact, MemoryCurve.pressed(load), asked)
+        tops = [levels.load - levels.displaced(x) for x in amplitudes]
+        heights, upper = [(T, -T) for T in tops], np.array([float(f * T) for T in tops])
+        lower = -upper
+    else:
+        assert maximum is not None  # exactly_one
+        upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
+        checks.some("maximum", upper)
+        lower = -upper
+        if minimum is not None:
+            lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
+            lower = checks.bearable("minimum", lower, limit)
+        if (upper < lower).any():
+            i = int(np.argmax(upper < lower))
+            expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
+            raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
+        ends = zip(upper.tolist(), lower.tolist(), strict=True)
+        heights = [(levels.height(high), levels.height(low)) for high, low in ends]
+        LOGGER.info("pressing at the level of a cycle")
+    paths = [[(levels.load, T) for T in each] for each in heights]
+    forces = [np.array(both) for both in zip(upper, lower, strict=True)]
+    return _cycles(contact, MemoryCurve.pressed(levels.load), paths, forces)
 
 
 def steady(
-    scene: Scene,
-    *,
-    loads: ArrayLike,
-    forces: ArrayLike,
-    influence: Kind | None = None,
+    scene: Scene, *, loads: ArrayLike, forces: ArrayLike, influence: Kind | None = None
 ) -> Cycle:
     """The steady state of a closed path of load and shear force that is repeated.
 
@@ -384,8 +363,7 @@ def steady(
     """
     points = points_of(scene, loads, forces)
     contact = pressed_for(scene, [load for load, _ in points], influence)
-    P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
-    return _cycles(contact, MemoryCurve(), [(points, P, Q)])[0]
+    return _cycles(contact, MemoryCurve(), [points], [np.array(forces, dtype=np.float64)])[0]
 
 
 class _Closed(Walk):
@@ -405,16 +383,12 @@ class _Closed(Walk):
         """The memory curve at each point of the second cycle."""
         return self.curves[self.once + 1 :]
 
-    @cached_property
-    def first(self) -> list[Piece]:
-        """The pieces of the loss (`curve.Piece`) up to the end of the first cycle."""
-        return [piece for cost in self.pieces[: self.once + 1] for piece in cost]
-
-    @cached_property
-    def later(self) -> list[Piece]:
-        """The pieces of the loss in every later cycle."""
-        pieces = (piece for cost in self.pieces[self.once + 1 :] for piece in cost)
-        return [piece for piece in pieces if piece.slope * piece.sign != 1]
+    @property
+    def cycles(self) -> tuple[list[Piece], list[Piece]]:
+        """The pieces of the loss up to the end of the first cycle, and in every later cycle."""
+        parts = self.pieces[: self.once + 1], self.pieces[self.once + 1 :]
+        first, later = ([piece for cost in part for piece in cost] for part in parts)
+        return first, later
 
     @cached_property
     def stuck(self) -> Point:
@@ -428,94 +402,85 @@ class _Closed(Walk):
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """The loads of the normal solutions that the first and the steady cycle need."""
-        pieces = self.first, self.later
-        return levels_needed(self.steady, pieces) | {self.stuck[0], self.least}
+        return super().needed | {self.stuck[0], self.least}
 
 
 def _cycles(
-    contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
+    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]], forces: Sequence[Array]
 ) -> list[Cycle]:
     """The steady cycles of several closed paths that begin from the same memory curve.
 
-    asked : for each path the points (P, T), the loads P and the shear forces Q
+    paths, forces : for each path the points (P, T) and the shear forces Q
     """
     levels = contact.cached(FrictionLevels)
-    closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
+    closed = [_Closed.around(levels, start, points) for points in paths]
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
         levels.order(needed)  # a proof for the widest range of loads holds for the others
-    spent = losses(levels, [pieces for each in closed for pieces in (each.first, each.later)])
-    steady = LevelSums.of([curve for each in closed for curve in each.steady])
-    moved = displacements_of(levels, steady)
-    ends = np.cumsum([0, *(each.once for each in closed)]).tolist()
+    spent = losses(levels, [pieces for each in closed for pieces in each.cycles]) * levels.loss_unit
+    moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
+    ends = np.cumsum([0, *map(len, paths)]).tolist()
     return [
-        _cycle(contact, *path[1:], each, spent[2 * k : 2 * k + 2], moved[slice(*far)])
-        for k, (path, each, far) in enumerate(zip(asked, closed, pairwise(ends), strict=True))
+        _cycle(contact, closed[k], forces[k], spent[2 * k : 2 * k + 2], moved[start:stop])
+        for k, (start, stop) in enumerate(pairwise(ends))
     ]
 
 
-def _cycle(
-    contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
-) -> Cycle:
+def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved: Ball) -> Cycle:
     """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
-    levels, order = closed.levels, closed.order
-    (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
+    levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
+    (first, loss), (first_error, error) = rounded(spent)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
     amplitude, amplitude_error = (float(part) for part in rounded(half))
-    rest, top, bottom = (levels.at(s) for s in (closed.stuck[0], levels.load, closed.least))
-    sliding = bottom.touching & rest.open
-    intermittent = top.touching & bottom.open
+    rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
+    lost, kept = top.touching & bottom.open, bottom.touching
     statuses = {
-        "intermittent": intermittent,
-        "sliding": sliding,
-        "partial" if closed.later else "stuck": rest.touching & top.touching,
+        "intermittent": lost,
+        "sliding": kept & rest.open,
+        "partial" if closed.cycles[1] else "stuck": rest.touching & top.touching,
     }
+    doubtful = levels.to_scene((kept & rest.open) | ~(rest.touching | rest.open))
     slips, slip_errors = rounded(
         (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
     )
+    slip_errors = np.where(doubtful, slip_errors, 0.0)
     radii, radius_errors = stick_radii(levels, rest)
-    loaded, heights = zip(*closed.points, strict=True)
-    constant = set(loaded) == {levels.load}
-    defect = np.nan
-    if constant:
+    loaded, heights = zip(*closed.points[: closed.once], strict=True)
+    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
+    defect = smooth = np.nan
+    if set(loaded) == {levels.load}:
         other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
         defect = abs(float(other.value) - loss) / (loss or 1.0)
+        if reference:
+            smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     if order != "proved":
         error = first_error = np.inf
     if order == "fails":
         amplitude_error, statuses = np.inf, {}
-        slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
+        slip_errors, radius_errors = (np.full(len(slips), np.inf) for _ in range(2))
     if closed.general is not None:
         first, both = closed.general.losses[[closed.once, -1]]
         loss, defect = both - first, np.nan
-        amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
-    everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
-    slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
-    lost, touching_below = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
-    doubtful = levels.to_scene(~(rest.touching | rest.open))
-    slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
-    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # whole: W0
-    if constant and reference:
-        smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
+        amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
     found = Cycle(
         contact=contact,
-        loads=frozen(loads),
+        loads=frozen(np.array([float(load) for load in loaded])),
         forces=frozen(forces),
         loss=float(loss),
         loss_error=float(error),
         loss_first=float(first),
         loss_first_error=float(first_error),
         status=by_status(levels, top, **statuses),
-        slips=frozen(np.where(lost, np.nan, np.where(touching_below, slips, 0.0))),
+        slips=frozen(
+            np.where(levels.to_scene(lost), np.nan, np.where(levels.to_scene(kept), slips, 0.0))
+        ),
         slip_errors=frozen(slip_errors),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors),
-        level=float(closed.stuck[0]),
-        force_level=float(levels.coefficient.value) * float(closed.stuck[1]),
+        level=float(stuck),
+        force_level=float(levels.coefficient.value) * float(stuck_height),
         balance_defect=defect,
-        loss_normalised=float(loss) / whole,
+        loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
         smooth_normalised=smooth,
         displacement_amplitude=amplitude,
         displacement_error=amplitude_error,
@@ -528,9 +493,7 @@ def _cycle(
 
 
 def loops(
-    cycles: Sequence[Cycle],
-    points: int = 200,
-    asperities: ArrayLike | None = None,
+    cycles: Sequence[Cycle], points: int = 200, asperities: ArrayLike | None = None
 ) -> list[Loop]:
     """The force-displacement loops of several cycles of one contact at constant load.
 
@@ -557,27 +520,23 @@ def loops(
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     """The loop through the forces maximum - 2 way, as Q falls, and minimum + 2 way, as Q rises."""
-    high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
-    way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
-    forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))
-    forces[len(way) - 1], forces[-1] = low, high
+    contact = cycle.contact
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    P, top, bottom = levels.load, levels.height(high), levels.height(low)
-    drops = [2 * Fraction(each) / f for each in way.tolist()]
-    heights = [top, bottom, *(max(top - drop, bottom) for drop in drops)]
-    heights += [min(bottom + drop, top) for drop in drops[1:]]
-    heights[len(way) + 1], heights[-1] = bottom, top
-    LOGGER.info(f"computing {len(way) - 1} levels of a loop")
-    walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps=1)
+    top, bottom = levels.height(cycle.maximum), levels.height(cycle.minimum)
+    LOGGER.info(f"computing {len(way) + 1} levels of a loop")
+    drops = [*(min(2 * Fraction(each) / f, top - bottom) for each in way.tolist()), top - bottom]
+    heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]
+    points = [(levels.load, height) for height in (top, bottom, *heights)]
+    walk = Walk(levels, MemoryCurve.pressed(levels.load), points, steps=1)
     if cycle.order == "fails" and levels.proved:
         found, some = walk.states(), chosen
     else:
         found, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
     loaded = contact.loads[chosen] > 0
-    mine = (found.forces, found.asperity_displacements)
+    mine = (found.forces.value, found.asperity_displacements.value)
     return Loop(
         chosen,
-        frozen(forces),
-        frozen(np.array(found.displacements[2:])),
+        frozen(np.array([float(f * height) for height in heights])),
+        frozen(found.displacements.value[2:]),
         *(frozen(np.where(loaded, each[2:, some], 0.0)) for each in mine),
     )

@@ -99,7 +99,7 @@ def fretting(cycle: Cycle) -> Fretting:
     rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
     in_part = rim * rim_gap(np.minimum(_over(cycle.stick_radii, a), 1.0))
     mean = largest = np.full(len(scene), unknown)
-    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces, strict=True):
+    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces.value, strict=True):
         bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]
         radii = [stick_radii(levels, levels.at(load))[0] for load, _ in bends]
         here = stick_radii(levels, levels.at(curve.load))[0]
@@ -145,11 +145,10 @@ def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
              "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()
     for each in worn:
-        here = np.flatnonzero(each.contact.loads)
-        x, y = each.contact.scene.asperities.positions[here].T
-        ends = {name: np.full(len(here), getattr(each, name)) for name in ("maximum", "minimum")}
-        values = {name: column[here] for name, column in each.columns(*names).items()}
-        rows.append({**ends, "asperity": here, "x": x, "y": y, **values})
+        x, y = each.contact.scene.asperities.positions.T
+        every = {name: np.full(len(x), getattr(each, name)) for name in ("maximum", "minimum")}
+        every |= {"asperity": np.arange(len(x)), "x": x, "y": y, **each.columns(*names)}
+        rows.append({name: column[each.contact.loads > 0] for name, column in every.items()})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 

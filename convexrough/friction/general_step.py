@@ -5,25 +5,36 @@ Mindlin's ratio c_t. Each asperity i keeps its own memory curve, in the plane of
 its deflection. A straight step to the load P and the shear force T computes the normal solution at
 P. Then Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i
 and x: the displacements of the asperities and of the bodies in the step.
+
+For the curves of asperities, one formula replaces docs/theory/paths.md, "The rules". The curve
+after a straight step follows from the old curve and the end (s1, t1) of the step alone: the slip
+front only moves down, and the part of a curve above the present indentation is dropped. Cut the old
+curve at the smaller of the old and the new indentation, and let h be its heights. If the asperity
+slips, the new curve ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
+
+    L - c h(L) = s1 - c t1,
+
+whose left side does not decrease with L.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arithmetic.balls import Ball
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import SolverError
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.levels import FrictionLevels, Snapshot
-from convexrough.friction.own_curves import OwnCurves, OwnStep
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.state import Point, States, by_status
 from convexrough.influence import couple
 from convexrough.progress import LOGGER
@@ -41,43 +52,191 @@ ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 #: this limit it may grow, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
-#: The smallest and the largest number of steps per segment.
-FEWEST, MOST = 4, 64
+#: The numbers of steps per segment that are tried.
+COUNTS = (4, 8, 16, 32, 64)
 
 #: The number of steps is doubled until each loss changes by less than SETTLED of itself, and the
 #: displacements by less than SETTLED_MOTION of the largest. The change of a loss is compared with
 #: the loss plus NEGLIGIBLE times the largest loss.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
+#: A point on each of n curves: index of the next vertex, level and height, (n,) each.
+Front: TypeAlias = tuple[Indices, Array, Array]
 
-@dataclass(frozen=True)
-class Bundle:
+
+@dataclass(frozen=True, eq=False)
+class OwnCurves:
+    """The memory curves of n asperities: polygons of m vertices, of which the last may be repeated.
+
+    coefficients : (n,) k of Hertz's law
+    levels, heights : (n, m) indentations and deflections at the vertices
+    """
+
+    coefficients: Array
+    levels: Array
+    heights: Array
+
+    @classmethod
+    def pressed(cls, indentations: Array, coefficients: Array) -> OwnCurves:
+        """The curves of asperities without shear."""
+        levels = np.column_stack((np.zeros(len(indentations)), indentations))
+        return cls(coefficients, levels, np.zeros(levels.shape))
+
+    @cached_property
+    def layers(self) -> tuple[Array, Array, Array]:
+        """(n, m) loads and shear forces at the vertices; (n, m - 1) slopes of the layers."""
+        run, added = np.diff(self.levels), np.diff(self.heights)
+        slopes = np.divide(added, run, out=np.zeros(run.shape), where=run > 0)
+        loads = hertz.load(self.levels, self.coefficients[:, None])
+        forces = np.cumsum(slopes * np.diff(loads), axis=1)
+        return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
+
+    def cut(self, indentations: Array) -> OwnCurves:
+        """The curves up to these indentations (n,); curves that end below them are unchanged."""
+        front = self._front(np.zeros(len(indentations)), indentations)
+        return self.ended(front, front[1:])
+
+    def step(self, indentations: Array, deflections: Array) -> OwnStep:
+        """A straight step that ends here, (n,) each; the curves must be cut at `indentations`."""
+        base, moved = self.levels[:, -1], deflections - self.heights[:, -1]
+        sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
+        sign = np.where(sticks, 0.0, np.sign(moved))
+        front = self._front(sign, np.where(sign == 0, base, indentations - sign * deflections))
+        (after, level, _), k = front, self.coefficients
+        loads, forces, slopes = (each[np.arange(len(k)), after - 1] for each in self.layers)
+        low, high = hertz.load(level, k), hertz.load(indentations, k)
+        grown = np.where(sticks, indentations - base, 1.0)
+        slope = np.where(sticks, moved / grown, sign)
+        stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(level / k**3))
+        return OwnStep(
+            self,
+            front,
+            (indentations, deflections),
+            fronts=np.where(sign != 0, level, indentations),
+            forces=forces + slopes * (low - loads) + slope * (high - low),
+            stiffness=np.where(np.abs(deflections) < indentations, stiffness, 0.0),
+        )
+
+    def energies(self) -> Array:
+        """(n,) elastic energy of the own deflections, divided by c_t f^2."""
+        loads, forces, slope = self.layers
+        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.levels)
+        power = np.diff(loads * self.levels)
+        return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
+
+    def _front(self, sign: Array, wanted: Array) -> Front:
+        """The point on each curve at which  level - sign * height  reaches `wanted` (n,)."""
+        keys, rows = self.levels - sign[:, None] * self.heights, np.arange(len(sign))
+        below = (keys < wanted[:, None]).sum(axis=1)
+        after = np.clip(below, 1, keys.shape[1] - 1)
+        here, there = (rows, after - 1), (rows, after)
+        width = keys[there] - keys[here]
+        part = np.where(below > after, 1.0, 0.0)
+        np.divide(wanted - keys[here], width, out=part, where=width > 0)
+        part = np.clip(part, 0.0, 1.0)
+        level, height = (
+            each[here] + part * (each[there] - each[here]) for each in (self.levels, self.heights)
+        )
+        return after, level, height
+
+    def ended(self, front: Front, end: tuple[Array, Array]) -> OwnCurves:
+        """The curves up to their fronts, then a line to `end`: levels and heights."""
+        after, *at_front = front
+        columns, after = np.arange(int(after.max()) + 2), after[:, None]
+        kept = np.minimum(columns, self.levels.shape[1] - 1)
+        unchanged, at = columns < after, columns == after
+        whole = (
+            np.where(unchanged, old[:, kept], np.where(at, here[:, None], last[:, None]))
+            for old, here, last in zip((self.levels, self.heights), at_front, end, strict=True)
+        )
+        return OwnCurves(self.coefficients, *whole)
+
+
+class OwnStep(NamedTuple):
+    """A straight step of n asperities from their curves `old`; arrays are (n,).
+
+    front     : where the old curves end;  end : indentations and deflections after the step
+    fronts    : indentation at the slip front; the whole indentation where nothing slips
+    forces    : shear forces T_i
+    stiffness : derivatives of the forces with respect to the deflections
+    """
+
+    old: OwnCurves
+    front: Front
+    end: tuple[Array, Array]
+    fronts: Array
+    forces: Array
+    stiffness: Array
+
+    @property
+    def curves(self) -> OwnCurves:
+        """The curves after the step."""
+        return self.old.ended(self.front, self.end)
+
+
+class Bundle(NamedTuple):
     """The state of n asperities after a step.
 
     load, height : [force] P and T = Q / f
-    level     : the normal solution at P
+    indentations : (n,) at P; minus the gap where open
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
-    carried   : (n,) [force] T_i, the shear forces of the asperities divided by f
+    forces    : (n,) T_i, the shear forces of the asperities divided by f
     positions : (n,) deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
     """
 
     load: Fraction
-    level: Snapshot
+    height: Fraction
+    indentations: Array
     curves: OwnCurves
     fronts: Array
-    carried: Array
+    forces: Array
     positions: Array
     displacement: float = 0.0
-    height: Fraction = Fraction(0)
     work: float = 0.0
 
     @property
     def deflections(self) -> Array:
         """(n,) the own deflection of each asperity, divided by c_t f."""
         return self.curves.heights[:, -1]
+
+
+class Step(NamedTuple):
+    """The equations of a step from the state `now` to T_i with the sum `total`.
+
+    indentations : (n,) after the step; minus the gap where open
+    own, loads : (n,) indentations, 0 where open, and loads after the step
+    curves : the curves before the step, up to these indentations
+    parts  : (n,) fraction of the step during which each asperity touches
+    """
+
+    now: Bundle
+    total: float
+    indentations: Array
+    own: Array
+    loads: Array
+    curves: OwnCurves
+    parts: Array
+
+    @classmethod
+    def to(cls, now: Bundle, indentations: Array, total: float) -> Step:
+        own, gaps = np.maximum(indentations, 0.0), np.maximum(-now.indentations, 0.0)
+        parts = np.divide(own, own + gaps, out=np.zeros_like(own), where=own > 0)
+        curves = now.curves.cut(own)
+        loads = hertz.load(own, curves.coefficients)
+        return cls(now, total, indentations, own, loads, curves, parts)
+
+    def taken(self, deflections: Array) -> Array:
+        """(n,) the eta_i after which these are the own deflections; 0 where open."""
+        wanted, nothing = deflections - self.now.deflections, np.zeros(len(deflections))
+        return np.divide(wanted, self.parts, out=nothing, where=self.parts > 0)
+
+    def at(self, eta: Array) -> OwnStep:
+        """The step of each asperity that is displaced by eta."""
+        targets = self.now.deflections + eta * self.parts
+        return self.curves.step(self.own, np.clip(targets, -self.own, self.own))
 
 
 class Stepper:
@@ -89,18 +248,19 @@ class Stepper:
         modulus = scene.material.contact_modulus
         self.levels = levels
         self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-        everyone = np.arange(len(scene))
-        self.A = couple(scene, everyone, 1.0 / (np.pi * modulus), "dense").matrix
+        self.influence = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense")
+        self.A = self.influence.matrix
 
-    def start(self, curve: MemoryCurve) -> Bundle:
-        """The state without shear at the load of this curve."""
-        level = self.levels.snapshot(curve.load)
-        own, zero = np.maximum(level.indentations, 0.0), np.zeros(len(level.indentations))
-        return Bundle(curve.load, level, OwnCurves.pressed(own, self.coefficients), own, zero, zero)
+    def start(self, load: Fraction) -> Bundle:
+        """The state without shear at a load."""
+        found = self.levels.depths(load)
+        own, zero = np.maximum(found, 0.0), np.zeros(len(found))
+        curves = OwnCurves.pressed(own, self.coefficients)
+        return Bundle(load, Fraction(0), found, curves, own, zero, zero)
 
     def along(self, start: MemoryCurve, points: Sequence[Point], steps: int) -> list[Bundle]:
         """The state at each point, with `steps` general steps per segment."""
-        now, found, segments = self.start(start), list[Bundle](), list[list[Point]]()
+        now, found, segments = self.start(start.load), list[Bundle](), list[list[Point]]()
         for (load, height), (target, shear) in pairwise([(start.load, start.height), *points]):
             grading = 1 if load else 3  # indentations grow as L^(2/3)
             parts = [Fraction(k + 1, steps) ** grading for k in range(steps)]
@@ -116,66 +276,90 @@ class Stepper:
 
     def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
         """The state after one step, which is halved if Newton's method does not converge."""
-        level = self.levels.snapshot(load)
+        if not load:
+            lost = float(now.height) / 2 * now.displacement
+            return self.start(load)._replace(work=now.work - lost)
+        step = Step.to(now, self.levels.depths(load), float(height))
         try:
-            if not load:
-                found = self.start(MemoryCurve())
-            elif abs(height) == load:
-                found = self._gross(now, level, 1 if height > 0 else -1)
-            else:
-                found = self._solve(now, level, float(height))
+            eta, x, own = self._gross(step) if abs(height) == load else self._solve(step)
         except SolverError:
             if cuts == 0:
                 raise
             middle = (now.load + load) / 2, (now.height + height) / 2
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
-        mean, run = float(now.height + height) / 2, found.displacement - now.displacement
-        return replace(found, load=load, height=height, work=now.work + mean * run)
+        work = now.work + float(now.height + height) / 2 * x
+        moved, displacement = now.positions + eta, now.displacement + x
+        known = step.indentations, own.curves, own.fronts, own.forces
+        return Bundle(load, height, *known, moved, displacement, work)
 
-    def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
-        """The state at the smallest displacement at which all asperities slide."""
-        trial, on = _Trial.of(self, now, level), level.indentations > 0
-        coupled = self.A @ (sign * level.loads - now.carried)
-        taken = (sign * level.indentations - now.deflections)[on] / trial.parts[on]
-        x = sign * float((sign * (taken + coupled[on])).max())
-        return self._reached(now, level, trial.at(x - coupled, x, sign * level.load))
+    def _gross(self, step: Step) -> tuple[Array, float, OwnStep]:
+        """eta, x and the own steps at the smallest displacement at which all asperities slide."""
+        sign, on = np.sign(step.total), step.own > 0
+        coupled = self.A @ (sign * step.loads - step.now.forces)
+        x = sign * float((sign * (step.taken(sign * step.own) + coupled)[on]).max())
+        return x - coupled, x, step.at(x - coupled)
 
-    def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
-        trial = _Trial.of(self, now, level)
-        size = float(np.abs(level.indentations).max())
-        eta, x = trial.even(total)
-        tried = [trial.at(eta, x, total)]
-        residuals = [tried[0].residual]
+    def _solve(self, step: Step) -> tuple[Array, float, OwnStep]:
+        """eta, x and the own steps by Newton's method.
+
+        It starts with deflections that are an equal fraction of the indentations.
+        """
+        size, load = float(np.abs(step.indentations).max()), float(step.loads.sum())
+        eta = step.taken(step.total / load * step.own)
+        tried = [self._iterate(step, np.append(eta, eta @ step.loads / load))]
         for _ in range(ITERATIONS):
-            if residuals[-1] <= ACCURATE * size:
+            iterate, worst = tried[-1], max(each.residual for each in tried[-RECENT:])
+            if iterate.residual <= ACCURATE * size:
                 break
-            iterate, worst = tried[-1], max(residuals[-RECENT:])
-            change, shift = iterate.newton(self.A)
+            change = self._newton(iterate)
             for k in range(HALVINGS):
-                part = 2.0**-k
-                following = trial.at(iterate.eta + part * change, iterate.x + part * shift, total)
-                if (residual := following.residual) < worst:
+                following = self._iterate(step, iterate.unknown + 2.0**-k * change)
+                if following.residual < worst:
                     break
             else:
                 break
             tried.append(following)
-            residuals.append(residual)
-        least = min(residuals)
-        if least > 1e3 * ACCURATE * size:
-            found = f"a residual of {least / size:.1e} of the indentation"
+        best = min(tried, key=lambda each: each.residual)
+        if best.residual > 1e3 * ACCURATE * size:
+            found = f"a residual of {best.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
-        return self._reached(now, level, tried[residuals.index(least)])
+        return best.unknown[:-1], float(best.unknown[-1]), best.own
 
-    def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
-        moved = now.positions + iterate.eta
-        displacement = now.displacement + iterate.x
-        own = iterate.own
-        return Bundle(now.load, level, own.curves, own.fronts, own.forces, moved, displacement)
+    def _iterate(self, step: Step, unknown: Array) -> _Iterate:
+        own, x = step.at(unknown[:-1]), float(unknown[-1])
+        defect = unknown[:-1] + self.A @ (own.forces - step.now.forces) - x
+        excess, slopes = float(own.forces.sum()) - step.total, step.parts * own.stiffness
+        total, rounding = float(slopes.sum()), len(slopes) * ROUNDOFF
+        missing = abs(excess) / total if total > 0 else np.inf
+        beyond = abs(excess) > rounding * float(np.abs(own.forces).sum())
+        residual = max(float(np.abs(defect).max()), missing if beyond else 0.0)
+        return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
+
+    def _newton(self, iterate: _Iterate) -> Array:
+        """The change of the unknown in a Newton step, from those whose forces change."""
+        some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
+        slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)
+        coupled, matrix = self.A[:, some] * slopes, np.zeros((n + 1, n + 1))
+        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = coupled[some], -1.0, slopes
+        matrix[range(n), range(n)] += 1.0
+        try:
+            found = np.linalg.solve(matrix, np.append(moved[some], wanted[-1]))
+        except np.linalg.LinAlgError as error:
+            raise SolverError("everything slides", solver="general step") from error
+        return np.append(moved + found[-1] - coupled @ found[:-1], found[-1])
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
         own = float(state.curves.energies().sum())
-        return own + 0.5 * float(state.carried @ self.A @ state.carried)
+        return own + 0.5 * float(state.forces @ self.A @ state.forces)
+
+
+class _Iterate(NamedTuple):
+    unknown: Array  # (n + 1,) eta, the displacements of the asperities in the step; then x
+    own: OwnStep  # the steps of the asperities that are displaced by eta
+    slopes: Array  # (n,) dT_i / deta_i
+    defect: Array  # (n + 1,) the left sides of (1) minus the right sides
+    residual: float  # the largest defect, or the displacement that corrects that of T if larger
 
 
 class SteppedPath(NamedTuple):
@@ -209,107 +393,35 @@ def followed(
         until losses and displacements settle, up to 64
     """
     by = (stepper or Stepper)(levels)
+    f = float(levels.coefficient.value)
+    travel = float((levels.coefficient * levels.ratio).value)
 
     def found(count: int) -> SteppedPath:
         LOGGER.info(f"solving {count} general steps per segment, as order is not proved")
-        return _found(levels, by, by.along(start, points, count))
+        bundles = by.along(start, points, count)
+        positions = travel * np.array([each.positions for each in bundles])
+        own = travel * np.array([each.deflections for each in bundles])
+        forces = f * np.array([each.forces for each in bundles])
+        spent = np.array([each.work - by.stored(each) for each in bundles])
+        displacements = travel * np.array([each.displacement for each in bundles])
+        parts = (displacements, forces, positions, positions - own)
+        return SteppedPath(
+            states=States(*(Ball.around(part, np.inf) for part in parts)),
+            losses=frozen(f * travel * spent),
+            status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
+            fronts=np.array([each.fronts for each in bundles]),
+        )
 
     if steps is not None:
         return found(steps)
-    count, before, best = 2 * FEWEST, found(FEWEST), np.full(len(points), np.inf)
-    while True:
-        here = found(count)
-        last, best = best, (4.0 * here.losses - before.losses) / 3.0
+    here, best = found(COUNTS[0]), np.full(len(points), np.inf)
+    for count in COUNTS[1:]:
+        before, here, last = here, found(count), best
+        best = (4.0 * here.losses - before.losses) / 3.0
         settled = np.abs(best - last) <= SETTLED * (best + NEGLIGIBLE * best.max(initial=0.0))
-        moved = here.states.displacements - before.states.displacements
-        near = np.abs(moved).max() <= SETTLED_MOTION * np.abs(here.states.displacements).max()
-        if (settled.all() and near) or count >= MOST:
-            known = np.maximum.accumulate(np.maximum(best, 0.0))
-            return here._replace(losses=frozen(np.where(settled, known, np.nan)))
-        count, before = 2 * count, here
-
-
-def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) -> SteppedPath:
-    unit = (float(levels.coefficient.value), float((levels.coefficient * levels.ratio).value))
-    f, travel = unit
-    positions = travel * np.array([each.positions for each in bundles])
-    own = travel * np.array([each.deflections for each in bundles])
-    forces = f * np.array([each.carried for each in bundles])
-    spent = np.array([each.work - stepper.stored(each) for each in bundles])
-    displacements = travel * np.array([each.displacement for each in bundles])
-    parts = (displacements, forces, positions, positions - own)
-    unknown = (np.full(part.shape, np.inf) for part in parts)
-    fields = (frozen(each) for pair in zip(parts, unknown, strict=True) for each in pair)
-    return SteppedPath(
-        states=States(*fields),
-        losses=frozen(f * travel * spent),
-        status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
-        fronts=np.array([each.fronts for each in bundles]),
-    )
-
-
-class _Iterate(NamedTuple):
-    eta: Array  # (n,) displacements of the asperities in the step
-    x: float  # displacement of the bodies in the step
-    own: OwnStep
-    slopes: Array  # dT_i / deta_i
-    defect: Array  # (n,) defects of the first equation of (1)
-    excess: float  # sum of T_i minus T
-
-    @property
-    def residual(self) -> float:
-        """The largest defect or the displacement that corrects `excess`, whichever is larger."""
-        stiffness, rounding = float(self.slopes.sum()), len(self.eta) * ROUNDOFF
-        missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
-        beyond = abs(self.excess) > rounding * float(np.abs(self.own.forces).sum())
-        return max(float(np.abs(self.defect).max()), missing if beyond else 0.0)
-
-    def newton(self, A: Array) -> tuple[Array, float]:
-        """The changes of eta and x in a Newton step."""
-        n = len(self.eta)
-        matrix = np.empty((n + 1, n + 1))
-        matrix[:n, :n] = A * self.slopes
-        matrix[np.diag_indices(n)] += 1.0
-        matrix[:n, n] = -1.0
-        matrix[n, :n] = self.slopes
-        matrix[n, n] = 0.0
-        try:
-            step = np.linalg.solve(matrix, -np.append(self.defect, self.excess))
-        except np.linalg.LinAlgError as error:
-            raise SolverError("everything slides", solver="general step") from error
-        return step[:n], float(step[n])
-
-
-class _Trial(NamedTuple):
-    """The equations of a step from the state `now` to the normal solution `level`."""
-
-    stepper: Stepper
-    now: Bundle
-    level: Snapshot
-    indentations: Array  # (n,) after the step, 0 where open
-    curves: OwnCurves  # before the step, up to these indentations
-    parts: Array  # (n,) fraction of the step during which each asperity touches
-
-    @classmethod
-    def of(cls, stepper: Stepper, now: Bundle, level: Snapshot) -> _Trial:
-        own = np.maximum(level.indentations, 0.0)
-        gaps = np.maximum(-now.level.indentations, 0.0)
-        parts = np.divide(own, own + gaps, out=np.zeros_like(own), where=own > 0)
-        return cls(stepper, now, level, own, now.curves.cut(own), parts)
-
-    def even(self, total: float) -> tuple[Array, float]:
-        """Start values of eta and x: each asperity is deflected by the same fraction of its limit.
-
-        This limit is the indentation, and the fraction is `total` divided by the load.
-        """
-        wanted = total / self.level.load * self.indentations - self.now.deflections
-        eta = np.divide(wanted, self.parts, out=np.zeros(len(wanted)), where=self.parts > 0)
-        return eta, float(eta @ self.level.loads / self.level.load)
-
-    def at(self, eta: Array, x: float, total: float) -> _Iterate:
-        limits = self.indentations
-        targets = np.clip(self.now.deflections + eta * self.parts, -limits, limits)
-        own = self.curves.step(limits, targets)
-        defect = eta + self.stepper.A @ (own.forces - self.now.carried) - x
-        excess = float(own.forces.sum()) - total
-        return _Iterate(eta, x, own, self.parts * own.stiffness, defect, excess)
+        far = here.states.displacements.value
+        moved = far - before.states.displacements.value
+        if settled.all() and np.abs(moved).max() <= SETTLED_MOTION * np.abs(far).max():
+            break
+    known = np.maximum.accumulate(np.maximum(best, 0.0))
+    return here._replace(losses=frozen(np.where(settled, known, np.nan)))

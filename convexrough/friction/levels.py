@@ -12,10 +12,10 @@ load P - x. The number 0 always identifies the load 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,57 +37,38 @@ from convexrough.scene.scene import Scene
 AT_THE_END = 16
 
 
-Made = TypeVar("Made")
-
-
 class FrictionLevels:
     """The levels of a contact by rational loads [force]; use `contact.cached(FrictionLevels)`.
 
     scene : the scene, with N asperities and friction
-    load  : [force] the load P of the contact
+    top   : the level at the load P of the contact
+    load  : [force] P
     candidates : (n,) indices of the asperities that may touch at loads up to P
+    coefficient, ratio : f and c_t
+    force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces, of
+        tangential displacements and of energy losses
     """
 
     def __init__(self, contact: Contact) -> None:
-        self._levels = contact.cached(levels_of)
+        self._levels, self.scene = contact.cached(levels_of), contact.scene
         self._named: dict[Fraction, Level] = {}
-        self._cache: dict[Any, Any] = {}
+        self._orders: dict[tuple[frozenset[Fraction], int], Order] = {}
         self._ordered: Fraction | None = None  # the least load down to which order is proved
-        self.scene = contact.scene
-        self.by_load = contact.prescribed_load is not None
-        self.candidates = self._levels.problem.candidates
-        self.units = self._levels.problem.units
+        self.top, problem = self._levels.top, self._levels.problem
+        self.candidates, self.units = problem.candidates, problem.units
+        self._prescribed = contact.prescribed_load
         found = float(self.top.load.value) * self.units.force
-        prescribed = contact.prescribed_load
-        self.load = Fraction(found if prescribed is None else prescribed)
-        material = self.scene.material
+        self.load = Fraction(found if self._prescribed is None else self._prescribed)
+        nu = Ball.exact(self.scene.material.poisson_ratio)
         self.coefficient = Ball.exact(checks.friction(self.scene.friction))
-        nu = Ball.exact(material.poisson_ratio)
-        self.ratio = (2.0 - nu) / ((1.0 - nu) * 2.0)  # c_t
-
-    @cached_property
-    def force_unit(self) -> Ball:
-        """[force] the unit of shear forces."""
-        return self.coefficient * self.units.force
-
-    @cached_property
-    def travel_unit(self) -> Ball:
-        """[length] the unit of tangential displacements."""
-        return self.coefficient * self.ratio * self.units.length
-
-    @cached_property
-    def loss_unit(self) -> Ball:
-        """[force length] the unit of energy losses."""
-        return self.force_unit * self.travel_unit
+        self.ratio = (2.0 - nu) / ((1.0 - nu) * 2.0)
+        self.force_unit = self.coefficient * self.units.force
+        self.travel_unit = self.coefficient * self.ratio * self.units.length
+        self.loss_unit = self.force_unit * self.travel_unit
 
     def height(self, force: float | Fraction) -> Fraction:
         """T = Q / f for a shear force Q at the load P."""
         return height_at(self.load, force, self.scene)
-
-    @property
-    def top(self) -> Level:
-        """The level at the load P of the contact."""
-        return self._levels.top
 
     @property
     def proved(self) -> bool:
@@ -130,13 +111,14 @@ class FrictionLevels:
         The level of this load has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
         exceeds the displacement of gross sliding.
         """
-        if not displacement <= self.farthest * (1 + 1e-14):
+        room = self.top.approach - self.at(Fraction(0)).approach
+        farthest = float((room * self.travel_unit).value)
+        if not displacement <= farthest * (1 + 1e-14):
             found = f"{displacement:.17g}: gross sliding"
-            expected = f"at most X = {self.farthest:.17g}, where the last asperity slides"
+            expected = f"at most X = {farthest:.17g}, where the last asperity slides"
             raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
-        left = self.top.approach - lowered - self.at(Fraction(0)).approach
-        if not left.value > AT_THE_END * ROUNDOFF * lowered.value:
+        if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:
             return Fraction(0)
         if displacement == 0.0:
             return self.load
@@ -148,46 +130,21 @@ class FrictionLevels:
         self._named[load] = level
         return load
 
-    @cached_property
-    def farthest(self) -> float:
-        """[length] the displacement X at which gross sliding begins."""
-        far = (self.top.approach - self.at(Fraction(0)).approach) * self.travel_unit
-        return float(far.value)
-
     def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
         """What is proved about order (`friction.order`) from the least of these loads up to P."""
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
-        found = self.cached(
-            (order_between, asked, most), lambda: order_between(self.at, asked, most)
-        )
+        if (asked, most) not in self._orders:
+            self._orders[asked, most] = order_between(self.at, asked, most)
+        found = self._orders[asked, most]
         if found == "proved":
             self._ordered = min(asked)
         return found
 
-    def cached(self, name: Any, make: Callable[[], Made]) -> Made:
-        """The result of make(), computed once for each name."""
-        if name not in self._cache:
-            self._cache[name] = make()
-        made: Made = self._cache[name]
-        return made
-
-    def snapshot(self, load: Fraction) -> Snapshot:
-        """The level at a load in the scene's units, for all asperities of the scene."""
-        level = self.at(load)
-        return Snapshot(
-            load=float(load),
-            loads=self.to_scene(level.loads.value * self.units.force),
-            indentations=self.indentations(level).value * self.units.length,
-            touching=self.to_scene(level.touching),
-            open=~self.to_scene(~level.open),
-        )
-
-    def loads(self, level: Level) -> Ball:
-        """(N,) the loads P_i of a level, in scaled units."""
-        found: Ball = of_rows(self.to_scene, level.loads)
-        return found
+    def depths(self, load: Fraction) -> Array:
+        """(N,) [length] the indentations at a load, or minus the gap where open."""
+        return self.indentations(self.at(load)).value * self.units.length
 
     def indentations(self, level: Level) -> Ball:
         """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
@@ -212,9 +169,7 @@ class FrictionLevels:
     @cached_property
     def _others(self) -> Indices:
         """Indices of the asperities that cannot touch at loads up to P."""
-        left = np.ones(len(self.scene), dtype=bool)
-        left[self.candidates] = False
-        return np.flatnonzero(left)
+        return np.setdiff1d(np.arange(len(self.scene)), self.candidates, assume_unique=True)
 
     @cached_property
     def _beyond(self) -> Coupling:
@@ -227,7 +182,7 @@ class FrictionLevels:
 
     def _balls(self, loads: Sequence[Fraction]) -> Ball:
         """(k,) the total loads that these numbers identify, in scaled units."""
-        if self.by_load:
+        if self._prescribed is not None:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
 
@@ -259,21 +214,6 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """
     checks.instance("contact", contact, Contact)
     return contact.cached(FrictionLevels).order([Fraction(0)], checks.whole("most", most, 0))
-
-
-class Snapshot(NamedTuple):
-    """A normal solution in the scene's units. Arrays are (N,).
-
-    load, loads    : [force] total load, and load of each asperity
-    indentations   : [length] indentations, or minus the gap where open
-    touching, open : True where the asperity is proved to touch, or to be open
-    """
-
-    load: float
-    loads: Array
-    indentations: Array
-    touching: NDArray[np.bool_]
-    open: NDArray[np.bool_]
 
 
 def exactly(values: Sequence[Fraction]) -> Ball:

@@ -11,15 +11,14 @@ load. All of this assumes order: no indentation falls as the load rises.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
 from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, energies
@@ -28,7 +27,9 @@ from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 
 #: Two loads of a path [force].
-Pair: TypeAlias = tuple[Fraction, Fraction]
+Loads: TypeAlias = tuple[Fraction, Fraction]
+
+T = TypeVar("T")
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
@@ -58,32 +59,34 @@ def trapezoid_loss(high: Level, low: Level) -> Ball:
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
     """(m,) the loss on each of m segments, given the pieces of each."""
     pieces = [piece for each in costs for piece in each]
-    found = exactly([1 - p.sign * p.slope for p in pieces]) * _integrals(levels, pieces)
+    levels.prepare(load for piece in pieces for load in piece[2:])
+    still = np.array([piece.load_constant for piece in pieces], dtype=bool)
+    front = front_integrals(levels, [piece for piece in pieces if not piece.load_constant])
+    fallen = joined([_at_constant_load(levels, [p for p in pieces if p.load_constant]), front])
+    integrals = fallen[np.argsort(np.argsort(~still, kind="stable"))]  # of -dB/dL
+    found = exactly([1 - p.sign * p.slope for p in pieces]) * integrals
     ends = np.cumsum([0, *map(len, costs)]).tolist()
     return Ball.stacked([found[start:stop].sum() for start, stop in pairwise(ends)])
 
 
-def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) the integral of -dB/dL along each piece of a segment (`curve.Piece`)."""
-    levels.prepare(load for piece in pieces for load in piece[2:])
-    still = np.array([piece.load_constant for piece in pieces], dtype=bool)
-    at, found = (
-        [(p.load_after, end) for p in pieces if p.load_constant for end in p[2:4]],
-        list[Ball](),
-    )
-    known = list(dict.fromkeys(at))
-    for start in range(0, len(known), some := max(1, NUMBERS // (1 + len(levels.candidates)))):
-        slip, slide = _of_pairs(levels, known[start : start + some])
+def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
+    """(k,) the integral of -dB/dL over pieces at constant load: a difference of B."""
+    pairs = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
+    place, found = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}, list[Ball]()
+    for some in _some([*place], 1 + len(levels.candidates)):
+        slip, slide = _of_pairs(levels, some)
         found.append((slip + slide).sum())
-    place = {pair: k for k, pair in enumerate(known)}
-    total = joined([*found, Ball.exact(np.zeros(0))])
-    before, lost = (total[[place[pair] for pair in at[end::2]]] for end in (0, 1))
-    moving = front_integrals(levels, [piece for piece in pieces if not piece.load_constant])
-    back = np.argsort(np.argsort(~still, kind="stable"))
-    return joined([lost - before, moving])[back]
+    lost = joined([*found, Ball.exact(np.zeros(0))])[[place[pair] for pair in pairs]]
+    return lost[1::2] - lost[0::2]
 
 
-def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball]:
+def _some(values: Sequence[T], size: int) -> Iterator[Sequence[T]]:
+    """The values in parts for which about NUMBERS numbers are in memory, `size` for each value."""
+    step = max(1, NUMBERS // size)
+    return (values[start : start + step] for start in range(0, len(values), step))
+
+
+def _of_pairs(levels: FrictionLevels, pairs: Sequence[Loads]) -> tuple[Ball, Ball]:
     """`asperity_losses` for k pairs of loads P and L."""
     loads = sorted({load for pair in pairs for load in pair})
     rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
@@ -98,8 +101,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
-    each = [(p.top, p.bottom, p.load_before, p.load_after) for p in pieces]
-    ends = list(zip(*each, strict=True))  # L0, L1, P0, P1
+    ends = list(zip(*(piece[2:] for piece in pieces), strict=True))  # L0, L1, P0, P1
     over, run, fall = (
         exactly([a - b for a, b in zip(ends[i], ends[j], strict=True)]).scaled(
             1.0 / levels.units.force
@@ -112,7 +114,9 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     which = [[place[load] for load in end] for end in ends]
     (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
     softest = np.array([_stiffest(known[k]) for k in which[1]])
-    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), _over(run.upper, softest)))
+    with np.errstate(divide="ignore"):
+        most = run.upper / softest * (1 + SAFETY)
+    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), most))
     m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
     first, last = D2 - D1, D3 - D1
     larger = where(fall.value >= 0.0, first, last)
@@ -129,11 +133,6 @@ def _stiffest(level: Level) -> float:
     k = level.problem.exact.coefficients.upper
     stiffness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
     return float(stiffness.max(initial=0.0)) * (1 - SAFETY)
-
-
-@np.errstate(divide="ignore")
-def _over(size: Array, divisor: Array) -> Array:
-    return np.asarray(size / divisor * (1 + SAFETY))
 
 
 def _hull(a: Ball, b: Ball) -> Ball:
@@ -155,33 +154,25 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     Their relative errors are about cells^-2; the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
-    parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends
+    parts = list[tuple[Fraction, Loads, Loads]]()  # weight, P at both ends, fronts at both ends
     for piece in pieces:
-        cut = (
-            1
-            if piece.load_constant
-            else max(1, round(cells * float((piece.top - piece.bottom) / run)))
+        part = 0.0 if piece.load_constant else float((piece.top - piece.bottom) / run)
+        cut = max(1, round(cells * part))
+        top, bottom, before, after = piece[2:]
+        fronts, loads = (
+            [start + (end - start) * Fraction(k, cut) for k in range(cut + 1)]
+            for start, end in ((top, bottom), (before, after))
         )
-        steps = [Fraction(k, cut) for k in range(cut + 1)]
-        edges = [
-            (
-                piece.load_before + part * (piece.load_after - piece.load_before),
-                piece.top + part * (piece.bottom - piece.top),
-            )
-            for part in steps
-        ]
         weight = 1 - piece.sign * piece.slope
-        parts += [(weight, (P, R), (L, M)) for (P, L), (R, M) in pairwise(edges)]
+        parts += [(weight, *both) for both in zip(pairwise(loads), pairwise(fronts), strict=True)]
     levels.prepare(load for _, *both in parts for pair in both for load in pair)
     totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
-    some = max(1, NUMBERS // (4 + 4 * len(levels.candidates)))
-    for start in range(0, len(parts), some):
-        here = parts[start : start + some]
-        pairs = [(P, min(L, P)) for _, loads, fronts in here for P in loads for L in fronts]
-        weights = exactly([weight for weight, _, _ in here])
+    for some in _some(parts, 4 + 4 * len(levels.candidates)):
+        pairs = [(P, min(L, P)) for _, loads, fronts in some for P in loads for L in fronts]
+        weights = exactly([weight for weight, _, _ in some])
+        same = np.array([P == R for _, (P, R), _ in some])[:, None]
         for k, values in enumerate(_of_pairs(levels, pairs)):
             one, other = values[1::4] - values[0::4], values[3::4] - values[2::4]
-            same = np.array([P == R for _, (P, R), _ in here])[:, None]
             lost = weights[:, None] * where(same, one, _hull(one, other))
             totals[k] = totals[k] + of_rows(np.transpose, lost).sum()
     slip, slide = (each * levels.loss_unit for each in totals)

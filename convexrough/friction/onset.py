@@ -133,14 +133,9 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
             return min(max(following, low), high)
         if not low < following < high:
             following = (low + high) / 2
-        here = _short(following)
+        here = Fraction(float(following))
+        here += Fraction(float(following - here))  # a fraction with few digits
     return here
-
-
-def _short(load: Fraction) -> Fraction:
-    """The load, rounded to a sum of two float64 numbers: a fraction with few digits."""
-    high = Fraction(float(load))
-    return high + Fraction(float(load - high))
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:

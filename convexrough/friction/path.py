@@ -1,6 +1,10 @@
-"""`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
+"""Friction states along a path of load P and shear force Q: `load_path`; `history`: at constant P.
 
-The friction state is a memory curve, a polygon over load levels: docs/theory/paths.md derives it.
+With the coefficient of friction f, the points of a path are (P, T = Q / f). The friction state is a
+memory curve, a polygon over load levels: docs/theory/paths.md derives it. A level is also the
+normal solution at one load. States are sums over the levels of the memory curve, and losses are
+integrals over the pieces of each segment (`curve.Piece`). If an indentation falls as the load
+rises, general steps compute the results, without proofs.
 """
 
 from __future__ import annotations
@@ -8,21 +12,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import Stepper
-from convexrough.friction.levels import FrictionLevels, height_at
+from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.general_step import SteppedPath, Stepper, followed
+from convexrough.friction.levels import FrictionLevels, height_at, rounded
+from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import Point
-from convexrough.friction.walk import Walk
+from convexrough.friction.state import Point, States, states_of, statuses_of
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
@@ -33,6 +40,84 @@ if TYPE_CHECKING:
 
 #: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A path from a memory curve through m points, with straight segments between them.
+
+    levels  : the normal solutions of the contact
+    start   : the memory curve before the first segment
+    points  : the m points (P, T)
+    steps   : number of general steps per segment; None takes general steps only if order fails
+    stepper : solver of the general steps
+    """
+
+    levels: FrictionLevels
+    start: MemoryCurve
+    points: Sequence[Point]
+    steps: int | None = None
+    stepper: type[Stepper] = Stepper
+
+    @cached_property
+    def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:
+        curve, found = self.start, list[tuple[MemoryCurve, list[Piece]]]()
+        for load, height in self.points:
+            curve, pieces = curve.go(load, height)
+            found.append((curve, pieces))
+        return found
+
+    @property
+    def curves(self) -> list[MemoryCurve]:
+        """The memory curve after each point."""
+        return [curve for curve, _ in self._segments]
+
+    @property
+    def pieces(self) -> list[list[Piece]]:
+        """The pieces of the loss on each segment."""
+        return [pieces for _, pieces in self._segments]
+
+    @cached_property
+    def needed(self) -> set[Fraction]:
+        """The loads of all levels needed for states, statuses and losses."""
+        bent = {load for curve in self.curves for load, bend in curve.bends if bend}
+        fronts = {curve.front for curve in self.curves if curve.front is not None}
+        return bent | fronts | {x for each in self.pieces for piece in each for x in piece[2:]}
+
+    @cached_property
+    def order(self) -> Order:
+        """What is proved about order, from the lowest of the needed loads to the contact's load."""
+        return self.levels.order(self.needed)
+
+    @cached_property
+    def general(self) -> SteppedPath | None:
+        """Results of general steps, if these are requested or order fails; else None."""
+        if self.steps is None and (self.order != "fails" or not self.levels.proved):
+            return None
+        return followed(self.levels, self.start, self.points, self.steps, self.stepper)
+
+    def states(self) -> States:
+        if self.general is not None:
+            return self.general.states
+        found = states_of(self.levels, self.curves)
+        return found.unproved() if self.order == "fails" else found
+
+    def status(self) -> NDArray[np.str_]:
+        """(m, N) the statuses at each point."""
+        if self.general is not None:
+            return self.general.status
+        each = [statuses_of(self.levels, curve, self.order) for curve in self.curves]
+        return frozen(np.array(each))
+
+    def losses(self) -> tuple[Array, Array]:
+        """(m,) [force length] energy lost since the start, and proved bounds on the errors."""
+        unknown = frozen(np.full(len(self.points), np.inf))
+        if self.general is not None:
+            return self.general.losses, unknown
+        each = losses(self.levels, self.pieces)
+        since_start = Ball.stacked([*accumulate(each[k] for k in range(len(each)))])
+        spent, errors = rounded(since_start * self.levels.loss_unit)
+        return spent, errors if self.order == "proved" else unknown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,8 +319,7 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
         k = int(np.argmax(bare))
         expected = "0 at a load of 0: shear must end before contact is lost"
         raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
-    for k in np.flatnonzero(np.abs(Q) > f * P).tolist():
-        checks.bearable(f"forces[{k}]", float(Q[k]), float(f * P[k]))
+    checks.bearable("forces", Q, f * P)
     pairs = zip(map(Fraction, P.tolist()), Q.tolist(), strict=True)
     return [(load, height_at(load, force, scene)) for load, force in pairs]
 
@@ -243,25 +327,24 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
 def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
-    found, (losses, loss_errors) = walk.states(), walk.losses()
-    here = [levels.at(load) for load in points]
+    (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
+    (displacements, displacement_errors), (asperity_forces, force_errors), *others = found
+    rows = levels.rows(points)
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
-    loads = np.array([level.loads.value for level in here]) * levels.units.force
-    approaches = np.array([float(level.approach.value) for level in here]) * levels.units.length
     return LoadPath(
         contact=contact,
         loads=frozen(np.array(points, dtype=np.float64)),
         forces=frozen(np.array(forces)),
-        displacements=found.displacements,
-        displacement_errors=found.displacement_errors,
-        approaches=frozen(approaches),
+        displacements=displacements,
+        displacement_errors=displacement_errors,
+        approaches=frozen(rows.approach.value * levels.units.length),
         losses=losses,
         loss_errors=loss_errors,
-        asperity_forces=found.forces,
-        asperity_force_errors=found.force_errors,
-        asperity_loads=frozen(levels.to_scene(loads)),
-        asperity_displacements=found.asperity_displacements,
-        drifts=found.drifts,
+        asperity_forces=asperity_forces,
+        asperity_force_errors=force_errors,
+        asperity_loads=frozen(levels.to_scene(rows.loads.value * levels.units.force)),
+        asperity_displacements=others[0][0],
+        drifts=others[1][0],
         fronts=frozen(np.array(fronts)),
         status=walk.status(),
         curves=tuple(walk.curves),

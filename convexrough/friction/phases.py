@@ -1,9 +1,12 @@
-"""Energy losses of cycles with oscillating load and shear force, by phase and amplitude."""
+"""Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude.
+
+A smooth path is replaced by chords, with corners where the slip front starts, stops or turns.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +17,6 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import Cycle, steady
 from convexrough.friction.order import Order
-from convexrough.friction.shapes import elliptic_path
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -25,6 +27,56 @@ from convexrough.sphere.smooth import smooth_reference
 
 #: The values of `Cycle.order`, the weakest first.
 UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
+
+
+def elliptic_path(
+    *,
+    load: float,
+    load_amplitude: float,
+    force: float = 0.0,
+    force_amplitude: float,
+    phase: float = 0.0,
+    friction: float,
+    chords: int = 96,
+) -> tuple[Array, Array]:
+    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse.
+
+        P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
+
+    phase  : [rad] from -pi to pi. At 0 the axes of the ellipse are parallel to those of P and Q; at
+        pi/2 the ellipse is a straight line, as P and Q are in phase
+    friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
+        points of the path, so that `Cycle.level` is exact
+    chords : approximate number of chords that replace the ellipse. In tests the loss was smaller
+        than that of the ellipse by a fraction of at most 12 / chords^2
+
+    Raises InputError for other phases, or if `friction` is not positive.
+    >>> loads, forces = cr.elliptic_path(
+    ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8
+    ... )
+    >>> len(loads), float(loads.max())
+    (12, 1.5)
+    """
+    checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200)
+    p, q = (
+        checks.finite("load_amplitude", load_amplitude),
+        checks.finite("force_amplitude", force_amplitude),
+    )
+    t = q / checks.positive("friction", friction)
+    phase = checks.phase("phase", phase)
+    across, along = t * np.cos(phase), t * np.sin(phase)
+    corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
+    halves = np.sort(np.mod(corners, np.pi))
+    ends = np.append(np.concatenate((halves, halves + np.pi)), halves[0] + 2 * np.pi)
+    arcs = [
+        np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
+        for a, b in pairwise(ends)
+        if b - a > 1e-9
+    ]
+    angles = np.concatenate(arcs)
+    loads = checks.finite("load", load) + p * np.cos(angles)
+    forces = checks.finite("force", force) + q * np.sin(angles + phase)
+    return frozen(loads), frozen(forces)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,9 +107,7 @@ class PhaseLosses(Table, Plottable):
     """
 
     _along: ClassVar[Along] = {
-        ("ellipse",): (
-            *("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding"),
-        ),
+        ("ellipse",): ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
     }
 
     scene: Scene
@@ -107,32 +157,27 @@ def phase_losses(
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
-    for what, values in (("phases", turns), ("factors", sizes)):
-        checks.some(what, values)
+    checks.some("phases", turns)
+    checks.some("factors", sizes)
     for i, turn in enumerate(turns):
         checks.phase(f"phases[{i}]", turn)
     alone = _smooth_alone(scene, load)
-
-    def settled(on: Scene, size: float, phase: float) -> Cycle:
-        loads, forces = elliptic_path(
-            load=load,
-            load_amplitude=size * load_amplitude,
-            force=force,
-            force_amplitude=size * force_amplitude,
-            phase=phase,
-            friction=f,
-            chords=chords,
-        )
-        kind = influence if on is scene else None
-        return steady(on, loads=loads, forces=forces, influence=kind)
-
     rough, smooth = list[Cycle](), list[float]()
     pairs = list(product(sizes.tolist(), turns.tolist()))
     for k, (size, phase) in enumerate(pairs):
         LOGGER.info(f"ellipse {k + 1} of {len(pairs)}")
         with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
-            rough.append(settled(scene, size, phase))
-        smooth.append(settled(alone, size, phase).loss if alone else np.nan)
+            P, Q = elliptic_path(
+                load=load,
+                load_amplitude=size * load_amplitude,
+                force=force,
+                force_amplitude=size * force_amplitude,
+                phase=phase,
+                friction=f,
+                chords=chords,
+            )
+            rough.append(steady(scene, loads=P, forces=Q, influence=influence))
+        smooth.append(steady(alone, loads=P, forces=Q).loss if alone else np.nan)
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
     return PhaseLosses(
         scene=scene,

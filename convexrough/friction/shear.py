@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
+from convexrough.friction.path import Walk
 from convexrough.friction.state import stick_radii
-from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
-from convexrough.roundoff import SAFETY
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
-
-#: An asperity keeps the status "sliding" of the solution if the error bound of its given force is
-#: smaller than this fraction of the friction limit f P_i.
-NEAR_SLIDING = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,10 +151,7 @@ class ShearState(Table, Plottable):
 
 
 def shear(
-    contact: Contact,
-    *,
-    force: float | None = None,
-    displacement: float | None = None,
+    contact: Contact, *, force: float | None = None, displacement: float | None = None
 ) -> ShearState:
     """The friction state of a pressed contact after monotonic shear at constant load P.
 
@@ -179,72 +172,55 @@ def shear(
     friction = checks.friction(contact.scene.friction)
     checks.exactly_one("force", force, "displacement", displacement)
     LOGGER.info("pressing at the load P - Q / f")
-    levels = contact.cached(FrictionLevels)
+    levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
+    start = MemoryCurve.pressed(levels.load)
     if displacement is None:
-        force = one_force("force", force, friction * contact.load)
+        assert force is not None  # exactly_one
+        if shape := np.shape(force):
+            raise InputError("force", found=f"shape {shape}", expected="one number")
+        force = checks.finite("force", force)
+        checks.bearable("force", force, friction * contact.load)
         height = levels.height(force)
     else:
         displacement = checks.finite("displacement", displacement)
         height = levels.load - levels.displaced(abs(displacement))
         height = height if displacement >= 0 else -height
-    return _state(contact, levels, height, force, displacement)
-
-
-def one_force(what: str, value: Any, limit: float) -> float:
-    """The shear force as a number, after a check that it does not exceed the friction limit."""
-    if shape := np.shape(value):
-        raise InputError(what, found=f"shape {shape}", expected="one number")
-    return float(checks.bearable(what, np.asarray(checks.finite(what, value)), limit))
-
-
-def _state(
-    contact: Contact,
-    levels: FrictionLevels,
-    height: Fraction,
-    force: float | None,
-    displacement: float | None,
-) -> ShearState:
-    """The state at T = Q / f: by normal solutions, or by general steps if order fails."""
-    start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
     walk = Walk(levels, start, [(levels.load, height)])
     if walk.general is not None and displacement is not None:
         walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
     found, order = walk.states(), walk.order
+    moved, carried, asperities, drifts = (each[0] for each in found)
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
-        total = float(walk.points[0][1]) * checks.friction(contact.scene.friction)
-        force_uncertainty = 0.0
+        total = Ball.exact(walk.points[0][1]) * levels.coefficient
     else:
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
-        size, off = rounded((levels.top.load - level.load) * levels.force_unit)
-        total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
-    error = float(found.displacement_errors[0]) if displacement is None else 0.0
+        total = (levels.top.load - level.load) * levels.force_unit
+        total = total if (displacement or 0.0) >= 0 else -total
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
-    most = np.abs(found.drifts[0]) + found.drift_errors[0]  # its slip is 0 if it does not touch
-    slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
-    if order == "fails":
-        error = force_uncertainty = np.inf
-        slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
+    most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
+    slip_errors = np.where(loaded, drifts.error, 0.0) + np.where(unsure, most, 0.0)
+    unknown = np.inf if order == "fails" else 0.0
     status = walk.status()[0]
     certificate = ShearCertificate(
         scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
         order=order,
         status=frozen(np.where(status == "stuck", "partial", status)),
-        force_errors=found.force_errors[0],
-        slip_errors=frozen(slip_errors),
-        stick_radius_errors=frozen(radius_errors),
-        force_error=force_uncertainty if force is None else 0.0,
-        displacement_error=error,
+        force_errors=frozen(carried.error),
+        slip_errors=frozen(slip_errors + unknown),
+        stick_radius_errors=frozen(radius_errors + unknown),
+        force_error=float(total.error) + unknown if force is None else 0.0,
+        displacement_error=float(moved.error) + unknown if displacement is None else unknown,
     )
     return ShearState(
         contact=contact,
-        force=total if force is None else force,
-        displacement=float(found.displacements[0]) if displacement is None else displacement,
-        forces=found.forces[0],
-        displacements=frozen(np.where(loaded, found.asperity_displacements[0], 0.0)),
-        slips=frozen(np.where(loaded, found.drifts[0], 0.0)),
+        force=float(total.value) if force is None else force,
+        displacement=float(moved.value) if displacement is None else displacement,
+        forces=frozen(carried.value),
+        displacements=frozen(np.where(loaded, asperities.value, 0.0)),
+        slips=frozen(np.where(loaded, drifts.value, 0.0)),
         stick_radii=frozen(radii),
         certificate=certificate,
     )
@@ -254,53 +230,9 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
     """The value of T = Q / f for which general steps give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
-    start = MemoryCurve.pressed(levels.load)
-
     def beyond(part: float) -> float:
-        height = Fraction(part) * levels.load
-        moved = followed(levels, start, [(levels.load, height)]).states.displacements[0]
-        return float(moved - displacement)
+        points = [(levels.load, Fraction(part) * levels.load)]
+        found = followed(levels, MemoryCurve.pressed(levels.load), points)
+        return float(found.states.displacements.value[0] - displacement)
 
-    root = brentq(beyond, -1.0, 1.0, xtol=1e-12)
-    return Fraction(root) * levels.load
-
-
-def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
-    """The certificate of given shear forces after monotonic shear.
-
-    forces : (n,) [force] shear forces in the order of the scene's asperities
-    force  : [force] the prescribed sum of the shear forces
-
-    `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity gets the status that it has in the solution if it is open there, or if its entry of
-    `force_errors` is small enough. For "sliding" it must be below 1 % of the friction limit f P_i;
-    for "partial" it must be below the margin f P_i - |Q_i|, with the force Q_i of the solution.
-    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
-
-    Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
-    the forces are not finite numbers.
-
-    >>> force = 0.25 * contact.load
-    >>> state = cr.shear(contact, force=force)
-    >>> cr.certify_shear(contact, state.forces, force=force).holds
-    True
-    """
-    checks.instance("contact", contact, Contact)
-    checks.in_order("forces", forces)
-    given = checks.array("forces", forces, length=len(contact.scene))
-    return against(shear(contact, force=checks.finite("force", force)), given)
-
-
-def against(state: ShearState, given: Array) -> ShearCertificate:
-    """The certificate of given forces (n,) [force], from a comparison with a proved state."""
-    contact = state.contact
-    apart = np.abs(given - state.forces)
-    errors = (apart + state.certificate.force_errors) * (1 + SAFETY)
-    limits = checks.friction(contact.scene.friction) * contact.loads
-    left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
-    implied = (errors < left) | (state.status == "open")
-    return replace(
-        state.certificate,
-        status=frozen(np.where(implied, state.status, "undecided")),
-        force_errors=frozen(errors),
-    )
+    return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load

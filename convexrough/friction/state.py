@@ -15,11 +15,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
 from convexrough.normal.level import Level
 
@@ -28,7 +28,7 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):
-    """m states of N asperities in the scene's units, and proved bounds on their errors.
+    """m states of N asperities in the scene's units; radii are infinite without a proof.
 
     displacements : (m,) X, of the bodies
     forces        : (m, N) Q_i, shear forces of the asperities
@@ -36,27 +36,14 @@ class States(NamedTuple):
     drifts        : (m, N) displacement relative to the opposite surface, also while open
     """
 
-    displacements: Array
-    displacement_errors: Array
-    forces: Array
-    force_errors: Array
-    asperity_displacements: Array
-    asperity_displacement_errors: Array
-    drifts: Array
-    drift_errors: Array
+    displacements: Ball
+    forces: Ball
+    asperity_displacements: Ball
+    drifts: Ball
 
     def unproved(self) -> States:
         """The same states with infinite error bounds."""
-        names = [name for name in self._fields if name.endswith("errors")]
-        return self._replace(
-            **{name: frozen(np.full(getattr(self, name).shape, np.inf)) for name in names}
-        )
-
-
-def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
-    """The loads of the levels that the states and statuses of these curves need."""
-    bent = {load for curve in curves for load, bend in curve.bends if bend}
-    return bent | {curve.front for curve in curves if curve.front is not None}
+        return States(*(Ball.around(each.mid, np.inf) for each in self))
 
 
 class LevelSums(NamedTuple):
@@ -107,16 +94,15 @@ def states_of(
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
-    loads = Ball.stacked([levels.loads(level)[some] for level in solved])
+    loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[some] for level in solved])
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
     travel = levels.travel_unit
-    fields = (
+    return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,
         sums.total(moved) * travel,
         -sums.total((-moved).positive_part()) * travel,
     )
-    return States(*(part for ball in fields for part in rounded(ball)))
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:

@@ -1,9 +1,9 @@
-"""`verify_shear`: comparison of claimed shear forces with what is proved."""
+"""`verify_shear`, `certify_shear`: comparison of claimed shear forces with what is proved."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -14,10 +14,15 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
+from convexrough.friction.shear import ShearCertificate, ShearState, shear
 from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.record import Record
+from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
+
+#: An asperity keeps the status "sliding" of the solution if the error bound of its given force is
+#: smaller than this fraction of the friction limit f P_i.
+NEAR_SLIDING = 1e-2
 
 #: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
 CLAIMS_SLIDING = 1e-4
@@ -131,8 +136,47 @@ def verify_shear(
         found = f"shape {claimed.shape} of {claimed.dtype}"
         expected = f"{len(given)} values True or False, one per asperity"
         raise InputError("sliding", found=found, expected=expected)
-    claimed = frozen(np.array(np.broadcast_to(claimed, given.shape)))
-    return ShearVerdict(contact, given, float(force), claimed, within, against(state, given), state)
+    proved = state.certificate
+    errors = (np.abs(given - state.forces) + proved.force_errors) * (1 + SAFETY)
+    limits = checks.friction(contact.scene.friction) * contact.loads
+    left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
+    implied = (errors < left) | (state.status == "open")
+    return ShearVerdict(
+        contact=contact,
+        forces=given,
+        total_prescribed=float(force),
+        claimed=frozen(np.array(np.broadcast_to(claimed, given.shape))),
+        within=within,
+        certificate=replace(
+            proved,
+            status=frozen(np.where(implied, state.status, "undecided")),
+            force_errors=frozen(errors),
+        ),
+        solution=state,
+    )
+
+
+def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
+    """The certificate of given shear forces after monotonic shear.
+
+    forces : (n,) [force] shear forces in the order of the scene's asperities
+    force  : [force] the prescribed sum of the shear forces
+
+    `force_errors` are bounds on the differences between the given forces and the solution. An
+    asperity gets the status that it has in the solution if it is open there, or if its entry of
+    `force_errors` is small enough. For "sliding" it must be below 1 % of the friction limit f P_i;
+    for "partial" it must be below the margin f P_i - |Q_i|, with the force Q_i of the solution.
+    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
+
+    Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
+    the forces are not finite numbers.
+
+    >>> force = 0.25 * contact.load
+    >>> state = cr.shear(contact, force=force)
+    >>> cr.certify_shear(contact, state.forces, force=force).holds
+    True
+    """
+    return verify_shear(contact, forces, force=force).certificate
 
 
 def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:

@@ -5,23 +5,29 @@ lambda for which constant residual forces r_i exist, with the sum t0, such that 
 lambda times the elastic forces at t_v is at most the load P_i in size, at every point. This module
 computes a lower bound on it from given r_i, and an upper bound, (3) of docs/theory/shakedown.md,
 from given slips. A solver finds both, and need not be accurate. The bounds include the errors of
-shares and loads. All shear forces are divided by the coefficient of friction.
+loads and of elastic shares Y: the shear forces of asperities that all stick, per unit of the total
+force. They make all displacements (H + B) Y equal, and sum Y = 1, with the compliances
+H = diag(1/(2 E* a)) of the asperities and the full tangential kernel B; E* is the contact modulus,
+a the contact radius. All shear forces are divided by the coefficient of friction.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, among_zeros
 from convexrough.contact import Contact
+from convexrough.convex.theorem import distance
 from convexrough.errors import SolverError
-from convexrough.melan.elastic_shares import Shares, vector_shares
+from convexrough.friction.order import Order
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import VectorProblem
 
 #: The solver's tolerance, and the fraction by which residual forces are moved into the cones.
 TOLERANCE, MARGIN = 1e-10, 1e-9
@@ -30,48 +36,84 @@ TOLERANCE, MARGIN = 1e-10, 1e-9
 STEPS = 2.0**30
 
 
-class Melan(NamedTuple):
-    """The largest lambda of Melan's program, with proved bounds.
-
-    factor : lambda for the computed residual forces, shares and loads
-    lower, upper : proved bounds on the largest lambda; 0 and infinite without a proof
-    gross  : lambda at which the path reaches the friction limit of the whole contact
-    rest   : (N, 2) [force] r_i minus the elastic shares of the mean force t0
-    slips  : (m, N, 2) slips at each of the m points of the path, in whole multiples of a unit
-    """
+class Limit(NamedTuple):
+    """The results of a shakedown theory: fields of `Shakedown`, with forces divided by friction."""
 
     factor: float
     lower: float
     upper: float
+    factors: Array
     gross: float
-    rest: Array
-    slips: Array
+    witness: Array
+    mechanism: Array
+    order: Order | None = None
 
 
-def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
-    """The solution of Melan's program with the full tangential kernel.
+def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
+    """The limit of Melan's program with the full tangential kernel.
 
     mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
     """
-    problem = Loaded.of(contact)
-    unit, n = problem.units.force, len(problem)
-    shares, m = vector_shares(contact), len(vertices)
+    known = VectorProblem.of(contact)
+    unit, n, m = known.units.force, len(known), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)
-    elastic = np.einsum("ijk,vk->vij", shares.values, vertices / unit)  # (m, n, 2)
-    errors = np.einsum("ik,vk->vi", shares.errors, np.abs(vertices) / unit)
-    steady = shares.values @ (mean / unit)
-    raw = run_clarabel(_program(shares.loads, steady, elastic), "shakedown", TOLERANCE)
-    rest = _inwards(shares.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
+    shares, share_errors = elastic_shares(known)
+    elastic = np.einsum("ijk,vk->vij", shares, vertices / unit)  # (m, n, 2)
+    errors = np.einsum("ik,vk->vi", share_errors, np.abs(vertices) / unit)
+    steady = shares @ (mean / unit)
+    raw = run_clarabel(_program(known.loads, steady, elastic), "shakedown", TOLERANCE)
+    rest = _inwards(known.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
     cones = raw.multipliers[2:].reshape(m, n, 3)
-    slips = _closed(-cones[..., 1:] / shares.loads[:, None])
-    return Melan(
-        factor=_largest(rest, elastic, shares.loads)[1],
-        lower=_lower(shares, rest, mean / unit, elastic, errors),
-        upper=_upper(shares, slips, mean / unit, elastic, errors),
+    slips = _closed(-cones[..., 1:] / known.loads[:, None])
+    factor = _largest(rest, elastic, known.loads)[1]
+    return Limit(
+        factor=factor,
+        lower=_lower(known, rest, mean / unit, elastic, errors),
+        upper=_upper(known, slips, mean / unit, elastic, errors),
+        factors=np.where(contact.loads > 0, factor, np.nan),
         gross=_largest(mean[None], vertices[:, None], np.array([contact.load]))[1],
-        rest=problem.to_scene((rest - steady) * unit),
-        slips=among_zeros(slips, problem.touching, len(contact.scene), axis=1),
+        witness=known.to_scene((rest - steady) * unit),
+        mechanism=among_zeros(
+            slips / np.hypot(*np.moveaxis(slips, -1, 0)).max(),
+            known.touching,
+            len(contact.scene),
+            axis=1,
+        ),
     )
+
+
+def elastic_shares(problem: VectorProblem) -> tuple[Array, Array]:
+    """(n, 2, 2) the shares Y, and (n, 2) bounds on |error of Y| for total forces along x and y.
+
+    The bounds are infinite without a proof. docs/theory/shakedown.md, "Elastic shares".
+    """
+    n = len(problem)
+    checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
+    compliance = problem.kernel + np.diag(np.repeat(problem.compliance, 2))
+    together = np.tile(np.eye(2), (n, 1))
+    moved = np.linalg.solve(compliance, together)
+    shares = (moved @ np.linalg.inv(together.T @ moved)).reshape(n, 2, 2)
+    known = problem.scope != "none" and problem.stray == 0 and problem.sure.all()
+    if not known or problem.margin == 0.0:
+        return shares, np.full((n, 2), np.inf)
+    errors = [_errors(problem, shares[..., k], np.eye(2)[k]) for k in (0, 1)]
+    return shares, np.stack(errors, axis=1)
+
+
+def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
+    """(n,) bounds on the errors of shares (n, 2) of one total force (2,), from their residual."""
+    exact = Ball.exact(np.ascontiguousarray(shares.T))
+    compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
+    moved = exact * compliance + problem.couple(shares).T
+    off = np.hypot(*(moved - moved.value.mean(axis=1)[:, None]).size)
+    off += problem.product_error * (problem.influence.matrix @ np.hypot(*shares.T))
+    missing = float(np.hypot(*(exact.sum() - total).size)) * (1 + SAFETY)
+    off += missing * problem.reach[0]
+    off[0] += missing * compliance.upper[0]
+    within = distance(off * (1 + SAFETY), 1.0 / problem.stiffness, problem.margin)
+    errors: Array = within * np.sqrt(problem.stiffness) * (1 + SAFETY)
+    errors[0] += missing
+    return errors
 
 
 def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
@@ -79,27 +121,21 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
     limits : (n,) P;  steady : (n, 2) elastic forces at t0;  elastic : (m, n, 2) those at t_v
     """
-    from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
+    from scipy import sparse  # 0.1 s to import: only when solving
 
     m, n, _ = elastic.shape
-    inverse = np.diag(1.0 / limits)
-    into = csc_matrix(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
-    scaled = np.zeros((m, n, 3))
-    scaled[..., 1:] = -elastic / limits[:, None]
-    rests = kron(csc_matrix(np.ones((m, 1))), kron(csc_matrix(-inverse), into))
-    balance = kron(csc_matrix(np.ones((1, n))), identity(2))
-    equal = hstack([csc_matrix((2, 1)), balance])
-    within = hstack([csc_matrix(scaled.reshape(-1, 1)), rests])
-    constant = np.zeros((m, n, 3))
-    constant[..., 0] = 1.0
-    constant[..., 1:] = steady / limits[:, None]
     unknowns = 1 + 2 * n
-    linear = np.zeros(unknowns)
-    linear[0] = -1.0
+    scaled, constant = np.zeros((m, n, 3)), np.zeros((m, n, 3))
+    scaled[..., 1:] = -elastic / limits[:, None]
+    constant[..., 0], constant[..., 1:] = 1.0, steady / limits[:, None]
+    of_asperities = sparse.kron(sparse.diags_array(-1.0 / limits), np.eye(3, 2, -1))
+    balance = sparse.kron(np.ones((1, n)), np.eye(2))
+    rests = sparse.kron(np.ones((m, 1)), of_asperities)
+    rows: list[list[Any]] = [[None, balance], [scaled.reshape(-1, 1), rests]]
     return ConeProgram(
-        quadratic=csc_matrix((unknowns, unknowns)),
-        linear=linear,
-        constraints=csc_matrix(vstack([equal, within])),
+        quadratic=sparse.csc_matrix((unknowns, unknowns)),
+        linear=np.append(-1.0, np.zeros(2 * n)),
+        constraints=sparse.csc_matrix(sparse.block_array(rows)),
         constant=np.append(np.zeros(2), constant.reshape(-1)),
         equalities=2,
     )
@@ -115,14 +151,14 @@ def _inwards(limits: Array, state: Array, mean: Array) -> Array:
     return np.asarray(state + MARGIN * (parts * mean - state))
 
 
-def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
+def _lower(known: Loaded, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
     """A lower bound on the largest lambda that the residual forces `rest` allow, or 0.
 
     elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
     """
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
-    limits = (shares.loads - shares.load_errors - missing) * (1 - SAFETY)
+    limits = (known.loads - known.errors - missing) * (1 - SAFETY)
     if not np.isfinite(errors).all() or (limits <= 0).any():
         return 0.0
     least, most = _largest(rest, elastic, limits)
@@ -161,7 +197,7 @@ def _closed(slips: Array) -> Array:
     return np.asarray(slips)
 
 
-def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
+def _upper(known: Loaded, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
     """The upper bound (3) on lambda from these slips; infinite if their work may be 0 or less.
 
     elastic, errors : as for `_lower`
@@ -174,6 +210,6 @@ def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Ar
     work = float(done.sum()) - uncertainty
     together = slips.sum(axis=0)[0]
     given = together * mean
-    cost = float((sizes * (shares.loads + shares.load_errors)).sum()) * (1 + SAFETY)
+    cost = float((sizes * (known.loads + known.errors)).sum()) * (1 + SAFETY)
     cost += -float(given.sum()) + 4 * ROUNDOFF * float(np.abs(given).sum())
     return cost / work * (1 + SAFETY) if work > 0 else np.inf

@@ -7,11 +7,9 @@ derives the limit with partial slip, and Melan's limit for asperities that stick
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
-from typing import ClassVar, Literal, TypeAlias, cast
+from typing import ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +23,7 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
 from convexrough.friction.order import Order
 from convexrough.influence import Kind
-from convexrough.melan import program
-from convexrough.melan.elastic_shares import scalar_shares
+from convexrough.melan.program import Limit, solve
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
@@ -34,9 +31,6 @@ from convexrough.scene.scene import Scene
 from convexrough.vector_shear.loaded import Loaded
 
 Theory = Literal["exact", "elastic", "vector"]
-
-#: The constructor of `Shakedown` with the prescribed quantities filled in; called with the results.
-Limit: TypeAlias = "Callable[..., Shakedown]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,25 +172,26 @@ def shakedown(
         expected = 'none, as the kind is not "exact": the normal load must be constant'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
     contact = press(scene, load=P0, influence=influence)
-    limit = partial(
-        Shakedown,
+    if kind == "exact":
+        limit = _exact(contact, float(t0), p, t)
+    else:
+        limit = _elastic(contact, float(t0), t) if kind == "elastic" else solve(contact, t0, t)
+    arrays = {"factors": limit.factors, "witness": f * limit.witness, "mechanism": limit.mechanism}
+    return Shakedown(
         scene=scene,
         kind=kind,
+        **limit._asdict() | {name: frozen(values) for name, values in arrays.items()},
         load=P0,
         force=frozen(f * t0) if kind == "vector" else float(f * t0),
         load_amplitudes=frozen(p),
         force_amplitudes=frozen(q),
     )
-    if kind == "exact":
-        return _exact(limit, contact, float(t0), p, t)
-    if kind == "elastic":
-        return _elastic(limit, contact, float(t0), t)
-    return _vector(limit, contact, t0, t)
 
 
-def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Shakedown:
-    levels, scene = contact.cached(FrictionLevels), contact.scene
-    f, P0 = checks.friction(scene.friction), float(levels.load)
+def _exact(contact: Contact, t0: float, p: Array, t: Array) -> Limit:
+    """The limit with partial slip; t0, t : the mean shear force and amplitudes, divided by f."""
+    levels = contact.cached(FrictionLevels)
+    P0 = float(levels.load)
     plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
     fall = _fall(p, t)
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
@@ -213,23 +208,24 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
     if len(touching) <= MOST_ONSETS:
         found |= enclosed(levels, touching.tolist())
-    factors = np.full(len(scene), np.nan)
+    factors = np.full(len(contact.scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
-    sure, beyond = levels.snapshot(worst.upper), levels.snapshot(worst.lower)
+    sure = levels.at(worst.upper)
     order = levels.order({worst.lower, worst.upper})
-    proved = order == "proved" and bool(sure.touching[touching].all())
+    proved = order == "proved" and bool(levels.to_scene(sure.touching)[touching].all())
     lower, upper = factor(worst.upper), factor(worst.lower)
     height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
-    gaps = np.maximum(-beyond.indentations, 0.0) * (contact.loads > 0)
-    return limit(
+    gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
+    rest = levels.to_scene(sure.loads.value * levels.units.force)
+    return Limit(
         factor=float(factors[last]),
         lower=lower * (1 - SAFETY) if proved else 0.0,
         upper=upper * (1 + SAFETY) if proved else np.inf,
-        factors=frozen(factors),
+        factors=factors,
         gross=gross,
-        witness=frozen(f * height / (sure.load or 1.0) * sure.loads),
-        mechanism=frozen(gaps / (gaps.max() or 1.0)),
+        witness=height / (float(worst.upper) or 1.0) * rest,
+        mechanism=gaps / (gaps.max() or 1.0),
         order=order,
     )
 
@@ -242,65 +238,39 @@ def _fall(p: Array, t: Array) -> float:
     return float((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
-def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
+def _elastic(contact: Contact, t0: float, t: Array) -> Limit:
     """Melan's limit with the scalar kernel: the least factor of all asperities and gross sliding.
 
-    t0, t : the mean shear force and its (m,) amplitudes, divided by f
+    t0, t : the mean shear force and its (m,) amplitudes, divided by f. The elastic shares q are the
+    derivatives of the normal loads by the total load.
     """
-    f = checks.friction(contact.scene.friction)
-    problem, shares = Loaded.of(contact), scalar_shares(contact)
-    high, low = float(t.max()), float(t.min())
-    q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
-
-    def limits(loads: Array, sizes: Array) -> Array:
-        """(n,) the factors at which the ranges of the shear forces, divided by f, are 2 `loads`.
-
-        sizes : (n,) sizes of the elastic shares
-        """
-        ranges = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
-        return np.divide(2.0 * loads, ranges, out=np.full_like(loads, np.inf), where=ranges > 0)
-
-    each = limits(P, np.abs(q))
-    sliding = min(
+    problem, high, low = Loaded.of(contact), float(t.max()), float(t.min())
+    unit = problem.units.force
+    P, q = problem.levels.top.loads[problem.places], problem.elastic
+    each = P / q * (2.0 * unit / (high - low))  # where the range of a shear force is 2 P_i
+    gross = min(
         (contact.load - t0) / high if high > 0 else np.inf,
         (contact.load + t0) / -low if low < 0 else np.inf,
     )
-    factor = min(float(each.min()), sliding)
-    lower = min(float(limits(np.maximum(P - load_errors, 0.0), np.abs(q) + off).min()), sliding)
-    upper = min(float(limits(P + load_errors, np.abs(q) - off).min()), sliding)
-    # The solution holds for positive shares only.
-    proved = bool((q >= off).all())
-    critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))
+    limits = np.abs(each.value)
+    factor = min(float(limits.min()), gross)
+    proved = bool(q.positive.all())  # the solution holds for positive shares only
+    critical = np.arange(len(P)) == int(np.argmin(limits)) if factor < gross else np.ones(len(P))
     # The force at rest may lie from -P_i - factor q_i low to P_i - factor q_i high.
-    travelled = np.outer(factor * q / problem.units.force, (low, high))
-    room_low, room_high = -P - travelled.min(axis=1), P - travelled.max(axis=1)
+    travelled = np.outer(factor * q.value / unit, (low, high))
+    room_low, room_high = -P.value - travelled.min(axis=1), P.value - travelled.max(axis=1)
     width = room_high - room_low
-    part = (t0 / problem.units.force - room_low.sum()) / (width.sum() or 1.0)
+    part = (t0 / unit - room_low.sum()) / (width.sum() or 1.0)
     factors = np.full(len(contact.scene), np.nan)
-    factors[problem.touching] = each
-    return limit(
+    factors[problem.touching] = limits
+    return Limit(
         factor=factor,
-        lower=lower * (1 - SAFETY) if proved else 0.0,
-        upper=upper * (1 + SAFETY) if proved else np.inf,
-        factors=frozen(factors),
-        gross=sliding,
-        witness=frozen(problem.to_scene(f * problem.units.force * (room_low + part * width))),
-        mechanism=frozen(problem.to_scene(np.asarray(critical, dtype=np.float64))),
-    )
-
-
-def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
-    f = checks.friction(contact.scene.friction)
-    found = program.solve(contact, t0, t)
-    slips = np.hypot(*np.moveaxis(found.slips, -1, 0)).max()
-    return limit(
-        factor=found.factor,
-        lower=found.lower,
-        upper=found.upper,
-        factors=frozen(np.where(contact.loads > 0, found.factor, np.nan)),
-        gross=found.gross,
-        witness=frozen(f * found.rest),
-        mechanism=frozen(found.slips / slips),
+        lower=max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
+        upper=min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
+        factors=factors,
+        gross=gross,
+        witness=problem.to_scene(unit * (room_low + part * width)),
+        mechanism=problem.to_scene(np.asarray(critical, dtype=np.float64)),
     )
 
 

@@ -16,7 +16,7 @@ from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
-from convexrough.friction.walk import follow
+from convexrough.friction.path import Walk
 
 
 def octagon(name: str) -> tuple[cr.Scene, Array, Array]:
@@ -124,13 +124,11 @@ def test_shares_of_a_loss_where_the_load_varies() -> None:
         scene, loads=[0.9 * largest, 0.5 * largest], forces=np.array([0.2, -0.2]) * largest
     )
     levels = found.contact.cached(FrictionLevels)
-    start = MemoryCurve.pressed(0)
     points = [
         (Fraction(p), Fraction(q) * 2) for p, q in zip(found.loads, found.forces, strict=True)
     ]
-    curves, _ = follow(start, [*points, points[0]])
-    _, costs = follow(curves[-1], [*points[1:], points[0]])
-    pieces = [piece for cost in costs for piece in cost if piece.slope * piece.sign != 1]
+    walk = Walk(levels, MemoryCurve(), [*points, *points, points[0]])
+    pieces = [piece for cost in walk.pieces[len(points) + 1 :] for piece in cost]
     nodes, weights = np.polynomial.legendre.leggauss(40)
     total = np.zeros(len(levels.candidates))
     k = levels.top.problem.coefficients

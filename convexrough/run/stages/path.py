@@ -16,8 +16,7 @@ from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import load_path
-from convexrough.friction.phases import PhaseLosses, phase_losses
-from convexrough.friction.shapes import elliptic_path
+from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
 from convexrough.record import rows_of
 from convexrough.run.stage import (
     MOST_PRINTED,
