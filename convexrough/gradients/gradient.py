@@ -175,8 +175,7 @@ class Number:
 
     def in_scene(self, values: Array) -> Array:
         """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
-        problem = self.top.problem
-        return frozen(among_zeros(values, problem.candidates, len(problem.scene)))
+        return frozen(self.top.problem.to_scene(values))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
