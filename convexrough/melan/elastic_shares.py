@@ -18,8 +18,7 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.convex.theorem import distance
 from convexrough.roundoff import SAFETY
-from convexrough.vector_shear.loaded import Loaded
-from convexrough.vector_shear.problem import VectorProblem
+from convexrough.vector_shear.problem import FrictionProblem
 
 
 class Shares(NamedTuple):
@@ -38,7 +37,7 @@ class Shares(NamedTuple):
 
 def scalar_shares(contact: Contact) -> Shares:
     """The shares with the scalar kernel: derivatives of the normal loads by the total load."""
-    known = Loaded.of(contact)
+    known = contact.cached(FrictionProblem)
     shares = known.elastic
     if known.scope == "none":
         return _unproved(shares.value, known)
@@ -47,7 +46,7 @@ def scalar_shares(contact: Contact) -> Shares:
 
 def vector_shares(contact: Contact) -> Shares:
     """The shares with the full tangential kernel."""
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     n, h = len(problem), problem.compliance
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
     compliance = problem.kernel + np.diag(np.repeat(h, 2))
@@ -64,7 +63,7 @@ def vector_shares(contact: Contact) -> Shares:
     return Shares(shares, errors, problem.loads, problem.errors)
 
 
-def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
+def _errors(problem: FrictionProblem, shares: Array, total: Array) -> Array:
     """(n,) bounds on the errors of shares (n, 2) of one total force (2,), from their residual."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
@@ -80,7 +79,7 @@ def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
     return errors
 
 
-def _unproved(values: Array, problem: Loaded) -> Shares:
+def _unproved(values: Array, problem: FrictionProblem) -> Shares:
     """The shares with infinite errors."""
     nowhere = np.full(len(values), np.inf)
     errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)

@@ -21,7 +21,7 @@ from convexrough.errors import SolverError
 from convexrough.melan.elastic_shares import Shares, vector_shares
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
-from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import FrictionProblem
 
 #: The solver's tolerance, and the fraction by which residual forces are moved into the cones.
 TOLERANCE, MARGIN = 1e-10, 1e-9
@@ -53,7 +53,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
 
     mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
     """
-    problem = Loaded.of(contact)
+    problem = contact.cached(FrictionProblem)
     unit, n = problem.units.force, len(problem)
     shares, m = vector_shares(contact), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)

@@ -31,7 +31,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
-from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import FrictionProblem
 
 Theory = Literal["exact", "elastic", "vector"]
 
@@ -248,7 +248,7 @@ def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
     t0, t : the mean shear force and its (m,) amplitudes, divided by f
     """
     f = checks.friction(contact.scene.friction)
-    problem, shares = Loaded.of(contact), scalar_shares(contact)
+    problem, shares = contact.cached(FrictionProblem), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 

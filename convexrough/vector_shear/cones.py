@@ -21,7 +21,7 @@ from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import SolverError
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
 from convexrough.vector_shear.certificate import certify_vectors
-from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -106,7 +106,7 @@ class FrictionConic:
     accepted: float = 1e-8
     name: str = field(default="conic", init=False)
 
-    def solve(self, problem: VectorProblem, total: Array) -> VectorState:
+    def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
         """The state under a total (2,), |T| < sum P, in scaled units."""
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
@@ -143,14 +143,14 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     lift   : the cones of an asperity;  small : (n,) epsilon;  energy : the unit of energy
     """
 
-    problem: VectorProblem
+    problem: FrictionProblem
     total: Array
     lift: _Lift
     small: Array
     energy: float
 
     @classmethod
-    def assemble(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
+    def assemble(cls, problem: FrictionProblem, total: Array) -> FrictionProgram:
         """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
         shares = problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
@@ -238,7 +238,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return VectorState(self.total, q, displacement, slips, raw.iterations)
 
 
-def _too_dense(problem: VectorProblem) -> SolverError:
+def _too_dense(problem: FrictionProblem) -> SolverError:
     touching, numbers = problem.touching, problem.convexity_numbers
     worst = np.argsort(-numbers)[:5]
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)

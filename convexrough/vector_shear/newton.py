@@ -23,7 +23,7 @@ from convexrough.arrays import Array
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class FrictionNewton:
     max_iterations: int = 100
     name: str = field(default="newton", init=False)
 
-    def solve(self, problem: VectorProblem, total: Array) -> VectorState:
+    def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
         """The state under a total (2,), |T| < sum P, in scaled units."""
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
@@ -84,7 +84,7 @@ class _Iterate(NamedTuple):
 class _Friction:
     """The equations of vector friction for one total T (2,), in the form of `convex.newton`."""
 
-    problem: VectorProblem
+    problem: FrictionProblem
     total: Array
 
     solver: ClassVar[str] = "friction (newton)"
@@ -130,7 +130,7 @@ class _Friction:
         return advice(self.problem, float(np.hypot(*self.total)))
 
 
-def _direction(problem: VectorProblem, state: _Iterate) -> Array:
+def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
     """The step d(eta); if the matrix is not positive definite, the shift is added to the kernel."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
@@ -166,7 +166,7 @@ def _direction(problem: VectorProblem, state: _Iterate) -> Array:
     return np.asarray(change - state.defect - moved)
 
 
-def _roots(problem: VectorProblem, eta: Array) -> Array:
+def _roots(problem: FrictionProblem, eta: Array) -> Array:
     """(n, 2, 2) W: unit vectors along and across eta_i times the roots of the slopes of q."""
     size = np.hypot(*eta.T)
     radial = problem.slopes(size)
@@ -178,7 +178,7 @@ def _roots(problem: VectorProblem, eta: Array) -> Array:
     return np.stack((x * radial, -y * across, y * radial, x * across), axis=1).reshape(-1, 2, 2)
 
 
-def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
+def _onto_total(problem: FrictionProblem, eta: Array, total: Array) -> Array | None:
     """eta + s, with the vector s for which forces add up to T; None if it is not found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
@@ -209,10 +209,10 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
     return None
 
 
-def advice(problem: VectorProblem, total: float) -> str:
+def advice(problem: FrictionProblem, total: float) -> str:
     """What the user can try if no state is found at this total."""
     place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
-    number = float((problem.shells * problem.stiffest).max())
+    number = float(problem.convexity_numbers.max())
     if number < 1:
         return f"{place}; try a shear force a little smaller"
     return (
