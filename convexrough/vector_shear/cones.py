@@ -11,20 +11,17 @@ multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope of 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
-from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
+from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, SECOND_ORDER
 from convexrough.errors import SolverError
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
 
 
 class _Lift(NamedTuple):
@@ -73,9 +70,6 @@ FIVE = _Lift(
     energy=np.array([[0, 0, 3, -5, 3, -3 / 5, 0], [0, 0, -3, 17 / 3, -4, 1, 1 / 3]]),
 )
 
-#: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
-_SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
-
 #: Below this fraction of gross sliding the state is proportional to T to the solver's accuracy, so
 #: the program is solved at this fraction and the result scaled. A heuristic.
 ELASTIC = 1e-9
@@ -118,10 +112,8 @@ class FrictionConic:
             known = certify_vectors(problem, state, Ball.exact(total / scale))
             gap, residual = known.excess / energy, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
-                q, displacement, slips = state.increments, state.displacement, state.slips
-                return VectorState(
-                    total, scale * q, scale * displacement, scale * slips, state.iterations
-                )
+                q, X, slips = (scale * each for each in state[1:4])
+                return VectorState(total, q, X, slips, state.iterations)
         raise SolverError(
             f"clarabel stopped after {raw.iterations} steps with {raw.status}, at an energy proved "
             f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
@@ -167,41 +159,37 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
-        rows = self._rows()
-        constant = np.concatenate((self.total / self.force, rows[:, :, 0].ravel()))
-        return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
-
-    def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic part (1/2) q'(B + shift) q with the kernel B, and the local energies."""
+        """The program: (1/2) q'(B + shift) q and the local energies; the total, and the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
         n, P, S = len(problem), problem.loads, problem.shift.shares[:, None]
-        unit = np.repeat(self.small * P, 2)
+        unit, more = np.repeat(self.small * P, 2), (len(lift.orders) - 1) * n
         M = problem.kernel.copy()
         M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
-        nothing = sparse.csc_matrix(((len(lift.orders) - 1) * n,) * 2)
         counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
         lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
-        linear = np.concatenate((np.zeros(2 * n), lifted.ravel()))
-        return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
-    def _constraints(self, rows: Array) -> csc_matrix:
-        from scipy import sparse
-
-        n, _, variables = rows.shape
+        rows = self._rows()
         vectors = np.zeros((rows.shape[1], 2))
         vectors[[1, 2], [0, 1]] = 1.0
-        coefficients = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        weights = (self.small * self.problem.loads)[None] / self.force
-        balance = sparse.kron(weights, sparse.identity(2))
-        powers = sparse.csc_matrix(sparse.bsr_matrix(coefficients))
-        each = sparse.hstack([sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors)), powers])
-        totals = sparse.hstack([balance, sparse.csc_matrix((2, (variables - 1) * n))])
-        constraints = sparse.csc_matrix(sparse.vstack([totals, -each]))
+        balance = sparse.kron((self.small * P)[None] / self.force, sparse.identity(2))
+        blocks = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
+        forces = sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors))
+        cones = sparse.hstack([forces, sparse.csc_matrix(sparse.bsr_matrix(blocks))])
+        totals = sparse.hstack([balance, sparse.csc_matrix((2, more))])
+        constraints = sparse.csc_matrix(sparse.vstack([totals, -cones]))
         constraints.eliminate_zeros()
-        return constraints
+        return ConeProgram(
+            quadratic=sparse.csc_matrix(
+                sparse.block_diag((upper, sparse.csc_matrix((more, more))))
+            ),
+            linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
+            constraints=constraints,
+            constant=np.concatenate((self.total / self.force, rows[:, :, 0].ravel())),
+            equalities=2,
+        )
 
     def _rows(self) -> Array:
         """(n, rows, k) the rows of all cones, for variables divided by epsilon^order.
@@ -212,7 +200,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
         powers = np.maximum(lift.orders - leading, 0.0)
         forms = lift.cones * small[:, :, None, None] ** powers
-        rows = (_SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
+        rows = (SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
         friction = np.zeros((len(small), 3, len(lift.orders)))
         friction[:, 0] = lift.share * small ** (lift.orders - 1)
         return np.concatenate((friction, rows), axis=1)
