@@ -18,7 +18,7 @@ from convexrough.arrays import Array
 from convexrough.convex.theorem import distance
 from convexrough.friction.levels import AT_THE_END
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
-from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along, slopes
 
 #: Number of radii r tried in step 2, and the ratio of each to the one before. Heuristics.
 TRIALS, WIDER = 24, 1.5
@@ -132,17 +132,10 @@ def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
     return exact * (limits / thresholds * (1.0 + left / (1.0 + left.sqrt())) / (1.0 + beyond))
 
 
-def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k."""
-    left = np.maximum(1.0 - share, 0.0)
-    root = np.sqrt(left)
-    return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
-
-
 def _steepest(problem: FrictionProblem, size: Array) -> Array:
     """(n,) upper bounds on the slopes of q where |eta| is at least `size`."""
     share = np.fmax(size, 0.0) / problem.threshold_balls.upper * (1.0 - ROUNDED)
-    _, across = _slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
+    _, across = slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
     return np.asarray(np.where(problem.sure, across * (1 + SAFETY), 0.0))
 
 
@@ -162,7 +155,7 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
 
     def least_slope(reached: Array) -> float:
         share = (size + reached) / problem.threshold_balls.lower * (1.0 + ROUNDED)
-        radial, across = np.where(problem.sure, _slopes(scale, share), 0.0)
+        radial, across = np.where(problem.sure, slopes(scale, share), 0.0)
         extra = across - radial
         angle = np.minimum(reached / np.maximum(size, 1e-300), 1.0) + ROUNDED
         _, axes = np.linalg.eigh((direction * extra[:, None]).T @ direction)

@@ -144,13 +144,12 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     @classmethod
     def assemble(cls, problem: FrictionProblem, total: Array) -> FrictionProgram:
         """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
-        shares = problem.shift.shares
-        if shares.max() > FIVE_CONES_LIMIT:
+        if problem.share > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
         elastic = np.hypot(*total) * problem.elastic.value / problem.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
         energy = float((problem.loads * problem.thresholds * small**2).max())
-        lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE
+        lift = FOUR if problem.share <= FOUR_CONES_LIMIT else FIVE
         return cls(problem, total, lift, small, energy)
 
     @property
@@ -163,13 +162,13 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
-        n, P, S = len(problem), problem.loads, problem.shift.shares[:, None]
+        n, P = len(problem), problem.loads
         unit, more = np.repeat(self.small * P, 2), (len(lift.orders) - 1) * n
         M = problem.kernel.copy()
-        M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
+        M[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
         counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
-        lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
+        lifted = (counted * (lift.energy[0] + problem.share * lift.energy[1]))[:, 1:]
 
         rows = self._rows()
         vectors = np.zeros((rows.shape[1], 2))
@@ -198,8 +197,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         """
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
-        powers = np.maximum(lift.orders - leading, 0.0)
-        forms = lift.cones * small[:, :, None, None] ** powers
+        forms = lift.cones * small[:, :, None, None] ** np.maximum(lift.orders - leading, 0.0)
         rows = (SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
         friction = np.zeros((len(small), 3, len(lift.orders)))
         friction[:, 0] = lift.share * small ** (lift.orders - 1)
@@ -218,7 +216,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         size = np.hypot(*q.T)
         displacement = -raw.multipliers[:2] * self.energy / self.force
         limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
-        slip = limit - (thresholds - problem.shift.values * P)  # where |q_i| = P_i
+        slip = limit - (thresholds - problem.share * problem.compliance * P)  # where |q_i| = P_i
         left = thresholds - problem.deflections(np.minimum(size, P))
         sliding = slip > left
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
@@ -232,7 +230,7 @@ def _too_dense(problem: FrictionProblem) -> SolverError:
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(
         f"too dense for a convex program: the least shift of the tangential kernel is "
-        f"{problem.shift.shares.max():.4g} of the local compliance, and at most 1 is convex. "
+        f"{problem.share:.4g} of the local compliance, and at most 1 is convex. "
         f"Largest convexity numbers, contact radii over (pi/4) times the distance to the nearest "
         f"neighbour, by their indices: {named}",
         solver="friction (conic)",

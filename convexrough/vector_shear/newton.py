@@ -146,9 +146,10 @@ def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
     for shifted in (False, True):
         matrix = scaled + np.eye(2 * n)
         if shifted:
-            share = np.repeat(problem.shift.values, 2)
             slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
-            matrix[np.diag_indices(2 * n)] += share * slopes
+            matrix[np.diag_indices(2 * n)] += (
+                np.repeat(problem.share * problem.compliance, 2) * slopes
+            )
         factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
         if info == 0:
             break
@@ -169,12 +170,10 @@ def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
 def _roots(problem: FrictionProblem, eta: Array) -> Array:
     """(n, 2, 2) W: unit vectors along and across eta_i times the roots of the slopes of q."""
     size = np.hypot(*eta.T)
-    radial = problem.slopes(size)
-    across = np.where(size > 0, problem.increments(size) / np.where(size > 0, size, 1.0), radial)
+    radial, across = np.sqrt(problem.slopes(eta))
     direction = along(np.ones(len(size)), eta, size)
     direction[size == 0] = (1.0, 0.0)
     x, y = direction.T
-    radial, across = np.sqrt(radial), np.sqrt(across)
     return np.stack((x * radial, -y * across, y * radial, x * across), axis=1).reshape(-1, 2, 2)
 
 

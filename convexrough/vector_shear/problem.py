@@ -56,18 +56,6 @@ class VectorState(NamedTuple):
     iterations: int
 
 
-class Shift(NamedTuple):
-    """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
-
-    values : (n,) one entry for both directions of each asperity
-    shares : (n,) S_i = values_i / h_i with the least local compliance h_i; the energy is convex if
-        all S_i <= 1: docs/theory/vector-friction.md, "Convexity"
-    """
-
-    values: Array
-    shares: Array
-
-
 class FrictionProblem:
     """n loaded asperities of a contact; use `contact.cached(FrictionProblem)`.
 
@@ -172,15 +160,10 @@ class FrictionProblem:
         """(n,) u and eta of `shear`, with the scalar kernel, under the shear force T [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
-            return shares, shares / self.slopes(0.0 * shares)
+            return shares, shares * self.compliance
         top, low = self.levels.top, self.levels.at(self.levels.load - height)
         u, eta = top.loads - low.loads, top.indentation - low.indentation
         return u.value[self.places], eta.value[self.places]
-
-    def increments(self, deflections: Array) -> Array:
-        """(n,) the shear forces u at these deflections eta; u = P beyond the threshold."""
-        u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.thresholds))
-        return u
 
     def deflections(self, increments: Array) -> Array:
         """(n,) the deflections of these shear forces, 0 <= u <= P."""
@@ -188,12 +171,6 @@ class FrictionProblem:
         x = annulus.width_between(increments / self.loads, left)
         eta: Array = self.thresholds * annulus.deflection(x)
         return eta
-
-    def slopes(self, deflections: Array) -> Array:
-        """(n,) c = du/deta at these deflections eta; 0 where sliding."""
-        stick = 1.0 - annulus.width_at(deflections / self.thresholds)
-        c: Array = 1.5 * self.loads / self.thresholds * stick
-        return c
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(N, ...) these values, and 0 for all other asperities of the scene."""
@@ -210,11 +187,6 @@ class FrictionProblem:
         product: Array = self.kernel @ increments.reshape(-1)
         return product.reshape(-1, 2)
 
-    def own(self, increments: Array) -> Array:
-        """(n, 2) the deflection of each asperity by its own force, |q_i| <= P_i."""
-        size = self.sizes(increments)
-        return along(self.deflections(size), increments, size)
-
     def sizes(self, increments: Array) -> Array:
         """(n,) |q_i|, or P_i if they differ by rounding only, as deflections are steep near P_i."""
         size, P = np.hypot(*increments.T), self.loads
@@ -222,9 +194,14 @@ class FrictionProblem:
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) q(eta), the inverse of `own`, parallel to eta; |q_i| = P_i where sliding."""
-        size = np.hypot(*deflections.T)
-        return along(self.increments(size), deflections, size)
+        """(n, 2) the forces q(eta) at these deflections eta; |q_i| = P_i where sliding."""
+        _, across = self.slopes(deflections)
+        return deflections * across[:, None]
+
+    def slopes(self, deflections: Array) -> tuple[Array, Array]:
+        """(n,) the eigenvalues of dq/deta along and across the deflections eta (n, 2)."""
+        sizes = np.hypot(*deflections.T)
+        return slopes(self.loads / self.thresholds, sizes / self.thresholds)
 
     def energy(self, increments: Array, coupling: Array) -> float:
         """The energy of forces q, given their coupling B q."""
@@ -244,7 +221,8 @@ class FrictionProblem:
         q, slips, P = state.increments, state.slips, self.loads
         size = self.sizes(q)
         slip_size = np.hypot(*slips.T)
-        imbalance = np.hypot(*(state.displacement - self.own(q) - self.couple(q) - slips).T)
+        own = along(self.deflections(size), q, size)
+        imbalance = np.hypot(*(state.displacement - own - self.couple(q) - slips).T)
         across = np.hypot(*(slips - along(slip_size, q, size)).T)
         unused = slip_size * np.maximum(1.0 - size / P, 0.0)
         missing = float(np.hypot(*(q.sum(axis=0) - state.total)))
@@ -257,21 +235,14 @@ class FrictionProblem:
         return max(parts)
 
     @cached_property
-    def shift(self) -> Shift:
-        """The shift for the cones, from (3) of docs/theory/vector-friction.md.
+    def share(self) -> float:
+        """The least S, up to rounding, for which B + S H is positive semidefinite, H = diag(h_i).
 
-        If a share exceeds 21/25, all shares are equal and follow from the smallest eigenvalue.
+        The energy is convex if S <= 1: docs/theory/vector-friction.md, "Convexity".
         """
-        nu = 2.0 * self.bias / (1.0 + self.bias)
-        factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
-        by_distance = factor * self.shells
-        shares = by_distance / self.compliance
-        if shares.max() <= 21 / 25:
-            return Shift(by_distance, shares)
         root = np.repeat(1.0 / np.sqrt(self.compliance), 2)
         lowest = float(np.linalg.eigvalsh(self.kernel * root * root[:, None])[0])
-        equal = np.full(len(self), max(-lowest, 0.0) + 1e-14 * (1 + len(self)))
-        return Shift(equal * self.compliance, equal)
+        return max(-lowest, 0.0) + 1e-14 * (1 + len(self))
 
     @cached_property
     def margin(self) -> float:
@@ -288,6 +259,17 @@ class FrictionProblem:
         """(n, n) bounds on the norms of the B_ij: |B_ij v| <= reach_ij |v|."""
         bound: Array = self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
         return bound
+
+
+def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
+    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k.
+
+    The force is q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - |eta|/k, 0). The second eigenvalue
+    is |q| / |eta|.
+    """
+    left = np.maximum(1.0 - share, 0.0)
+    root = np.sqrt(left)
+    return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:

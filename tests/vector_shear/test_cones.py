@@ -50,7 +50,7 @@ def blunt(tip_radius: float) -> cr.Contact:
 @pytest.mark.parametrize("tip_radius", [0.3, 0.5])
 def test_five_cones(tip_radius: float, fraction: float) -> None:
     contact = blunt(tip_radius)
-    assert 21 / 25 < contact.cached(FrictionProblem).shift.shares.max() < 1
+    assert 21 / 25 < contact.cached(FrictionProblem).share < 1
     force = fraction * FRICTION * contact.load
     newton = shear_vector(contact, force=force)
     conic = shear_vector(contact, force=force, solver=FrictionConic())
