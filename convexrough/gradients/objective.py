@@ -16,7 +16,7 @@ from convexrough.contact import Contact, press
 from convexrough.errors import ExtraError, InputError
 from convexrough.friction.cycle import cycle
 from convexrough.friction.shear import shear
-from convexrough.gradients.gradient import Gradient
+from convexrough.gradients.gradient import Gradient, Holding
 from convexrough.influence import Kind
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
@@ -138,13 +138,14 @@ class Objective(Record):
             for name in PRESCRIBED
         )
         contact = press(self._scene(given), load=load, approach=approach, influence=self.influence)
-        if self.of == "loss":
-            return _loss(contact, force)
-        if self.of == "displacement":
-            return shear(contact, force=force).gradient(displacement=1.0)
-        if self.of == "approach":
-            return contact.gradient(approach=1.0)
-        return contact.gradient(load=1.0)
+        if self.of == "loss" and force is not None:
+            checks.non_negative("force", force)
+        try:
+            return gradient_of(contact, self.of, force)
+        except InputError as error:
+            if not error.what.startswith("maximum"):
+                raise
+            raise InputError("force", found=error.found, expected=error.expected) from None
 
     def to_jax(self) -> Callable[[Any], Any]:
         """The result as a function for jax.grad, jax.jit and jax.vmap, without second derivatives.
@@ -240,16 +241,17 @@ class Objective(Record):
         return replace(scene, asperities=Asperities(**each), material=material, **whole)
 
 
-def _loss(contact: Contact, force: float | None) -> Gradient:
-    """The gradient of the loss of the cycle between -force and force; InputErrors name `force`."""
-    if force is not None:
-        checks.non_negative("force", force)
-    try:
-        return cycle(contact, maximum=force).gradient()
-    except InputError as error:
-        if not error.what.startswith("maximum"):
-            raise
-        raise InputError("force", found=error.found, expected=error.expected) from None
+def gradient_of(
+    contact: Contact, of: str, force: float | None, holding: Holding | None = None
+) -> Gradient:
+    """The gradient of a result of `NUMBERS`, of the cycle between -force and force for a loss."""
+    if of == "loss":
+        return cycle(contact, maximum=force).gradient(holding=holding)
+    if of == "displacement":
+        return shear(contact, force=force).gradient(displacement=1.0, holding=holding)
+    if of == "approach":
+        return contact.gradient(approach=1.0, holding=holding)
+    return contact.gradient(load=1.0, holding=holding)
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
