@@ -217,7 +217,10 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     boxes = _boxes(problem, own)
     cones = LiftedProgram.assemble(problem, boxes).apply()
     kind = f"second-order cones, {5 if boxes.five else 4} an asperity"
-    least = _objective(cones, boxes, own)
+    p = own[boxes.members]
+    t = np.cbrt(p / boxes.loads)
+    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
+    least = _value(cones, np.concatenate((p, *powers[0 if boxes.five else 1 :])))
     dual = form == "dual"
     return make(
         what=f"the dual of {kind}" if dual else kind,
@@ -296,14 +299,6 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
             return boxes
     theta = problem.shells / problem.compliance(own)
     raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
-
-
-def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
-    p = own[boxes.members]
-    t = np.cbrt(p / boxes.loads)
-    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
-    x = np.concatenate((p, *powers[0 if boxes.five else 1 :]))
-    return _value(program, x)
 
 
 def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:

@@ -143,17 +143,13 @@ def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
     pushed = np.einsum("nij,ni->nj", roots, -state.defect)
     turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
     right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
-    for shifted in (False, True):
-        matrix = scaled + np.eye(2 * n)
-        if shifted:
-            slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
-            matrix[np.diag_indices(2 * n)] += (
-                np.repeat(problem.share * problem.compliance, 2) * slopes
-            )
-        factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-        if info == 0:
-            break
-    else:
+    matrix = scaled + np.eye(2 * n)
+    factor, info = dpotrf(matrix.T, lower=1, clean=0)
+    if info != 0:
+        slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
+        matrix[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2) * slopes
+        factor, info = dpotrf(matrix.T, lower=1, clean=0)
+    if info != 0:
         raise SolverError(
             "the shifted matrix is not positive definite",
             solver=_Friction.solver,
