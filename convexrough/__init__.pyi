@@ -44,7 +44,7 @@ from .gradients.change import Direction as Direction
 from .gradients.change import ShearChange as ShearChange
 from .gradients.gradient import Gradient as Gradient
 from .gradients.objective import Objective as Objective
-from .gradients.states import onset_gradient as onset_gradient
+from .gradients.results import onset_gradient as onset_gradient
 from .many import Contacts as Contacts
 from .many import Cycles as Cycles
 from .many import press_many as press_many

@@ -153,18 +153,16 @@ def compare(
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
     """
-    reference = _REFERENCE
     others = every_solver() if solvers is None else [*map(named, solvers)]
+    pressed = partial(press, scene, approach=approach, load=load, influence=influence)
     entries: list[Entry] = []
-    for solver in (reference, *(each for each in others if each != reference)):
+    for solver in (_REFERENCE, *(each for each in others if each != _REFERENCE)):
         LOGGER.info(solver.name)
-        known = entries[0].contact if entries else None
-        pressed = partial(press, scene, approach=approach, load=load, influence=influence)
         _load_code_of(solver)
         kept: AbstractContextManager[Sequence[Any]] = logged_steps() if log else nullcontext(())
         with kept as steps:
-            entry = _enter(solver, pressed, known)
-        entries.append(replace(entry, steps=tuple(steps)))
+            entry = _enter(solver, pressed)
+        entries.append(replace(_against(entry, [*entries, entry][0]), steps=tuple(steps)))
     answers = [entry.contact for entry in entries if entry.contact is not None]
     pairs = combinations([Answer.of(contact) for contact in answers], 2)
     return Comparison(
@@ -212,12 +210,11 @@ def solver_named(name: str) -> solvers.Solver:
 _REFERENCE = solvers.Newton()
 
 
-def _enter(
-    solver: solvers.Solver, press_with: Callable[..., Contact], reference: Contact | None
-) -> Entry:
+def _enter(solver: solvers.Solver, pressed: Callable[..., Contact]) -> Entry:
+    """The entry of a solver, not yet compared with the reference."""
     memory = MemoryRise()
     try:
-        contact = press_with(solver=solver)
+        contact = pressed(solver=solver)
     except SolverError as error:
         return Entry(solver.name, "failed", str(error))
     except InputError as error:
@@ -231,19 +228,19 @@ def _enter(
         places = [each for each in extract_tb(error.__traceback__) if each.filename == file]
         place = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
         return Entry(solver.name, "failed", f"{type(error).__name__}: {error}{place}")
-    risen = memory.risen()
-    if reference is None:
-        reference = contact if solver == _REFERENCE else None
-    if reference is None:
-        return Entry(solver.name, "answered", contact=contact, memory=risen)
-    return Entry(
-        solver=solver.name,
-        outcome="answered",
-        contact=contact,
-        disagreement=_relative(contact.loads - reference.loads, reference.loads),
-        different_statuses=int(np.sum(contact.status != reference.status)),
-        different_contacts=_different_contacts(contact.loads, reference.loads),
-        memory=risen,
+    return Entry(solver.name, "answered", contact=contact, memory=memory.risen())
+
+
+def _against(entry: Entry, reference: Entry) -> Entry:
+    """The entry, compared with the reference if both have a solution."""
+    found, known = entry.contact, reference.contact
+    if found is None or known is None:
+        return entry
+    return replace(
+        entry,
+        disagreement=_relative(found.loads - known.loads, known.loads),
+        different_statuses=int(np.sum(found.status != known.status)),
+        different_contacts=_different_contacts(found.loads, known.loads),
     )
 
 

@@ -169,7 +169,7 @@ class Contact(Cached, Table, Plottable):
         >>> print(f"{contact.gradient(load=1.0, holding='approach').approach:.5g}")
         0.012145
         """
-        from convexrough.gradients.states import contact_gradient  # a higher layer
+        from convexrough.gradients.results import contact_gradient  # a higher layer
 
         weights = {"loads": loads, "gaps": gaps, "approach": approach, "load": load}
         return contact_gradient(self, holding, **weights)

@@ -43,13 +43,8 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     scene: the summits, or in the "closest" geometry the points where the paraboloids first touch.
     """
     checks.instance("contact", contact, Contact)
-    touching = np.flatnonzero(contact.loads)
-    return superpose(
-        points,
-        contact.scene.contact_points[touching],
-        contact.contact_radii[touching],
-        peak_pressures(contact)[touching],
-    )
+    touching, centres, radii = _discs(contact)
+    return superpose(points, centres, radii, peak_pressures(contact)[touching])
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
@@ -57,16 +52,11 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
 
     Each asperity contributes the field of its Hertz pressure.
     """
-    touching = np.flatnonzero(contact.loads)
-    centres = contact.scene.contact_points[touching]
-    radii = contact.contact_radii[touching]
-    relative_radii = contact.scene.relative_radii[touching]
-
-    def each(x: Array, y: Array) -> Array:
-        displacements: Array = hertz.surface_displacement(np.hypot(x, y), radii, relative_radii)
-        return displacements
-
-    return _sum_everywhere(points, centres, each)
+    touching, centres, a = _discs(contact)
+    R = contact.scene.relative_radii[touching]
+    return _sum_everywhere(
+        points, centres, lambda x, y: hertz.surface_displacement(np.hypot(x, y), a, R)
+    )
 
 
 def traction(state: ShearState, points: ArrayLike) -> Array:
@@ -75,14 +65,12 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
     At the distance r from its centre an asperity contributes f p0 sqrt(1 - r^2/a^2), with the
     coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is taken off.
     """
-    asperities = _Sheared(state)
+    centres, a, shares, peaks = _sheared(state)
     return _sum_over_discs(
         points,
-        asperities.centres,
-        asperities.radii,
-        lambda distances, disc: surface_shear.traction(
-            distances, asperities.radii[disc], asperities.shares[disc], asperities.peaks[disc]
-        ),
+        centres,
+        a,
+        lambda r, disc: surface_shear.traction(r, a[disc], shares[disc], peaks[disc]),
     )
 
 
@@ -94,39 +82,32 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     relative displacement of the bodies. This sum only approximates it, because `shear` averages
     compliances over directions.
     """
-    asperities = _Sheared(state)
+    centres, a, shares, peaks = _sheared(state)
     material = state.contact.scene.material
-
-    def each(x: Array, y: Array) -> Array:
-        displacements: Array = surface_shear.surface_displacement(
-            x,
-            y,
-            asperities.radii,
-            asperities.shares,
-            asperities.peaks,
-            material.shear_modulus,
-            material.poisson_ratio,
-        )
-        return displacements
-
-    return _sum_everywhere(points, asperities.centres, each)
+    body = material.shear_modulus, material.poisson_ratio
+    return _sum_everywhere(
+        points,
+        centres,
+        lambda x, y: surface_shear.surface_displacement(x, y, a, shares, peaks, *body),
+    )
 
 
-class _Sheared:
-    """The loaded asperities of a shear state, as arrays that `sphere.surface_shear` needs.
+def _discs(contact: Contact) -> tuple[Indices, Array, Array]:
+    """The indices of the loaded asperities, their centres (n, 2) and contact radii (n,)."""
+    touching = np.flatnonzero(contact.loads)
+    return touching, contact.scene.contact_points[touching], contact.contact_radii[touching]
 
-    centres : (n, 2) [length];  radii : (n,) a [length];  peaks : (n,) f p0 [force / length^2]
-    shares  : (n,) Q_i / (f P_i), exactly +-1 where sliding
+
+def _sheared(state: ShearState) -> tuple[Array, Array, Array, Array]:
+    """Centres (n, 2), contact radii, Q_i / (f P_i) and f p0 of the n loaded asperities.
+
+    Q_i / (f P_i) is exactly 1 or -1 where the asperity slides.
     """
-
-    def __init__(self, state: ShearState) -> None:
-        contact = state.contact
-        friction = checks.friction(contact.scene.friction)
-        touching = np.flatnonzero(contact.loads)
-        self.centres = contact.scene.contact_points[touching]
-        self.radii = contact.contact_radii[touching]
-        self.peaks = friction * peak_pressures(contact)[touching]
-        self.shares = state.forces[touching] / (friction * contact.loads[touching])
+    contact = state.contact
+    friction = checks.friction(contact.scene.friction)
+    touching, centres, radii = _discs(contact)
+    shares = state.forces[touching] / (friction * contact.loads[touching])
+    return centres, radii, shares, friction * peak_pressures(contact)[touching]
 
 
 def cell_areas(points: Array) -> Array:

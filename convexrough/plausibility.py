@@ -167,31 +167,9 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
 def cautions_about(scene: Scene, loads: Array) -> list[str]:
     """The warnings of `cautions` for loads (n,) [force]."""
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
-    if clear_of_cautions(scene, loads, radii):
-        return []
-    crowded = crowding(scene.contact_points, radii), covered(scene, radii)
-    return [*cautions(limits(scene, loads, radii, *crowded), scene.units)]
-
-
-def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
-    """True if simple bounds, which cost less than `cautions`, show that there are none."""
-    tips, a, touching = scene.asperities.tip_radii, float(radii.max()), np.count_nonzero(loads)
-    smooth = hertz.contact_radius(loads.sum(), scene.material.contact_modulus, scene.mean_radius)
-    far = float(scene.asperities.distances.max())
-    return bool(
-        scene.lattice is not None
-        and 2 * a < 0.99 * scene.lattice.spacing
-        and FEW <= touching < len(loads)
-        and a < 0.99 * STEEP * float(tips.min())
-        and all(far + a < 0.99 * STEEP * R for R, _ in scene.curved)
-        and (not is_array(scene) or (isinstance(scene.sphere_radius, float)
-             and np.abs(scene.asperities.positions).max(axis=0).min() > 1.01 * CUT_OFF * smooth))
-        and rim_touching(scene, loads > 0) <= CUT_RIM
-        and not axis_outside(scene)
-        and scene.material.hardness is None
-        and (scene.friction or 0.0) <= HIGH_FRICTION
-        and not any(unlikely_modulus(scene.material.contact_modulus, scene.units))
-    )  # fmt: skip
+    apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
+    near = 0.0 if apart else crowding(scene.contact_points, radii)
+    return [*cautions(limits(scene, loads, radii, near, covered(scene, radii)), scene.units)]
 
 
 def is_array(scene: Scene) -> bool:

@@ -35,7 +35,7 @@ def export(
 
     Programs go to the folder SCENE-programs unless --out names another.
     """
-    from convexrough.programs.folder import FORMATS, write_programs
+    from convexrough.programs.program import FORMATS, write_programs
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
 

@@ -33,7 +33,7 @@ FOUR_CONES = np.array([_SQUARE, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64
 FIVE_CONES = np.array([_Y1_AND_Y3, _Y2_AND_Y4, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64)
 
 #: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
-_SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
+SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
 
 class ConeRows(NamedTuple):
@@ -58,7 +58,7 @@ def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = Non
 
     columns = np.stack(lifts)
     names, n = columns.shape
-    cones = _SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
+    cones = SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
     rows = cones.reshape(-1, 7)  # of one lift
     constant, coefficients = rows[:, 0], rows[:, 7 - names :]
     if ones is not None:

@@ -220,7 +220,7 @@ class Cycle(Table, Plottable):
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
         5.907e-10 -9.964e-07
         """
-        from convexrough.gradients.losses import cycle_gradient  # a higher layer
+        from convexrough.gradients.results import cycle_gradient  # a higher layer
 
         return cycle_gradient(self, holding=holding)
 

@@ -214,7 +214,7 @@ class LoadPath(Table, Plottable):
         >>> print([f"{each:.3g}" for each in past.gradient().forces])
         ['5.88e-06', '-2.94e-06']
         """
-        from convexrough.gradients.losses import path_gradient  # a higher layer
+        from convexrough.gradients.results import path_gradient  # a higher layer
 
         return path_gradient(self, losses=losses, displacements=displacements, holding=holding)
 

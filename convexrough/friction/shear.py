@@ -135,7 +135,7 @@ class ShearState(Table, Plottable):
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
         9.88e-06 124.6
         """
-        from convexrough.gradients.states import state_gradient  # a higher layer
+        from convexrough.gradients.results import state_gradient  # a higher layer
 
         weights = {"displacement": displacement, "forces": forces, "slips": slips}
         return state_gradient(self, holding, **weights)

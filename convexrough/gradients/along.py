@@ -11,11 +11,11 @@ the corresponding level of the original path, and S = dD0/dL. To first order in 
 from __future__ import annotations
 
 from bisect import bisect, insort
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at
-from convexrough.gradients.pulled import ZERO, Moves, Part
+from convexrough.gradients.parts import ZERO, Moves, Part
 
 #: The shift of P_k or T_k, and the distance below which levels of the two paths correspond, both
 #: divided by the largest load. SHIFT is less than any difference of two float64 numbers.
@@ -38,23 +38,22 @@ NOTHING: Weights = (Fraction(0),) * 3
 #: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
-#: The changes of P and of T at all points of a path, per unit of a parameter.
-Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
+#: Changes of P or of T at all points of a path, per unit of a parameter.
+Shifts: TypeAlias = Sequence[Fraction]
 
 #: The value of a derivative that does not exist or is infinite.
 NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
-class LevelWeights(NamedTuple):
-    """Weights of V, D0 and S at each level, for losses / (c_t f^2) and displacements / (c_t f).
+class Sums(dict[Fraction, Weights]):
+    """The weights of V, D0 and S at each level."""
 
-    f is the coefficient of friction, c_t Mindlin's ratio.
-    """
+    def add(self, level: Fraction, weight: Fraction, energy: Fraction, approach: Fraction) -> None:
+        """Add weights of V and D0, multiplied by `weight`."""
+        V, D, S = self.get(level, NOTHING)
+        self[level] = (V + weight * energy, D + weight * approach, S)
 
-    losses: dict[Fraction, Weights]
-    displacements: dict[Fraction, Weights]
-
-    def lose(self, piece: Piece, weight: Fraction) -> None:
+    def add_loss(self, piece: Piece, weight: Fraction) -> None:
         """Add the loss (1 - c th) I on a piece (`friction.loss`), multiplied by a weight.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
@@ -64,30 +63,13 @@ class LevelWeights(NamedTuple):
         weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
         run, fall = high - low, before - after
-        add = self._adder(self.losses, weight)
-        add(high, 2 - fall / run, before - high)
-        add(low, fall / run - 2, low - after)
+        self.add(high, weight, 2 - fall / run, before - high)
+        self.add(low, weight, fall / run - 2, low - after)
         if fall == 0:
-            add(before, Fraction(0), -run)
+            self.add(before, weight, Fraction(0), -run)
         else:
-            add(before, -run / fall, Fraction(0))
-            add(after, run / fall, Fraction(0))
-
-    def move(self, curve: MemoryCurve, weight: Fraction) -> None:
-        """Add the displacement of the state with this memory curve, multiplied by a weight."""
-        add = self._adder(self.displacements, weight)
-        for level, bend in curve.bends:
-            add(level, Fraction(0), bend)
-
-    @staticmethod
-    def _adder(
-        found: dict[Fraction, Weights], weight: Fraction
-    ) -> Callable[[Fraction, Fraction, Fraction], None]:
-        def add(level: Fraction, energy: Fraction, approach: Fraction) -> None:
-            V, D, S = found.get(level, NOTHING)
-            found[level] = (V + weight * energy, D + weight * approach, S)
-
-        return add
+            self.add(before, weight, -run / fall, Fraction(0))
+            self.add(after, weight, run / fall, Fraction(0))
 
 
 @dataclass(frozen=True)
@@ -116,44 +98,41 @@ class Along:
         return cls(known, start, steps, [load for load, _ in pairs], heights)
 
     @cached_property
-    def sums(self) -> LevelWeights:
-        curve, found = MemoryCurve.pressed(self.start), LevelWeights({}, {})
-        for point, lost, moved in self.steps:
+    def sums(self) -> tuple[Sums, Sums]:
+        """Weights for all losses / (c_t f^2), and for all displacements / (c_t f)."""
+        curve, lost, moved = MemoryCurve.pressed(self.start), Sums(), Sums()
+        for point, loss, displacement in self.steps:
             curve, pieces = curve.go(self.loads[point], self.heights[point])
-            if lost:
+            if loss:
                 for piece in pieces:
-                    found.lose(piece, lost)
-            if moved:
-                found.move(curve, moved)
-        return found
+                    lost.add_loss(piece, loss)
+            if displacement:
+                for level, bend in curve.bends:
+                    moved.add(level, displacement, Fraction(0), bend)
+        return lost, moved
 
-    def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
-        """The `Part` of each level, the weighted sum of losses, and that of displacements.
+    def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
+        """The parts of the weighted sum of losses, and those of the sum of displacements.
 
         moves : derivatives of the load of every level, at fixed T
         """
-        spent, far, weights = ZERO, ZERO, dict[Fraction, tuple[Ball, Ball]]()
-        lost, force = self.known.loss_unit, self.known.units.force
-        for level, (V, D, _) in self.sums.losses.items():
-            each = lost * Ball.exact(V), lost / force * Ball.exact(D)
-            weights[level] = each
-            spent = spent + Part(self.known.at(level), *each).value
-        for level, (_, D, _) in self.sums.displacements.items():
-            energy, before = weights.get(level, (ZERO, ZERO))
-            advance = self.known.travel_unit * Ball.exact(D)
-            weights[level] = energy, before + advance
-            far = far + advance * self.known.at(level).approach
-        parts = [Part(self.known.at(level), *each, moves=moves) for level, each in weights.items()]
-        return parts, spent, far
+        (lost, moved), at, force = self.sums, self.known.at, self.known.units.force
+        unit, travel = self.known.loss_unit, self.known.travel_unit
+        return [
+            Part(at(level), unit * Ball.exact(V), unit / force * Ball.exact(D), moves=moves)
+            for level, (V, D, _) in lost.items()
+        ], [
+            Part(at(level), approach=travel * Ball.exact(D), moves=moves)
+            for level, (_, D, _) in moved.items()
+        ]
 
-    def _one_side(
-        self, loads: Sequence[Fraction], heights: Sequence[Fraction], sign: int, times: Ball
-    ) -> Ball:
+    def _one_side(self, loads: Shifts, heights: Shifts, sign: int, times: Ball) -> Ball:
+        """`times` the derivative from above (sign 1) or below (-1) for these changes of P and T."""
         unit, force = max(self.loads), self.known.units.force
         longest = max(map(abs, (*loads, *heights)))
         by = sign * SHIFT * unit / longest if longest else SHIFT
         try:
-            moved = replace(
+            shifted = replace(
                 self,
                 loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
                 heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
@@ -161,10 +140,8 @@ class Along:
         except InputError:  # |T| > P, or a negative load
             return NONE
         total = ZERO
-        for base, there, factor in (
-            (self.sums.losses, moved.losses, self.known.loss_unit),
-            (self.sums.displacements, moved.displacements, self.known.travel_unit * force),
-        ):
+        factors = self.known.loss_unit, self.known.travel_unit * force
+        for base, there, factor in zip(self.sums, shifted, factors, strict=True):
             for level, (V, D, S) in _slopes(base, there, unit, by).items():
                 if level == 0 and S:
                     return NONE
@@ -175,11 +152,15 @@ class Along:
                 total = total + factor * each
         return total * times
 
-    def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
+    def slopes(
+        self, directions: Sequence[tuple[Shifts, Shifts]], factor: Ball
+    ) -> tuple[Ball, Array]:
         """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
 
         The one-sided values are those from below and from above. A derivative is the mean of both
         if they agree within their error bounds. It is nan if they differ or one does not exist.
+
+        directions : changes of P and of T at all points
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]
@@ -193,9 +174,7 @@ def _one(below: Ball, above: Ball) -> Ball:
     return Ball.around((below + above).mid, apart.size) * 0.5 if apart.size else below
 
 
-def _slopes(
-    base: dict[Fraction, Weights], moved: dict[Fraction, Weights], unit: Fraction, by: Fraction
-) -> dict[Fraction, Weights]:
+def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fraction, Weights]:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
     unit : the largest load; weights that are small in this unit are neglected

@@ -6,7 +6,7 @@ docs/theory/gradients.md, "The change in one direction", derives them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +19,11 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
-from convexrough.gradients.pulled import ZERO, product
-from convexrough.gradients.scene import Bending, Geometry, curvatures
-from convexrough.gradients.states import Frictional
+from convexrough.gradients.parts import ZERO, Part, product
+from convexrough.gradients.results import by_ratio, level_below, with_friction
+from convexrough.gradients.scene import Bending, Geometry
 from convexrough.influence.choice import couple
-from convexrough.normal.level import Level
+from convexrough.normal.level import Level, Response
 from convexrough.record import Along, Record, Table
 from convexrough.scene.base import sphere_radius
 
@@ -122,28 +122,28 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
         if (given := getattr(direction, name)) != 0.0:
             expected = "0: a contact does not depend on it; use the change of a friction state"
             raise InputError(name, found=given, expected=expected)
-    top = levels(contact).top
-    return _pressed(contact, direction, _Bent.of(top, direction), top)[0]
+    return _pressed(contact, direction, _Bent.of(levels(contact).top, direction))[0]
 
 
 def _pressed(
-    contact: Contact, direction: Direction, bent: _Bent, top: Level
-) -> tuple[ContactChange, _Moved]:
-    """The change of the contact, and the change of the level in scaled units."""
+    contact: Contact, direction: Direction, bent: _Bent
+) -> tuple[ContactChange, Ball, Response]:
+    """The change of the contact, and those of its load and solution, in scaled units."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
     by_load = control_held(contact, None) == "load"
     if direction.load is not None or direction.approach is not None:
         by_load = direction.approach is None
+    top = levels(contact).top
     units = top.problem.units
     if by_load:
         total = Ball.exact(direction.load or 0.0) / units.force
     else:
-        alone = bent.of_level(top, ZERO).approach
-        lowered = Ball.exact(direction.approach or 0.0) / units.length - alone
+        alone, _ = bent.of_level(top, ZERO)
+        lowered = Ball.exact(direction.approach or 0.0) / units.length - alone.approach
         total = lowered / top.tangent.approach
-    moved = bent.of_level(top, total)
+    moved, _ = bent.of_level(top, total)
     loads = top.problem.to_scene(moved.loads.value * units.force)
     approach = float(moved.approach.value) * units.length if by_load else direction.approach or 0.0
     change = ContactChange(
@@ -152,9 +152,9 @@ def _pressed(
         loads=frozen(loads),
         gaps=frozen(_gap_changes(contact, bent, loads, approach)),
         approach=approach,
-        load=float(moved.total.value) * units.force,
+        load=float(total.value) * units.force,
     )
-    return change, moved
+    return change, total, moved
 
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
@@ -175,23 +175,21 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
 
 def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     """The result of `ShearState.change`, from the changes at the loads P and P - Q / f."""
-    contact = state.contact
+    contact, known = state.contact, with_friction(state)
     checks.instance("direction", direction, Direction)
-    sheared = Frictional.of(state)
-    if abs(sheared.known.height(state.force)) == sheared.known.load:
+    if abs(known.height(state.force)) == known.load:
         expected = "a force below f P, where the derivative is finite"
         raise InputError("force", found=f"{state.force}: gross sliding", expected=expected)
     sign = -1.0 if state.force < 0 else 1.0
-    top, low = sheared.known.top, sheared.below("force", state.force, "load")
-    bent, f, unit = _Bent.of(top, direction), sheared.f, sheared.unit
-    first, above = _pressed(contact, direction, bent, top)
+    top, low = known.top, level_below(known, "force", state.force, "load")
+    bent, f, unit = _Bent.of(top, direction), known.coefficient, known.units.force
+    first, total, above = _pressed(contact, direction, bent)
     by_friction = Ball.exact(direction.friction) / f
     slid = sign * direction.force / f / unit - (top.load - low.load) * by_friction  # dT
-    below = bent.of_level(low, above.total - slid)
-    ratio = Ball.exact(direction.poisson_ratio) * sheared.by_ratio + by_friction
-    far, travel = sign * sheared.known.travel_unit, sign * sheared.known.force_unit
-    sliding = ~low.springs.touching & (top.loads.value > 0)
-    gaps, opened = -low.indentation, -below.indentation
+    below, opened = bent.of_level(low, total - slid)
+    ratio = Ball.exact(direction.poisson_ratio) * by_ratio(known) + by_friction
+    far, travel = sign * known.travel_unit, sign * known.force_unit
+    sliding, gaps = ~low.springs.touching & (top.loads.value > 0), -low.indentation
     slips = balls.where(sliding, far * (opened + ratio * gaps), 0.0 * gaps)
     carried, moved = top.loads - low.loads, above.loads - below.loads
     approach_change, risen = top.approach - low.approach, above.approach - below.approach
@@ -206,26 +204,18 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     )
 
 
-class _Moved(NamedTuple):
-    """The changes of loads P, indentations n, approach D0 and total load, in scaled units."""
-
-    loads: Ball
-    indentation: Ball
-    approach: Ball
-    total: Ball
-
-
 @dataclass(frozen=True)
 class _Bent:
     """The changes of a scene's geometry and modulus in one direction.
 
     everywhere, here : changes of all asperities, and only of those that could touch (candidates)
-    modulus : dlog E*
+    geometry : the geometry of the candidates
+    modulus  : dlog E*
     """
 
-    geometry: Geometry
     everywhere: Bending
     here: Bending
+    geometry: Geometry
     modulus: float
 
     @classmethod
@@ -238,29 +228,27 @@ class _Bent:
             sphere_radius(scene.sphere_radius, "sphere_radius")
         moved, sphere = _moved(direction.positions, n), Ball.exact(direction.sphere_radius)
         modulus = Ball.exact(direction.contact_modulus) / scene.material.contact_modulus
-        every = Geometry(
-            problem,
-            Ball.exact(scene.asperities.positions),
-            Ball.exact(scene.asperities.tip_radii),
-            curvatures(scene),
-        )
+        every = Geometry.of(problem, np.arange(n))
         bent = every.bent(Ball.exact(heights), Ball.exact(tips), Ball.exact(moved), sphere)
         bent = bent._replace(local=bent.local - modulus * 2.0 / 3.0)
-        here = Bending(*(each[problem.candidates] for each in bent))
-        return cls(Geometry.of(problem), bent, here, float(modulus.value))
+        which = problem.candidates
+        here = Bending(*(each[which] for each in bent))
+        return cls(bent, here, Geometry.of(problem, which), float(modulus.value))
 
-    def of_level(self, level: Level, total: Ball) -> _Moved:
-        """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total."""
+    def of_level(self, level: Level, total: Ball) -> tuple[Response, Ball]:
+        """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total.
+
+        With it the changes (n,) of gaps where open, dA P + A dP - dd - dD0.
+        """
         problem = level.problem
         raised = self.here.offsets / problem.units.length - self._felt(level)
         right = raised - level.indentation.positive_part() * self.here.local
-        loads, approach = level.response(right, total)
-        return _Moved(loads, approach + raised - product(level, loads), approach, total)
+        moved = level.response(right, total)
+        return moved, product(level, moved.loads) - raised - moved.approach
 
     def _felt(self, level: Level) -> Ball:
         """(n,) dA P, the change of A P that is due to the change of A."""
-        coupled = level.approach + level.problem.exact.offsets - level.indentation
-        change, points = coupled * -self.modulus, self.here.points
+        change, points = Part(level).coupled * -self.modulus, self.here.points
         if points.value.any():
             every, P = np.arange(len(level.problem)), level.loads
             carried = [P, points[:, 0] * P, points[:, 1] * P]

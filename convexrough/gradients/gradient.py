@@ -1,28 +1,27 @@
 """`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
 
 The number is a weighted sum of energies V, approaches D0, loads and indentations at some levels.
-A level is the normal solution at one total load (`gradients.pulled`). These total loads depend on
+A level is the normal solution at one total load (`gradients.parts`). These total loads depend on
 the prescribed loads and shear forces, and on the coefficient of friction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arithmetic.balls import Ball, of_rows
+from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
-from convexrough.gradients.scene import Derivatives
+from convexrough.gradients.parts import ZERO, Moves, Part
+from convexrough.gradients.scene import Bending, Geometry
 from convexrough.normal.level import Level, Levels
-from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.base import named
@@ -30,71 +29,153 @@ from convexrough.sphere.smooth import smooth_reference
 
 Holding = Literal["load", "approach"]
 
-#: Parameters that only some gradients have: single numbers, and arrays.
+#: Single numbers by which only some gradients have a derivative.
 WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
-SEVERAL = ("loads", "forces")
 
 
-class Number(NamedTuple):
-    """A number J that depends on a contact, with derivatives at constant forces and load.
+@dataclass(frozen=True)
+class Number:
+    """A number J that depends on a contact, with its derivatives at constant forces and load.
 
-    value    : J
-    scaled   : the part of J that consists of energies and loads. If the modulus and all loads are
-        multiplied by a number, this part is multiplied by the same number
-    pulled   : for each level, the derivatives of its part of J by the load, and by offsets, Hertz's
-        coefficients and compliances of the asperities that could touch
-    slopes   : derivatives of J by parameters outside the scene's geometry, by name
-    steep    : for each such name, the factor of dD0/dL at the load 0, where dD0/dL is infinite
-    sides    : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
+    top    : the level of the contact; its problem has n asperities that could touch (candidates)
+    value  : J
+    parts  : the parts of J that come from levels
+    slopes : derivatives of J by parameters outside the scene's geometry, by name
+    steep  : for each infinite derivative of this kind, a number of the same sign
+    sides  : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
     """
 
     contact: Contact
-    problem: NormalProblem
     top: Level
     value: Ball
-    scaled: Ball
-    pulled: Sequence[Pulled]
+    parts: Sequence[Part]
     slopes: Mapping[str, Ball]
-    steep: Mapping[str, Ball]
-    sides: Mapping[str, Array] = {}
+    steep: Mapping[str, float]
+    sides: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, contact: Contact, top: Level, parts: Sequence[Part], explicit: Moves) -> Number:
-        """The number that is the sum of these parts.
+    def of(
+        cls,
+        contact: Contact,
+        top: Level,
+        value: Ball,
+        parts: Sequence[Part],
+        explicit: Moves,
+        sides: Mapping[str, Array] | None = None,
+    ) -> Number:
+        """The number with these parts.
 
         explicit : derivatives by parameters at fixed levels
         """
-        pulled, slopes = [Pulled.of(part) for part in parts], dict(explicit)
-        steep: dict[str, Ball] = {}
-        for part, each in zip(parts, pulled, strict=True):
+        slopes, steep = dict(explicit), dict[str, float]()
+        for part in parts:
             for name, rate in part.moves.items():
-                slopes[name] = slopes.get(name, ZERO) + each.load * rate
-                if each.steep.size > 0.0:
-                    steep[name] = steep.get(name, ZERO) + each.steep * rate
-        value = value_of(parts)
-        scaled = value - sum((part.length for part in parts), start=ZERO)
-        return cls(contact, top.problem, top, value, scaled, pulled, slopes, steep)
+                slopes[name] = slopes.get(name, ZERO) + part.slopes.load * rate
+                if part.level.trial is None and part.weight.size > 0.0:
+                    steep[name] = float((part.weight * rate).value)
+        return cls(contact, top, value, parts, slopes, steep, sides or {})
 
     def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
         """The number times a factor; `slopes` are derivatives of the factor, times the number."""
-        names = {*self.slopes, *slopes}
-        pulled = [each.times(factor) for each in self.pulled]
-        both = {
-            name: self.slopes.get(name, ZERO) * factor + slopes.get(name, ZERO) for name in names
-        }
-        value, scaled = self.value * factor, self.scaled * factor
-        return self._replace(value=value, scaled=scaled, pulled=pulled, slopes=both)
+        both = {name: slope * factor for name, slope in self.slopes.items()}
+        for name, slope in slopes.items():
+            both[name] = both.get(name, ZERO) + slope
+        parts = [part.times(factor) for part in self.parts]
+        return replace(self, value=self.value * factor, parts=parts, slopes=both)
 
     def holding_the_approach(self) -> Number:
         """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P.
 
         The bar names what is constant: the approach D0 or the load P. S is dD0/dP.
         """
-        slopes, units = dict(self.slopes), self.problem.units
+        slopes, units = dict(self.slopes), self.top.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
-        follows = Pulled.of(Part(self.top, approach=-by_approach))
-        return self._replace(pulled=[*self.pulled, follows], slopes=slopes)
+        return replace(
+            self, parts=[*self.parts, Part(self.top, approach=-by_approach)], slopes=slopes
+        )
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        return Geometry.of(self.top.problem, self.top.problem.candidates)
+
+    @cached_property
+    def offsets(self) -> Ball:
+        """(n,) derivatives by the offsets d."""
+        zero = Ball.exact(np.zeros(len(self.top.problem)))
+        return (
+            sum((part.slopes.offsets for part in self.parts), start=zero)
+            / self.top.problem.units.length
+        )
+
+    @cached_property
+    def local(self) -> Ball:
+        """(n,) derivatives by log k."""
+        zero = Ball.exact(np.zeros(len(self.top.problem)))
+        return sum((part.slopes.local for part in self.parts), start=zero)
+
+    @cached_property
+    def coupled(self) -> Ball:
+        """The sum of  left'A P  over all levels: minus the derivative by log E* at constant k."""
+        return sum((part.slopes.left.dot(part.coupled) for part in self.parts), start=ZERO)
+
+    @cached_property
+    def turning(self) -> Ball:
+        """(n, 2) derivatives by the contact points c, which change A."""
+        n, turned = len(self.offsets), [(part.slopes.left, part.level.loads) for part in self.parts]
+        carrying = np.zeros(n, dtype=bool)
+        for left, loads in turned:
+            carrying |= (left.size > 0) | (loads.size > 0)
+        which = np.flatnonzero(carrying)
+        total = Ball.exact(np.zeros((len(which), 2)))
+        turned = [(left[which], loads[which]) for left, loads in turned if left.size.any()]
+        slopes = iter(self.geometry.slopes([each for pair in turned for each in pair], which))
+        for left, loads in turned:
+            total = total + loads[:, None] * next(slopes) + left[:, None] * next(slopes)
+        everywhere: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
+        return everywhere
+
+    @cached_property
+    def positions(self) -> Ball:
+        """(n, 2) derivatives by the positions of the summits."""
+        geometry = self.geometry
+        sinking = self.offsets[:, None] * geometry.bend * geometry.points
+        return self.turning * geometry.share - sinking
+
+    def along(self, by: Bending) -> Ball:
+        """(n,) for each asperity, the derivative along the change `by` of its geometry."""
+        found = self.offsets * by.offsets + self.local * by.local
+        return found + (self.turning * by.points).sum() if self.geometry.closest else found
+
+    @property
+    def whole(self) -> dict[str, Ball]:
+        """The number and its derivatives by single numbers, by name."""
+        scene, slopes = self.contact.scene, self.slopes
+        modulus = (self.local.sum() * -2.0 / 3.0 - self.coupled) / scene.material.contact_modulus
+        found = {"value": self.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
+        found |= {name: slopes[name] for name in WHOLE if name in slopes}
+        found["contact_modulus"] = modulus + slopes.get("contact_modulus", ZERO)
+        if named(scene.sphere_radius) == "a sphere":
+            sphere = self.along(self.geometry.by_radius).sum()
+            found["sphere_radius"] = sphere + slopes.get("sphere_radius", ZERO)
+        return found
+
+    @property
+    def balance_defect(self) -> float:
+        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = the part of J that scales.
+
+        If the modulus and all loads are multiplied by a number, so are energies and loads in J.
+        """
+        bent = self.local.sum() * -2.0 / 3.0
+        terms = [bent, -self.coupled, *(part.slopes.load * part.level.load for part in self.parts)]
+        terms += [-sum((part.scaled for part in self.parts), start=ZERO)]
+        defect = float(sum(terms, start=ZERO).value)
+        size = max(float(np.abs(term.value)) for term in terms)
+        return abs(defect) / size if size > 0 else 0.0
+
+    def in_scene(self, values: Array) -> Array:
+        """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
+        return frozen(self.top.problem.to_scene(values))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,8 +236,8 @@ class Gradient(Table, Plottable):
     poisson_ratio: float
     poisson_ratio_error: float
     balance_defect: float
-    number: Number
-    derivatives: Derivatives
+    number: Number = field(repr=False)
+    shown: Number = field(repr=False)
     sphere_radius: float | None = None
     sphere_radius_error: float | None = None
     load: float | None = None
@@ -182,47 +263,37 @@ class Gradient(Table, Plottable):
     def of(cls, number: Number, holding: Holding) -> Gradient:
         """The gradient of a number, in the scene's units."""
         shown = number.holding_the_approach() if holding == "approach" else number
-        slopes = shown.slopes
-        found = Derivatives.of(shown.problem, shown.pulled)
-        numbers = {"value": number.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
-        numbers |= {name: slopes[name] for name in WHOLE if name in slopes}
-        modulus = found.contact_modulus + slopes.get("contact_modulus", ZERO)
-        numbers["contact_modulus"] = modulus
-        if (sphere := found.sphere_radius) is not None:
-            numbers["sphere_radius"] = sphere + slopes.get("sphere_radius", ZERO)
-        named: dict[str, Any] = {}
-        for name, ball in numbers.items():
-            named[name], named[f"{name}_error"] = float(ball.value), float(ball.error)
-        for name, ball in shown.steep.items():
-            named[name], named[f"{name}_error"] = float(np.copysign(np.inf, ball.value)), 0.0
-        for name in SEVERAL:
-            if name in slopes:
-                one = name.removesuffix("s")
-                named[name] = frozen(slopes[name].value.copy())
-                named[f"{one}_errors"] = frozen(slopes[name].error.copy())
-                named[f"{one}_sides"] = frozen(shown.sides[name])
-
-        tips, in_scene = found.tip_radii, found.in_scene
+        found: dict[str, Any] = {}
+        for name, ball in shown.whole.items():
+            found[name], found[f"{name}_error"] = float(ball.value), float(ball.error)
+        for name, steep in shown.steep.items():
+            found[name], found[f"{name}_error"] = float(np.copysign(np.inf, steep)), 0.0
+        for name, sides in shown.sides.items():
+            one, slopes = name.removesuffix("s"), shown.slopes[name]
+            found[name] = frozen(slopes.value.copy())
+            found[f"{one}_errors"] = frozen(slopes.error.copy())
+            found[f"{one}_sides"] = frozen(sides)
+        tips = shown.along(shown.geometry.by_tip)
         return cls(
             contact=shown.contact,
             holding=holding,
-            heights=in_scene(found.offsets.value),
-            height_errors=in_scene(found.offsets.error),
-            tip_radii=in_scene(tips.value),
-            tip_radius_errors=in_scene(tips.error),
-            balance_defect=_balance_defect(shown, found),
+            heights=shown.in_scene(shown.offsets.value),
+            height_errors=shown.in_scene(shown.offsets.error),
+            tip_radii=shown.in_scene(tips.value),
+            tip_radius_errors=shown.in_scene(tips.error),
+            balance_defect=shown.balance_defect,
             number=number,
-            derivatives=found,
-            **named,
+            shown=shown,
+            **found,
         )
 
     @cached_property
     def positions(self) -> Array:
-        return self.derivatives.in_scene(self.derivatives.positions.value)
+        return self.shown.in_scene(self.shown.positions.value)
 
     @cached_property
     def position_errors(self) -> Array:
-        return self.derivatives.in_scene(self.derivatives.positions.error)
+        return self.shown.in_scene(self.shown.positions.error)
 
     @cached_property
     def normalised(self) -> Gradient:
@@ -240,13 +311,9 @@ class Gradient(Table, Plottable):
         if reference is None:
             expected = "a sphere or an ellipsoid"
             raise InputError("normalised", found=named(scene.sphere_radius), expected=expected)
-        R = Ball.exact(scene.mean_radius)
-        E = Ball.exact(scene.material.contact_modulus)
-        nu, f = (
-            Ball.exact(scene.material.poisson_ratio),
-            Ball.exact(checks.friction(scene.friction)),
-        )
-        P = number.top.load * number.problem.units.force
+        E, nu = map(Ball.exact, (scene.material.contact_modulus, scene.material.poisson_ratio))
+        R, f = map(Ball.exact, (scene.mean_radius, checks.friction(scene.friction)))
+        P = number.top.load * number.top.problem.units.force
         radius = (P * R * 0.75 / E).cbrt()  # a_H
         factor = (1.0 - nu) * E * radius * 5.0 / ((2.0 - nu) * f * f * P * P * 9.0)  # 1 / W0
         if named(scene.sphere_radius) != "a sphere":  # W0 of an ellipsoid is a float64 number
@@ -263,18 +330,8 @@ class Gradient(Table, Plottable):
         return Gradient.of(number.times(factor, slopes), self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """The printed rows, without internal data and parameters that are None."""
-        hidden = ("number", "derivatives")
-        return (row for row in super()._rows() if row[0] not in hidden and row[1] != "None")
-
-
-def _balance_defect(number: Number, found: Derivatives) -> float:
-    """Relative error in the identity  E* dJ/dE* + sum over levels of L dJ/dL = `number.scaled`."""
-    bent, by_coupling = found.local.sum() * -2.0 / 3.0, -found.coupled
-    terms = [bent, by_coupling, -number.scaled, *(each.load * each.total for each in number.pulled)]
-    defect = float(sum(terms, start=ZERO).value)
-    size = max(float(np.abs(term.value)) for term in terms)
-    return abs(defect) / size if size > 0 else 0.0
+        """The printed rows, without parameters that are None."""
+        return (row for row in super()._rows() if row[1] != "None")
 
 
 def control_held(contact: Contact, holding: Holding | None) -> Holding:

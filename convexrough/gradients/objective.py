@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,10 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
-from convexrough.errors import InputError
+from convexrough.errors import ExtraError, InputError
 from convexrough.friction.cycle import cycle
 from convexrough.friction.shear import shear
-from convexrough.gradients.gradient import Gradient
+from convexrough.gradients.gradient import Gradient, Holding
 from convexrough.influence import Kind
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
@@ -28,6 +29,7 @@ NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load":
 #: The possible parameters: of asperities, of the scene, of the material, and prescribed quantities.
 EACH, WHOLE = ("heights", "tip_radii", "positions"), ("sphere_radius", "friction")
 ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach", "force")
+PARAMETERS = (*EACH, *WHOLE, *ELASTIC, *PRESCRIBED)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -83,20 +85,14 @@ class Objective(Record):
         object.__setattr__(self, "by", by)
         if "sphere_radius" in by:
             sphere_radius(self.scene.sphere_radius, "by sphere_radius")
-        able = self._able()
+        absent = [name for name in PRESCRIBED if getattr(self, name) is None]
+        if needed != "force" and self.scene.friction is None:
+            absent.append("friction")
+        able = [name for name in PARAMETERS if name not in absent]
         for name in by:
             if name not in able:
                 expected = f"some of: {', '.join(able)}"
                 raise InputError("by", found=repr(name), expected=expected)
-
-    def _able(self) -> list[str]:
-        """The parameters on which the result depends."""
-        known = [*EACH, *WHOLE, *ELASTIC, *PRESCRIBED]
-        if NUMBERS[self.of] != "force":
-            known.remove("force")
-            if self.scene.friction is None:
-                known.remove("friction")
-        return [name for name in known if getattr(self, name, 0.0) is not None]
 
     def _listed(self) -> tuple[str, ...]:
         """The names in `by`, after a check that none is repeated."""
@@ -128,88 +124,134 @@ class Objective(Record):
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
         """The `Gradient` of the result at these parameters (m,), by all parameters of the scene."""
-        given = dict(self._split(parameters))
-        scene, control = self._scene(given), {}
-        for name in PRESCRIBED:
-            value = given.get(name, getattr(self, name))
-            control[name] = None if value is None else float(value)
-        contact = press(
-            scene, load=control["load"], approach=control["approach"], influence=self.influence
+        own = [np.asarray(self._own(name)) for name in self.by]
+        ends = np.cumsum([each.size for each in own])
+        vector = checks.array("parameters", parameters)
+        if len(vector) != ends[-1]:
+            expected = f"{ends[-1]}: {', '.join(self.by)}"
+            raise InputError("parameters", found=f"{len(vector)} numbers", expected=expected)
+        parts = zip(np.split(vector, ends[:-1]), own, strict=True)
+        shaped = [part.reshape(each.shape) for part, each in parts]
+        given = dict(zip(self.by, shaped, strict=True))
+        load, approach, force = (
+            None if (value := given.get(name, getattr(self, name))) is None else float(value)
+            for name in PRESCRIBED
         )
-        force = control["force"]
-        if self.of == "loss":
-            return _loss(contact, force)
-        if self.of == "displacement":
-            return shear(contact, force=force).gradient(displacement=1.0)
-        if self.of == "approach":
-            return contact.gradient(approach=1.0)
-        return contact.gradient(load=1.0)
+        contact = press(self._scene(given), load=load, approach=approach, influence=self.influence)
+        if self.of == "loss" and force is not None:
+            checks.non_negative("force", force)
+        try:
+            return gradient_of(contact, self.of, force)
+        except InputError as error:
+            if not error.what.startswith("maximum"):
+                raise
+            raise InputError("force", found=error.found, expected=error.expected) from None
 
     def to_jax(self) -> Callable[[Any], Any]:
-        """The result as a function for jax. Raises ExtraError if jax is not installed."""
-        from convexrough.gradients.with_jax import differentiable
+        """The result as a function for jax.grad, jax.jit and jax.vmap, without second derivatives.
 
-        return differentiable(self)
+        The result is computed outside of jax in float64. Without the option `jax_enable_x64` it is
+        rounded to float32. Raises ExtraError if jax is not installed.
+        """
+        try:
+            import jax
+        except ImportError as error:
+            raise ExtraError("jax") from error
+
+        def outside(x: Any) -> tuple[Any, Any]:
+            value, slopes = self(np.asarray(x, dtype=np.float64))
+            return np.asarray(value, dtype=x.dtype), np.asarray(slopes, dtype=x.dtype)
+
+        def called(x: Any) -> Any:
+            x = jax.numpy.asarray(x, dtype=float)
+            shapes = jax.ShapeDtypeStruct((), x.dtype), jax.ShapeDtypeStruct(x.shape, x.dtype)
+            return jax.pure_callback(outside, shapes, x, vmap_method="sequential")
+
+        number: Any = jax.custom_vjp(lambda x: called(x)[0])
+        number.defvjp(called, lambda slopes, weight: (weight * slopes,))
+        found: Callable[[Any], Any] = number
+        return found
 
     def to_torch(self) -> Callable[[Any], Any]:
-        """The result as a function for torch. Raises ExtraError if torch is not installed."""
-        from convexrough.gradients.with_torch import differentiable
+        """The result as a function for torch that supports `backward`, without second derivatives.
 
-        return differentiable(self)
+        The result is computed in float64 on the CPU. Raises ExtraError if torch is not installed.
+        """
+        try:
+            import torch
+        except ImportError as error:
+            raise ExtraError("torch") from error
+        both = self
+
+        class Number(torch.autograd.Function):  # type: ignore[misc, name-defined, unused-ignore]
+            @staticmethod
+            def forward(ctx: Any, x: Any) -> Any:
+                value, slopes = both(x.detach().cpu().numpy().astype(np.float64))
+                at = torch.as_tensor(slopes.copy(), dtype=x.dtype, device=x.device)
+                ctx.save_for_backward(at)
+                return x.new_tensor(value)
+
+            @staticmethod
+            @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator, unused-ignore]
+            def backward(ctx: Any, weight: Any) -> Any:
+                return weight * ctx.saved_tensors[0]
+
+        found: Callable[[Any], Any] = Number.apply
+        return found
 
     def to_autograd(self) -> Callable[[Any], Any]:
-        """The result as a function for autograd. Raises ExtraError if it is not installed."""
-        from convexrough.gradients.with_autograd import differentiable
+        """The result as a function for `autograd.grad` (numpy), without second derivatives.
 
-        return differentiable(self)
+        Raises ExtraError if autograd is not installed.
+        """
+        try:
+            from autograd.extend import defvjp, primitive
+        except ImportError as error:
+            raise ExtraError("autograd") from error
+
+        @lru_cache(maxsize=1)  # the backward pass asks for the gradient at the last point
+        def at(point: bytes) -> tuple[float, Array]:
+            return self(np.frombuffer(point))
+
+        def both(x: Any) -> tuple[float, Array]:
+            return at(np.asarray(x, dtype=np.float64).tobytes())
+
+        found: Callable[[Any], Any] = primitive(lambda x: both(x)[0])
+        defvjp(found, lambda value, x: lambda weight: weight * both(x)[1])
+        return found
 
     def _own(self, name: str) -> Any:
         """The value of a parameter in the given scene, or the prescribed quantity."""
-        if name in EACH:
-            return getattr(self.scene.asperities, name)
-        if name in ELASTIC:
-            return getattr(self.scene.material, name)
         if name == "friction":
             return checks.friction(self.scene.friction)
-        return getattr(self if name in PRESCRIBED else self.scene, name)
-
-    def _split(self, parameters: ArrayLike) -> Iterator[tuple[str, Array]]:
-        vector, done, m = checks.array("parameters", parameters), 0, len(self.start)
-        if len(vector) != m:
-            expected = f"{m}: {', '.join(self.by)}"
-            raise InputError("parameters", found=f"{len(vector)} numbers", expected=expected)
-        for name in self.by:
-            shape = np.shape(self._own(name))
-            size = int(np.prod(shape))
-            yield name, vector[done : done + size].reshape(shape)
-            done += size
+        owner: Any = self if name in PRESCRIBED else self.scene
+        if name in EACH:
+            owner = self.scene.asperities
+        if name in ELASTIC:
+            owner = self.scene.material
+        return getattr(owner, name)
 
     def _scene(self, given: dict[str, Array]) -> Scene:
-        a, material = self.scene.asperities, self.scene.material
-        each = {name: given.get(name, getattr(a, name)) for name in EACH}
-        modulus, ratio = (float(given.get(each, getattr(material, each))) for each in ELASTIC)
-        scene = replace(
-            self.scene,
-            asperities=Asperities(**each),
-            material=replace(material, contact_modulus=modulus, poisson_ratio=ratio),
-        )
-        if "sphere_radius" in given:
-            scene = replace(scene, sphere_radius=float(given["sphere_radius"]))
-        if "friction" in given:
-            scene = replace(scene, friction=float(given["friction"]))
-        return scene
+        """The scene with these parameters instead of its own."""
+        scene = self.scene
+        each = {name: given.get(name, getattr(scene.asperities, name)) for name in EACH}
+        elastic = {name: float(given[name]) for name in ELASTIC if name in given}
+        whole: dict[str, Any] = {name: float(given[name]) for name in WHOLE if name in given}
+        material = replace(scene.material, **elastic)
+        return replace(scene, asperities=Asperities(**each), material=material, **whole)
 
 
-def _loss(contact: Contact, force: float | None) -> Gradient:
-    """The gradient of the loss of the cycle between -force and force; InputErrors name `force`."""
-    if force is not None:
-        checks.non_negative("force", force)
-    try:
-        return cycle(contact, maximum=force).gradient()
-    except InputError as error:
-        if not error.what.startswith("maximum"):
-            raise
-        raise InputError("force", found=error.found, expected=error.expected) from None
+def gradient_of(
+    contact: Contact, of: str, force: float | None, holding: Holding | None = None
+) -> Gradient:
+    """The gradient of a result of `NUMBERS`, of the cycle between -force and force for a loss."""
+    if of == "loss":
+        return cycle(contact, maximum=force).gradient(holding=holding)
+    if of == "displacement":
+        return shear(contact, force=force).gradient(displacement=1.0, holding=holding)
+    if of == "approach":
+        return contact.gradient(approach=1.0, holding=holding)
+    return contact.gradient(load=1.0, holding=holding)
 
 
 def _slope(gradient: Gradient, name: str) -> Any:

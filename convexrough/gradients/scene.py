@@ -1,7 +1,6 @@
-"""Derivatives by the parameters of a scene, as balls.
+"""How offsets d, coefficients k of Hertz's law and the compliance matrix A depend on a scene.
 
-They follow from the derivatives by offsets d, coefficients k and the compliance matrix A,
-dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, with the loads P, and from
+Derivatives, as balls, follow from
 
     d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
     A_ij = 1 / (pi E* |c_i - c_j|).
@@ -16,19 +15,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arrays import Array, Indices, among_zeros, frozen
-from convexrough.gradients.pulled import ZERO, Pulled
+from convexrough.arrays import Indices
 from convexrough.influence import Influence
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.scene.base import along, named
-from convexrough.scene.scene import Scene
+from convexrough.scene.base import along
 
 #: Largest number of loaded asperities for which sums over pairs are computed with balls.
 PAIRWISE = 1000
@@ -47,7 +44,7 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Geometry:
-    """The geometry of the n asperities that could touch, in the scene's units, as balls.
+    """The geometry of n asperities, in the scene's units, as balls.
 
     points, contact_points : (n, 2) r and c
     tips      : (n,) rho
@@ -63,14 +60,17 @@ class Geometry:
     curvature: Ball
 
     @classmethod
-    def of(cls, problem: NormalProblem) -> Geometry:
-        scene, which = problem.scene, problem.candidates
-        asperities = scene.asperities
+    def of(cls, problem: NormalProblem, which: Indices) -> Geometry:
+        """The geometry of the asperities `which` of the scene."""
+        asperities = problem.scene.asperities
+        radii = np.array(along(problem.scene.sphere_radius))
+        bent = np.isfinite(radii)
+        flat = Ball.exact(np.zeros(2))
         return cls(
             problem,
             Ball.exact(asperities.positions[which]),
             Ball.exact(asperities.tip_radii[which]),
-            curvatures(scene),
+            where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), flat),
         )
 
     @property
@@ -159,87 +159,3 @@ class Geometry:
                 sums = (x * P[None, :]).sum(), (y * P[None, :]).sum()
                 kept.append(of_rows(lambda *each: np.stack(each, axis=-1), *sums))
         return [joined(each) for each in found]
-
-
-@dataclass(frozen=True)
-class Derivatives:
-    """Derivatives of one number by the parameters of the n candidates, in the scene's units.
-
-    offsets : (n,) derivatives by d
-    local   : (n,) derivatives by log k
-    pulled  : the derivatives of the part of the number that each level contributes
-    """
-
-    geometry: Geometry
-    offsets: Ball
-    local: Ball
-    pulled: tuple[Pulled, ...]
-
-    @classmethod
-    def of(cls, problem: NormalProblem, pulled: Sequence[Pulled]) -> Derivatives:
-        zero = Ball.exact(np.zeros(len(problem)))
-        offsets = sum((each.offsets for each in pulled), start=zero) / problem.units.length
-        local = sum((each.local for each in pulled), start=zero)
-        return cls(Geometry.of(problem), offsets, local, tuple(pulled))
-
-    def in_scene(self, values: Array) -> Array:
-        """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
-        problem = self.geometry.problem
-        return frozen(among_zeros(values, problem.candidates, len(problem.scene)))
-
-    @cached_property
-    def turning(self) -> Ball:
-        """(n, 2) derivatives by the contact points c, which change A."""
-        geometry, n = self.geometry, len(self.offsets)
-        carrying = np.zeros(n, dtype=bool)
-        for each in self.pulled:
-            carrying |= (each.left.size > 0) | (each.loads.size > 0)
-        which = np.flatnonzero(carrying)
-        total = Ball.exact(np.zeros((len(which), 2)))
-        turned = [(each.left[which], each.loads[which]) for each in self.pulled]
-        turned = [pair for pair in turned if pair[0].size.any()]
-        slopes = iter(geometry.slopes([each for pair in turned for each in pair], which))
-        for left, loads in turned:
-            total = total + loads[:, None] * next(slopes) + left[:, None] * next(slopes)
-        everywhere: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
-        return everywhere
-
-    @cached_property
-    def coupled(self) -> Ball:
-        """The sum of  left'A P  over all levels, with `left` from the `Pulled` of each level."""
-        return sum((each.left.dot(each.coupled) for each in self.pulled), start=ZERO)
-
-    @cached_property
-    def positions(self) -> Ball:
-        """(n, 2) derivatives by the positions of the summits."""
-        geometry = self.geometry
-        sinking = self.offsets[:, None] * geometry.bend * geometry.points
-        return self.turning * geometry.share - sinking
-
-    def along(self, by: Bending) -> Ball:
-        """(n,) for each asperity, the derivative along the change `by` of its geometry."""
-        found = self.offsets * by.offsets + self.local * by.local
-        return found + (self.turning * by.points).sum() if self.geometry.closest else found
-
-    @property
-    def tip_radii(self) -> Ball:
-        return self.along(self.geometry.by_tip)
-
-    @property
-    def sphere_radius(self) -> Ball | None:
-        """The derivative by the radius of the sphere; None for other shapes."""
-        if named(self.geometry.problem.scene.sphere_radius) != "a sphere":
-            return None
-        return self.along(self.geometry.by_radius).sum()
-
-    @property
-    def contact_modulus(self) -> Ball:
-        modulus = self.geometry.problem.scene.material.contact_modulus
-        return (self.local.sum() * -2.0 / 3.0 - self.coupled) / modulus
-
-
-def curvatures(scene: Scene) -> Ball:
-    """(2,) [1 / length] curvatures of the base along x and y."""
-    radii = np.array(along(scene.sphere_radius))
-    bent = np.isfinite(radii)
-    return where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), Ball.exact(np.zeros(2)))

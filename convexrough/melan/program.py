@@ -26,8 +26,7 @@ from convexrough.errors import SolverError
 from convexrough.friction.order import Order
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
-from convexrough.vector_shear.loaded import Loaded
-from convexrough.vector_shear.problem import VectorProblem
+from convexrough.vector_shear.problem import FrictionProblem
 
 #: The solver's tolerance, and the fraction by which residual forces are moved into the cones.
 TOLERANCE, MARGIN = 1e-10, 1e-9
@@ -54,7 +53,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
 
     mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
     """
-    known = VectorProblem.of(contact)
+    known = contact.cached(FrictionProblem)
     unit, n, m = known.units.force, len(known), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)
     shares, share_errors = elastic_shares(known)
@@ -82,7 +81,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
     )
 
 
-def elastic_shares(problem: VectorProblem) -> tuple[Array, Array]:
+def elastic_shares(problem: FrictionProblem) -> tuple[Array, Array]:
     """(n, 2, 2) the shares Y, and (n, 2) bounds on |error of Y| for total forces along x and y.
 
     The bounds are infinite without a proof. docs/theory/shakedown.md, "Elastic shares".
@@ -100,7 +99,7 @@ def elastic_shares(problem: VectorProblem) -> tuple[Array, Array]:
     return shares, np.stack(errors, axis=1)
 
 
-def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
+def _errors(problem: FrictionProblem, shares: Array, total: Array) -> Array:
     """(n,) bounds on the errors of shares (n, 2) of one total force (2,), from their residual."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
@@ -151,7 +150,9 @@ def _inwards(limits: Array, state: Array, mean: Array) -> Array:
     return np.asarray(state + MARGIN * (parts * mean - state))
 
 
-def _lower(known: Loaded, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
+def _lower(
+    known: FrictionProblem, rest: Array, mean: Array, elastic: Array, errors: Array
+) -> float:
     """A lower bound on the largest lambda that the residual forces `rest` allow, or 0.
 
     elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
@@ -197,7 +198,9 @@ def _closed(slips: Array) -> Array:
     return np.asarray(slips)
 
 
-def _upper(known: Loaded, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
+def _upper(
+    known: FrictionProblem, slips: Array, mean: Array, elastic: Array, errors: Array
+) -> float:
     """The upper bound (3) on lambda from these slips; infinite if their work may be 0 or less.
 
     elastic, errors : as for `_lower`

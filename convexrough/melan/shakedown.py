@@ -28,7 +28,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
-from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import FrictionProblem
 
 Theory = Literal["exact", "elastic", "vector"]
 
@@ -244,7 +244,7 @@ def _elastic(contact: Contact, t0: float, t: Array) -> Limit:
     t0, t : the mean shear force and its (m,) amplitudes, divided by f. The elastic shares q are the
     derivatives of the normal loads by the total load.
     """
-    problem, high, low = Loaded.of(contact), float(t.max()), float(t.min())
+    problem, high, low = contact.cached(FrictionProblem), float(t.max()), float(t.min())
     unit = problem.units.force
     P, q = problem.levels.top.loads[problem.places], problem.elastic
     each = P / q * (2.0 * unit / (high - low))  # where the range of a shear force is 2 P_i

@@ -1,8 +1,12 @@
-"""The convex programs of a scene: a cone program, its dual, and a quadratic program."""
+"""The convex programs of a scene, as objects and as files in a folder with an index.
+
+The forms are a cone program, its dual, and a quadratic program.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +18,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.atomic import replacing
-from convexrough.errors import InputError, SolverError
+from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
 from convexrough.record import Record
@@ -24,6 +28,7 @@ from convexrough.solvers.bristles import BristleProgram, BristleQP
 from convexrough.solvers.cone_boxes import ConeBoxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
+from convexrough.version import __version__
 
 Form: TypeAlias = Literal["cones", "dual", "bristles"]
 FORMS: tuple[Form, ...] = get_args(Form)
@@ -34,6 +39,14 @@ WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
     "cones": _OF_CONES,
     "dual": _OF_CONES,
     "bristles": {"npz": qpsolvers_npz, "mps": mps},
+}
+
+#: File endings, with the contents and the software that reads them.
+FORMATS = {
+    "cbf": "the cone program and its dual in the Conic Benchmark Format: MOSEK, PICOS, ...",
+    "json": "the same for clarabel.load_from_file",
+    "mps": "the quadratic program of bristles: HiGHS (which has no cones), Gurobi, CPLEX, ...",
+    "npz": "all programs: cones as sparse matrices, bristles for qpsolvers.Problem.load",
 }
 
 
@@ -204,7 +217,10 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     boxes = _boxes(problem, own)
     cones = LiftedProgram.assemble(problem, boxes).apply()
     kind = f"second-order cones, {5 if boxes.five else 4} an asperity"
-    least = _objective(cones, boxes, own)
+    p = own[boxes.members]
+    t = np.cbrt(p / boxes.loads)
+    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
+    least = _value(cones, np.concatenate((p, *powers[0 if boxes.five else 1 :])))
     dual = form == "dual"
     return make(
         what=f"the dual of {kind}" if dual else kind,
@@ -215,6 +231,66 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     )
 
 
+def write_programs(
+    folder: Path,
+    name: str,
+    scene: Scene,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    formats: Collection[str] = tuple(FORMATS),
+    bristles: int = 64,
+) -> tuple[list[Path], dict[str, Any]]:
+    """Write a file NAME.FORM.ENDING for each form and format, and index.json.
+
+    Returned are the paths of all files, and the contents of the index.
+
+    approach, load : [length], [force] the prescribed quantity, exactly one of the two
+    formats        : some of `FORMATS`
+    bristles       : number of bristles per asperity
+
+    A program is left out if the solution is not in the box on which it is exact, or if a file would
+    not fit in memory; the index gives the reason. Raises InputError, with the reason for the last
+    one left out, if no program remains, and FileError if a file cannot be written.
+    """
+    problem, own = solved(scene, approach, load)
+    about: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+    written: list[Path] = []
+    for form in FORMS:
+        endings = [ending for ending in WRITERS[form] if ending in formats]
+        try:
+            program = stated(problem, own, form, bristles) if endings else None
+        except ConvexroughError as error:
+            left_out[form] = str(error)
+            continue
+        for ending in endings:
+            assert program is not None
+            path = folder / f"{name}.{form}.{ending}"
+            try:
+                program.save(path)
+            except InputError as error:
+                left_out[path.name] = str(error)
+                continue
+            written.append(path)
+            about[path.name] = program.about()
+    if not written:
+        last = [*left_out.values()][-1]
+        expected = "a scene with a convex program: a smaller approach or load, or sharper tips"
+        raise InputError("programs", found=last, expected=expected)
+    index = {
+        "schema": 1,
+        "version": __version__,
+        "prescribed": {"approach": approach, "load": load},
+        "asperities": len(scene),
+        "programs": about,
+        "left_out": left_out,
+    }
+    with replacing(path := folder / "index.json") as temporary:
+        temporary.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
+    return [*written, path], index
+
+
 def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
     """Boxes for four cones per asperity if the solution lies in them, else for five."""
     for five in (False, True):
@@ -223,14 +299,6 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
             return boxes
     theta = problem.shells / problem.compliance(own)
     raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
-
-
-def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
-    p = own[boxes.members]
-    t = np.cbrt(p / boxes.loads)
-    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
-    x = np.concatenate((p, *powers[0 if boxes.five else 1 :]))
-    return _value(program, x)
 
 
 def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:

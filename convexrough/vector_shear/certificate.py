@@ -18,7 +18,7 @@ from convexrough.arrays import Array
 from convexrough.convex.theorem import distance
 from convexrough.friction.levels import AT_THE_END
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
-from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along, slopes
 
 #: Number of radii r tried in step 2, and the ratio of each to the one before. Heuristics.
 TRIALS, WIDER = 24, 1.5
@@ -51,7 +51,7 @@ class VectorBounds(NamedTuple):
 
 
 @quietly
-def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
+def certify_vectors(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
     """Bounds on the errors of a state from any source, compared with the exact state.
 
     total : (2,) the total T, as a ball
@@ -66,7 +66,7 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
     return found._replace(excess=_excess(problem, state, total, found.increments))
 
 
-def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
+def _by_convexity(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
     sure, stiffness = problem.sure, problem.stiffness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
@@ -132,21 +132,14 @@ def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
     return exact * (limits / thresholds * (1.0 + left / (1.0 + left.sqrt())) / (1.0 + beyond))
 
 
-def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k."""
-    left = np.maximum(1.0 - share, 0.0)
-    root = np.sqrt(left)
-    return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
-
-
-def _steepest(problem: VectorProblem, size: Array) -> Array:
+def _steepest(problem: FrictionProblem, size: Array) -> Array:
     """(n,) upper bounds on the slopes of q where |eta| is at least `size`."""
     share = np.fmax(size, 0.0) / problem.threshold_balls.upper * (1.0 - ROUNDED)
-    _, across = _slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
+    _, across = slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
     return np.asarray(np.where(problem.sure, across * (1 + SAFETY), 0.0))
 
 
-def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
+def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) -> float:
     """The r of step 2: some vector of at most this length, added to all eta, restores the total.
 
     The result is infinite if no r is found.
@@ -162,7 +155,7 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
     def least_slope(reached: Array) -> float:
         share = (size + reached) / problem.threshold_balls.lower * (1.0 + ROUNDED)
-        radial, across = np.where(problem.sure, _slopes(scale, share), 0.0)
+        radial, across = np.where(problem.sure, slopes(scale, share), 0.0)
         extra = across - radial
         angle = np.minimum(reached / np.maximum(size, 1e-300), 1.0) + ROUNDED
         _, axes = np.linalg.eigh((direction * extra[:, None]).T @ direction)
@@ -184,7 +177,7 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
     return np.inf
 
 
-def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
+def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: Array) -> float:
     """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
 
     It is the sum of e_i |q_i - q*_i|, for |q_i| <= P_i up to rounding. e_i is the distance of
@@ -222,7 +215,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
     )
 
 
-def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
+def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
     """The bounds near gross sliding: docs/theory/vector-friction.md, "Close to gross sliding".
 
     t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`.

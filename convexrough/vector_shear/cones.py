@@ -11,20 +11,17 @@ multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope of 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
-from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
+from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, SECOND_ORDER
 from convexrough.errors import SolverError
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
 from convexrough.vector_shear.certificate import certify_vectors
-from convexrough.vector_shear.problem import VectorProblem, VectorState, along
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 class _Lift(NamedTuple):
@@ -73,9 +70,6 @@ FIVE = _Lift(
     energy=np.array([[0, 0, 3, -5, 3, -3 / 5, 0], [0, 0, -3, 17 / 3, -4, 1, 1 / 3]]),
 )
 
-#: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
-_SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
-
 #: Below this fraction of gross sliding the state is proportional to T to the solver's accuracy, so
 #: the program is solved at this fraction and the result scaled. A heuristic.
 ELASTIC = 1e-9
@@ -106,7 +100,7 @@ class FrictionConic:
     accepted: float = 1e-8
     name: str = field(default="conic", init=False)
 
-    def solve(self, problem: VectorProblem, total: Array) -> VectorState:
+    def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
         """The state under a total (2,), |T| < sum P, in scaled units."""
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
@@ -118,10 +112,8 @@ class FrictionConic:
             known = certify_vectors(problem, state, Ball.exact(total / scale))
             gap, residual = known.excess / energy, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
-                q, displacement, slips = state.increments, state.displacement, state.slips
-                return VectorState(
-                    total, scale * q, scale * displacement, scale * slips, state.iterations
-                )
+                q, X, slips = (scale * each for each in state[1:4])
+                return VectorState(total, q, X, slips, state.iterations)
         raise SolverError(
             f"clarabel stopped after {raw.iterations} steps with {raw.status}, at an energy proved "
             f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
@@ -143,22 +135,21 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     lift   : the cones of an asperity;  small : (n,) epsilon;  energy : the unit of energy
     """
 
-    problem: VectorProblem
+    problem: FrictionProblem
     total: Array
     lift: _Lift
     small: Array
     energy: float
 
     @classmethod
-    def assemble(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
+    def assemble(cls, problem: FrictionProblem, total: Array) -> FrictionProgram:
         """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
-        shares = problem.shift.shares
-        if shares.max() > FIVE_CONES_LIMIT:
+        if problem.share > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
         elastic = np.hypot(*total) * problem.elastic.value / problem.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
         energy = float((problem.loads * problem.thresholds * small**2).max())
-        lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE
+        lift = FOUR if problem.share <= FOUR_CONES_LIMIT else FIVE
         return cls(problem, total, lift, small, energy)
 
     @property
@@ -167,41 +158,37 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
-        rows = self._rows()
-        constant = np.concatenate((self.total / self.force, rows[:, :, 0].ravel()))
-        return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
-
-    def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic part (1/2) q'(B + shift) q with the kernel B, and the local energies."""
+        """The program: (1/2) q'(B + shift) q and the local energies; the total, and the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
-        n, P, S = len(problem), problem.loads, problem.shift.shares[:, None]
-        unit = np.repeat(self.small * P, 2)
+        n, P = len(problem), problem.loads
+        unit, more = np.repeat(self.small * P, 2), (len(lift.orders) - 1) * n
         M = problem.kernel.copy()
-        M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
+        M[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
-        nothing = sparse.csc_matrix(((len(lift.orders) - 1) * n,) * 2)
         counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
-        lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
-        linear = np.concatenate((np.zeros(2 * n), lifted.ravel()))
-        return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
+        lifted = (counted * (lift.energy[0] + problem.share * lift.energy[1]))[:, 1:]
 
-    def _constraints(self, rows: Array) -> csc_matrix:
-        from scipy import sparse
-
-        n, _, variables = rows.shape
+        rows = self._rows()
         vectors = np.zeros((rows.shape[1], 2))
         vectors[[1, 2], [0, 1]] = 1.0
-        coefficients = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        weights = (self.small * self.problem.loads)[None] / self.force
-        balance = sparse.kron(weights, sparse.identity(2))
-        powers = sparse.csc_matrix(sparse.bsr_matrix(coefficients))
-        each = sparse.hstack([sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors)), powers])
-        totals = sparse.hstack([balance, sparse.csc_matrix((2, (variables - 1) * n))])
-        constraints = sparse.csc_matrix(sparse.vstack([totals, -each]))
+        balance = sparse.kron((self.small * P)[None] / self.force, sparse.identity(2))
+        blocks = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
+        forces = sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors))
+        cones = sparse.hstack([forces, sparse.csc_matrix(sparse.bsr_matrix(blocks))])
+        totals = sparse.hstack([balance, sparse.csc_matrix((2, more))])
+        constraints = sparse.csc_matrix(sparse.vstack([totals, -cones]))
         constraints.eliminate_zeros()
-        return constraints
+        return ConeProgram(
+            quadratic=sparse.csc_matrix(
+                sparse.block_diag((upper, sparse.csc_matrix((more, more))))
+            ),
+            linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
+            constraints=constraints,
+            constant=np.concatenate((self.total / self.force, rows[:, :, 0].ravel())),
+            equalities=2,
+        )
 
     def _rows(self) -> Array:
         """(n, rows, k) the rows of all cones, for variables divided by epsilon^order.
@@ -210,9 +197,8 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         """
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
-        powers = np.maximum(lift.orders - leading, 0.0)
-        forms = lift.cones * small[:, :, None, None] ** powers
-        rows = (_SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
+        forms = lift.cones * small[:, :, None, None] ** np.maximum(lift.orders - leading, 0.0)
+        rows = (SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
         friction = np.zeros((len(small), 3, len(lift.orders)))
         friction[:, 0] = lift.share * small ** (lift.orders - 1)
         return np.concatenate((friction, rows), axis=1)
@@ -230,7 +216,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         size = np.hypot(*q.T)
         displacement = -raw.multipliers[:2] * self.energy / self.force
         limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
-        slip = limit - (thresholds - problem.shift.values * P)  # where |q_i| = P_i
+        slip = limit - (thresholds - problem.share * problem.compliance * P)  # where |q_i| = P_i
         left = thresholds - problem.deflections(np.minimum(size, P))
         sliding = slip > left
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
@@ -238,13 +224,13 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return VectorState(self.total, q, displacement, slips, raw.iterations)
 
 
-def _too_dense(problem: VectorProblem) -> SolverError:
+def _too_dense(problem: FrictionProblem) -> SolverError:
     touching, numbers = problem.touching, problem.convexity_numbers
     worst = np.argsort(-numbers)[:5]
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(
         f"too dense for a convex program: the least shift of the tangential kernel is "
-        f"{problem.shift.shares.max():.4g} of the local compliance, and at most 1 is convex. "
+        f"{problem.share:.4g} of the local compliance, and at most 1 is convex. "
         f"Largest convexity numbers, contact radii over (pi/4) times the distance to the nearest "
         f"neighbour, by their indices: {named}",
         solver="friction (conic)",

@@ -23,7 +23,7 @@ from convexrough.arrays import Array
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class FrictionNewton:
     max_iterations: int = 100
     name: str = field(default="newton", init=False)
 
-    def solve(self, problem: VectorProblem, total: Array) -> VectorState:
+    def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
         """The state under a total (2,), |T| < sum P, in scaled units."""
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
@@ -84,7 +84,7 @@ class _Iterate(NamedTuple):
 class _Friction:
     """The equations of vector friction for one total T (2,), in the form of `convex.newton`."""
 
-    problem: VectorProblem
+    problem: FrictionProblem
     total: Array
 
     solver: ClassVar[str] = "friction (newton)"
@@ -130,7 +130,7 @@ class _Friction:
         return advice(self.problem, float(np.hypot(*self.total)))
 
 
-def _direction(problem: VectorProblem, state: _Iterate) -> Array:
+def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
     """The step d(eta); if the matrix is not positive definite, the shift is added to the kernel."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
@@ -143,16 +143,13 @@ def _direction(problem: VectorProblem, state: _Iterate) -> Array:
     pushed = np.einsum("nij,ni->nj", roots, -state.defect)
     turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
     right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
-    for shifted in (False, True):
-        matrix = scaled + np.eye(2 * n)
-        if shifted:
-            share = np.repeat(problem.shift.values, 2)
-            slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
-            matrix[np.diag_indices(2 * n)] += share * slopes
-        factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-        if info == 0:
-            break
-    else:
+    matrix = scaled + np.eye(2 * n)
+    factor, info = dpotrf(matrix.T, lower=1, clean=0)
+    if info != 0:
+        slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
+        matrix[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2) * slopes
+        factor, info = dpotrf(matrix.T, lower=1, clean=0)
+    if info != 0:
         raise SolverError(
             "the shifted matrix is not positive definite",
             solver=_Friction.solver,
@@ -166,19 +163,17 @@ def _direction(problem: VectorProblem, state: _Iterate) -> Array:
     return np.asarray(change - state.defect - moved)
 
 
-def _roots(problem: VectorProblem, eta: Array) -> Array:
+def _roots(problem: FrictionProblem, eta: Array) -> Array:
     """(n, 2, 2) W: unit vectors along and across eta_i times the roots of the slopes of q."""
     size = np.hypot(*eta.T)
-    radial = problem.slopes(size)
-    across = np.where(size > 0, problem.increments(size) / np.where(size > 0, size, 1.0), radial)
+    radial, across = np.sqrt(problem.slopes(eta))
     direction = along(np.ones(len(size)), eta, size)
     direction[size == 0] = (1.0, 0.0)
     x, y = direction.T
-    radial, across = np.sqrt(radial), np.sqrt(across)
     return np.stack((x * radial, -y * across, y * radial, x * across), axis=1).reshape(-1, 2, 2)
 
 
-def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
+def _onto_total(problem: FrictionProblem, eta: Array, total: Array) -> Array | None:
     """eta + s, with the vector s for which forces add up to T; None if it is not found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
@@ -209,10 +204,10 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
     return None
 
 
-def advice(problem: VectorProblem, total: float) -> str:
+def advice(problem: FrictionProblem, total: float) -> str:
     """What the user can try if no state is found at this total."""
     place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
-    number = float((problem.shells * problem.stiffest).max())
+    number = float(problem.convexity_numbers.max())
     if number < 1:
         return f"{place}; try a shear force a little smaller"
     return (

@@ -1,35 +1,46 @@
-"""The friction problem with the full tangential kernel: docs/theory/vector-friction.md.
+"""The friction problem of the loaded asperities: docs/theory/vector-friction.md.
 
 Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
-in units of c_t f^2, with Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). With the compliance
-operator A and bias = nu / (2 - nu) the kernel is, by (1) of that page,
+in units of c_t f^2, with Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An asperity with the load P
+and the shear force u has the deflection own(u) = threshold [1 - (1 - u / P)^(2/3)], and slides
+beyond threshold = k P^(2/3). With the compliance operator A and bias = nu / (2 - nu) the tangential
+kernel is, by (1) of that page,
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
 for the unit vector d from j to i and Poisson's ratio nu. Under the shear force Q, T = Q / f. The
 forces q_i, of size |q_i| <= P_i and sum T, and the slips satisfy, with the rigid displacement X,
 
-    X = own(q_i) + (B q)_i + slip_i,   own(q) = threshold_i [1 - (1 - |q| / P_i)^(2/3)] q / |q|.
+    X = own(q_i) + (B q)_i + slip_i,   own(q) parallel to q.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array
+from convexrough.arithmetic.balls import Ball, where
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.convex.definite import proved_margin
+from convexrough.friction.levels import FrictionLevels
+from convexrough.influence import Influence, couple
+from convexrough.influence.shells import shells
+from convexrough.normal.boxes import Scope
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
-from convexrough.sphere import mindlin
-from convexrough.vector_shear.loaded import Loaded
+from convexrough.sphere import annulus, mindlin
 
 #: Margins of convexity for which a Cholesky factorisation is tried, the largest first.
 MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
+
+#: If the shear force over f is below this fraction of the total load, the state is proportional to
+#: the force to all digits.
+ELASTIC = Fraction(1, 10**15)
 
 
 class VectorState(NamedTuple):
@@ -45,59 +56,125 @@ class VectorState(NamedTuple):
     iterations: int
 
 
-class Shift(NamedTuple):
-    """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
+class FrictionProblem:
+    """n loaded asperities of a contact; use `contact.cached(FrictionProblem)`.
 
-    values : (n,) one entry for both directions of each asperity
-    shares : (n,) S_i = values_i / h_i with the least local compliance h_i; the energy is convex if
-        all S_i <= 1: docs/theory/vector-friction.md, "Convexity"
+    Arrays are (n,), in scaled units. Raises InputError without friction.
+
+    levels   : the normal solutions of the contact
+    scope    : scope of the contact's certificate; "none" without a proof
+    touching, places : indices of the loaded asperities in the scene, and among its candidates
+    loads, errors : P, and bounds on the errors;  most : upper bounds on P
+    thresholds : k P^(2/3)
+    compliance : h_i = (2/3) threshold_i / P_i; the Hessian of the local energy is at least h_i I
+    sure     : True where proved to touch
+    load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
+    stiffness : upper bound on 1 / h_i where sure, 0 elsewhere
+    stray    : bound on the total load of all asperities that are neither sure nor proved open
+    stray_effect : bound on the displacement of any asperity by this load
+    bias     : nu / (2 - nu)
     """
 
-    values: Array
-    shares: Array
-
-
-@dataclass(frozen=True, eq=False)
-class VectorProblem(Loaded):
-    """The loaded asperities of a contact, and their coupling by tangential forces.
-
-    bias   : nu / (2 - nu)
-    kernel : (2n, 2n) B, in the order x_1, y_1, x_2, y_2, ...
-    """
-
-    bias: float
-    kernel: Array
-
-    @classmethod
-    def _assemble(cls, contact: Contact) -> Self:
-        checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
-        loaded = Loaded.of(contact)
-        n = len(loaded)
+    def __init__(self, contact: Contact) -> None:
+        self.levels = levels = contact.cached(FrictionLevels)
+        self.units, self._scene, self._kind = levels.units, contact.scene, contact.influence
+        self.scope: Scope = contact.certificate.scope if levels.proved else "none"
+        level = levels.top
+        self.places = np.flatnonzero(level.loads.value > 0)
+        self.touching: Indices = levels.candidates[self.places]
+        P, k = level.loads[self.places], level.problem.exact.coefficients
+        k = k if len(k) == 1 else k[self.places]
+        thresholds, nothing = k * P.two_thirds(), Ball.exact(np.zeros(len(self.places)))
+        self.loads, self.errors, self.thresholds = P.value, P.error, thresholds.value
+        self.most = (self.loads + self.errors) * (1 + SAFETY)
+        self.compliance: Array = (2.0 / 3.0) * self.thresholds / self.loads
+        self.sure = level.touching[self.places] & P.positive & thresholds.positive
+        self.load_balls = where(self.sure, P, nothing)
+        self.threshold_balls = where(self.sure, thresholds, nothing + 1.0)
+        self.stiffness = np.where(self.sure, (1.5 * P.cbrt() / k).upper, 0.0)
+        left = ~level.open
+        left[self.places[self.sure]] = False
+        self.stray = float(np.maximum(level.loads.upper, 0.0)[left].sum()) * (1 + SAFETY)
+        largest = level.problem.largest_entry * (1 + SAFETY)
+        self.stray_effect = self.stray * largest if self.stray else 0.0
         nu = contact.scene.material.poisson_ratio
-        bias = nu / (2.0 - nu)
-        x, y = contact.scene.contact_points[loaded.touching].T
+        self.bias = nu / (2.0 - nu)
+
+    def __len__(self) -> int:
+        return len(self.loads)
+
+    @cached_property
+    def influence(self) -> Influence:
+        """The operator A."""
+        scale = self.units.force / self.units.length
+        scale /= np.pi * self._scene.material.contact_modulus
+        return couple(self._scene, self.touching, scale, self._kind)
+
+    @cached_property
+    def shells(self) -> Array:
+        """(n,) a diagonal; A + diag(shells) is positive semidefinite."""
+        return shells(self.influence)
+
+    @cached_property
+    def kernel(self) -> Array:
+        """(2n, 2n) B, in the order x_1, y_1, x_2, y_2, ..."""
+        n = len(self)
+        checks.fits_in_memory("loaded asperities", n, 160, power=2)
+        x, y = self._scene.contact_points[self.touching].T
         dx, dy = np.subtract.outer(x, x), np.subtract.outer(y, y)
         squares = dx**2 + dy**2
         squares[np.diag_indices(n)] = 1.0
         kernel = np.empty((n, 2, n, 2))
-        A = loaded.influence.matrix
-        turned = bias * A * (dx - dy) * (dx + dy) / squares  # bias A times the cosine in 2 d d' - I
+        A = self.influence.matrix
+        # bias A times the cosine in 2 d d' - I
+        turned = self.bias * A * (dx - dy) * (dx + dy) / squares
         kernel[:, 0, :, 0], kernel[:, 1, :, 1] = A + turned, A - turned
-        kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = bias * A * 2.0 * dx * dy / squares
-        known = {each.name: getattr(loaded, each.name) for each in fields(Loaded)}
-        return cls(**known, bias=bias, kernel=kernel.reshape(2 * n, 2 * n))
-
-    @property
-    def compliance(self) -> Array:
-        """(n,) h_i = (2/3) threshold_i / P_i; the local Hessian is at least h_i I."""
-        h: Array = (2.0 / 3.0) * self.thresholds / self.loads
-        return h
+        kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = self.bias * A * 2.0 * dx * dy / squares
+        return kernel.reshape(2 * n, 2 * n)
 
     @property
     def convexity_numbers(self) -> Array:
         """(n,) a_i / ((pi/2) s_i), with s_i half the distance to the nearest loaded asperity."""
         numbers: Array = self.shells / self.compliance
         return numbers
+
+    @cached_property
+    def force_unit(self) -> float:
+        """[force] the unit of shear forces."""
+        return float(self.levels.force_unit.value)
+
+    @cached_property
+    def travel_unit(self) -> float:
+        """[length] the unit of tangential displacements."""
+        return float(self.levels.travel_unit.value)
+
+    @property
+    def elastic(self) -> Ball:
+        """(n,) parts of a shear force that the asperities carry if all stick.
+
+        They are the derivatives of the loads with respect to the total load.
+        """
+        return self.levels.top.tangent.loads[self.places]
+
+    def from_rest(self, height: Fraction) -> tuple[Array, Array]:
+        """(n,) u and eta of `shear`, with the scalar kernel, under the shear force T [force]."""
+        if height < ELASTIC * self.levels.load:
+            shares = self.elastic.value * float(height / Fraction(self.units.force))
+            return shares, shares * self.compliance
+        top, low = self.levels.top, self.levels.at(self.levels.load - height)
+        u, eta = top.loads - low.loads, top.indentation - low.indentation
+        return u.value[self.places], eta.value[self.places]
+
+    def deflections(self, increments: Array) -> Array:
+        """(n,) the deflections of these shear forces, 0 <= u <= P."""
+        left = (self.loads - increments) / self.loads
+        x = annulus.width_between(increments / self.loads, left)
+        eta: Array = self.thresholds * annulus.deflection(x)
+        return eta
+
+    def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(N, ...) these values, and 0 for all other asperities of the scene."""
+        return among_zeros(values, self.touching, len(self._scene))
 
     @property
     def product_error(self) -> float:
@@ -110,11 +187,6 @@ class VectorProblem(Loaded):
         product: Array = self.kernel @ increments.reshape(-1)
         return product.reshape(-1, 2)
 
-    def own(self, increments: Array) -> Array:
-        """(n, 2) the deflection of each asperity by its own force, |q_i| <= P_i."""
-        size = self.sizes(increments)
-        return along(self.deflections(size), increments, size)
-
     def sizes(self, increments: Array) -> Array:
         """(n,) |q_i|, or P_i if they differ by rounding only, as deflections are steep near P_i."""
         size, P = np.hypot(*increments.T), self.loads
@@ -122,9 +194,14 @@ class VectorProblem(Loaded):
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) q(eta), the inverse of `own`, parallel to eta; |q_i| = P_i where sliding."""
-        size = np.hypot(*deflections.T)
-        return along(self.increments(size), deflections, size)
+        """(n, 2) the forces q(eta) at these deflections eta; |q_i| = P_i where sliding."""
+        _, across = self.slopes(deflections)
+        return deflections * across[:, None]
+
+    def slopes(self, deflections: Array) -> tuple[Array, Array]:
+        """(n,) the eigenvalues of dq/deta along and across the deflections eta (n, 2)."""
+        sizes = np.hypot(*deflections.T)
+        return slopes(self.loads / self.thresholds, sizes / self.thresholds)
 
     def energy(self, increments: Array, coupling: Array) -> float:
         """The energy of forces q, given their coupling B q."""
@@ -144,7 +221,8 @@ class VectorProblem(Loaded):
         q, slips, P = state.increments, state.slips, self.loads
         size = self.sizes(q)
         slip_size = np.hypot(*slips.T)
-        imbalance = np.hypot(*(state.displacement - self.own(q) - self.couple(q) - slips).T)
+        own = along(self.deflections(size), q, size)
+        imbalance = np.hypot(*(state.displacement - own - self.couple(q) - slips).T)
         across = np.hypot(*(slips - along(slip_size, q, size)).T)
         unused = slip_size * np.maximum(1.0 - size / P, 0.0)
         missing = float(np.hypot(*(q.sum(axis=0) - state.total)))
@@ -157,21 +235,14 @@ class VectorProblem(Loaded):
         return max(parts)
 
     @cached_property
-    def shift(self) -> Shift:
-        """The shift for the cones, from (3) of docs/theory/vector-friction.md.
+    def share(self) -> float:
+        """The least S, up to rounding, for which B + S H is positive semidefinite, H = diag(h_i).
 
-        If a share exceeds 21/25, all shares are equal and follow from the smallest eigenvalue.
+        The energy is convex if S <= 1: docs/theory/vector-friction.md, "Convexity".
         """
-        nu = 2.0 * self.bias / (1.0 + self.bias)
-        factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
-        by_distance = factor * self.shells
-        shares = by_distance / self.compliance
-        if shares.max() <= 21 / 25:
-            return Shift(by_distance, shares)
         root = np.repeat(1.0 / np.sqrt(self.compliance), 2)
         lowest = float(np.linalg.eigvalsh(self.kernel * root * root[:, None])[0])
-        equal = np.full(len(self), max(-lowest, 0.0) + 1e-14 * (1 + len(self)))
-        return Shift(equal * self.compliance, equal)
+        return max(-lowest, 0.0) + 1e-14 * (1 + len(self))
 
     @cached_property
     def margin(self) -> float:
@@ -188,6 +259,17 @@ class VectorProblem(Loaded):
         """(n, n) bounds on the norms of the B_ij: |B_ij v| <= reach_ij |v|."""
         bound: Array = self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
         return bound
+
+
+def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
+    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k.
+
+    The force is q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - |eta|/k, 0). The second eigenvalue
+    is |q| / |eta|.
+    """
+    left = np.maximum(1.0 - share, 0.0)
+    root = np.sqrt(left)
+    return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:

@@ -26,7 +26,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
 from convexrough.vector_shear.newton import FrictionNewton
-from convexrough.vector_shear.problem import VectorProblem, VectorState
+from convexrough.vector_shear.problem import FrictionProblem, VectorState
 
 
 class FrictionSolver(Protocol):
@@ -35,7 +35,7 @@ class FrictionSolver(Protocol):
     @property
     def name(self) -> str: ...
 
-    def solve(self, problem: VectorProblem, total: Array) -> VectorState: ...
+    def solve(self, problem: FrictionProblem, total: Array) -> VectorState: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +49,7 @@ class VectorShearState(Table, Plottable):
     stick_radii  : (n,) [length] radii of the stick discs, 0 where sliding
     disagreement : relative difference (2-norm) of the forces from those of `shear`
     residual     : largest relative violation of the conditions of least energy, recomputed from
-        this result: `VectorProblem.residual`
+        this result: `FrictionProblem.residual`
     duality_gap  : [force length] upper bound on the energy of these forces minus the least energy;
         infinite if the energy is not proved to be convex
     certificate  : proved statuses and bounds; a bound on the error of a vector is a bound on the
@@ -118,7 +118,7 @@ def shear_vector(
     size = float(checks.bearable("force", np.hypot(*Q), friction * contact.load))
     if contact.load == 0.0:
         return _unmoved(contact, solver.name)
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     exact = Ball.exact(Q) / friction / problem.units.force
     total = exact.value
     height = problem.levels.height(size)
@@ -153,7 +153,7 @@ def shear_vector(
     )
 
 
-def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
+def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> VectorState:
     """The solver's result, checked to be finite. The forces in a SolverError are converted."""
     try:
         state = solver.solve(problem, total)
@@ -179,7 +179,7 @@ def _vector(force: ArrayLike) -> Array:
     return pair.copy()
 
 
-def _gross(problem: VectorProblem, total: Array) -> VectorState:
+def _gross(problem: FrictionProblem, total: Array) -> VectorState:
     """The state at |T| = sum P, where all forces and slips are along T.
 
     If the components across T of the displacements B q by these forces q differ, forces tend to
@@ -207,7 +207,7 @@ def _times(vectors: Array, size: Array | float) -> Array:
     return product
 
 
-def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) -> float:
+def _disagreement(problem: FrictionProblem, state: VectorState, height: Fraction) -> float:
     """Relative 2-norm of the forces minus those of `shear`, directed along the total; 0 at rest."""
     if height == 0:
         return 0.0
@@ -218,7 +218,7 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
 
 
 def _certificate(
-    contact: Contact, problem: VectorProblem, state: VectorState, bounds: VectorBounds
+    contact: Contact, problem: FrictionProblem, state: VectorState, bounds: VectorBounds
 ) -> ShearCertificate:
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)

@@ -16,7 +16,7 @@ import convexrough as cr
 from convexrough.arrays import Array
 from convexrough.melan import program as melan
 from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
-from convexrough.vector_shear.problem import VectorProblem
+from convexrough.vector_shear.problem import FrictionProblem
 
 P, RADIUS = LARGEST["paper"], 0.5 * LARGEST["paper"]
 SWING = RADIUS * np.array([1.0, -1.0])
@@ -170,7 +170,7 @@ def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
     Vectors turn towards the state at rest slowly: the slip of a cycle halves in some ten of them.
     """
     contact = cr.press(PAPER, load=P)
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     n = len(problem)
     mean = np.array([0.3, 0.1 if kind == "vector" else 0.0]) * P
     swing = np.array([[1.0, 0.0], [-1.0, 0.0]]) * P

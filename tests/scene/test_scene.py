@@ -13,7 +13,7 @@ import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.sphere import mindlin
-from convexrough.vector_shear.problem import VectorProblem
+from convexrough.vector_shear.problem import FrictionProblem
 
 STEEL, ALUMINIUM = cr.Material.from_youngs(210e9, 0.3), cr.Material.from_youngs(70e9, 0.33)
 BODIES = st.builds(cr.Material.from_youngs, st.floats(1e-3, 1e12), st.floats(0.0, 0.5))
@@ -52,7 +52,7 @@ def _constants(*bodies: cr.Material) -> tuple[Any, Any, Any]:
 def test_tangential_kernel_is_the_sum_of_both_bodies() -> None:
     """Cerruti: [(1 - nu) + nu cos^2] / (2 pi G r) of each body."""
     contact = pressed(cr.Material.pair(STEEL, ALUMINIUM), load=2e4)
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     _, G, nu = _constants(STEEL, ALUMINIUM)
     apart = np.subtract(*contact.scene.contact_points[problem.touching[[3, 17]]])
     r = np.hypot(*apart)

@@ -23,7 +23,7 @@ from convexrough.solvers.cone_boxes import ConeBoxes, solve_in
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ProgramAnswer
 from convexrough.vector_shear.cones import FrictionConic
-from convexrough.vector_shear.problem import VectorProblem
+from convexrough.vector_shear.problem import FrictionProblem
 
 SOLVERS = [Conic(), ConicCVXPY()]
 OTHERS = [ConicCVXPY(solver=name) for name in ("SCS", "QOCO")]
@@ -143,7 +143,7 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_refused_friction_program_gives_its_last_forces() -> None:
     contact = cr.press(replace(paper(), friction=0.3), approach=PAPER_APPROACH)
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     total = np.array([0.3, 0.4]) * problem.loads.sum()
     with pytest.raises(cr.SolverError, match=r"accepted are 1e-18 and 1e-14; try") as refused:
         FrictionConic(accepted=1e-18).solve(problem, total)

@@ -15,7 +15,7 @@ import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
 from convexrough.arithmetic.balls import Ball
 from convexrough.vector_shear.certificate import certify_vectors
-from convexrough.vector_shear.problem import VectorProblem, VectorState
+from convexrough.vector_shear.problem import FrictionProblem, VectorState
 
 
 @settings(max_examples=15, deadline=None)
@@ -28,7 +28,7 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState
 def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: int) -> None:
     """States that are wrong must not be given a wrong status, nor a bound that is too small."""
     contact = pressed(name, nu=0.5)
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     total = np.array([0.8, 0.6]) * fraction * problem.loads.sum()
     good = FrictionNewton().solve(problem, total)
     rng = np.random.default_rng(seed)
@@ -149,7 +149,7 @@ def test_the_last_one_is_not_said_to_stick_where_all_slide(nu: float) -> None:
     assert all_slide > 5
 
 
-def duality_gap(problem: VectorProblem, state: VectorState) -> float:
+def duality_gap(problem: FrictionProblem, state: VectorState) -> float:
     return certify_vectors(problem, state, Ball.exact(state.total)).excess
 
 
@@ -162,7 +162,7 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
     contact = cr.press(with_friction(scene, nu=nu), approach=approach)
     if contact.load == 0 or contact.certificate.scope == "none":
         return
-    problem = VectorProblem.of(contact)
+    problem = contact.cached(FrictionProblem)
     total = np.array([fraction * problem.loads.sum(), 0.0])
     best = FrictionNewton().solve(problem, total)
     least = problem.energy(best.increments, problem.couple(best.increments))

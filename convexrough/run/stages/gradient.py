@@ -11,9 +11,8 @@ from pydantic import Field
 
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.cycle import cycle
-from convexrough.friction.shear import shear
-from convexrough.gradients.gradient import Gradient, Holding
+from convexrough.gradients.gradient import Holding
+from convexrough.gradients.objective import NUMBERS, gradient_of
 from convexrough.run.stage import Columns, Single, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
@@ -52,7 +51,7 @@ class GradientStage(Stage):
     @property
     def sheared(self) -> bool:
         """True if the result depends on a shear force."""
-        return self.of in ("loss", "displacement")
+        return NUMBERS[self.of] == "force"
 
     def mistakes_within(self) -> Iterator[Mistake]:
         if self.sheared and self.fraction is None:
@@ -63,19 +62,13 @@ class GradientStage(Stage):
     def compute(self, contact: Contact) -> GradientResult:
         """The gradient, or the reason why there is none."""
         try:
-            return GradientResult(self, contact, (self._gradient(contact),))
+            force = (self.fraction or 0.0) * limit(contact) if self.sheared else None
+            gradient = gradient_of(contact, self.of, force, self.holding)
+            return GradientResult(self, contact, (gradient,))
         except InputError as error:
             return GradientResult(self, contact, (), str(self._in_the_file(error)))
         except SolverError as error:
             return GradientResult(self, contact, (), str(error))
-
-    def _gradient(self, contact: Contact) -> Gradient:
-        if not self.sheared:
-            return contact.gradient(**{self.of: 1.0}, holding=self.holding)
-        force = (self.fraction or 0.0) * limit(contact)
-        if self.of == "displacement":
-            return shear(contact, force=force).gradient(displacement=1.0, holding=self.holding)
-        return cycle(contact, maximum=force).gradient(holding=self.holding)
 
     def _in_the_file(self, error: InputError) -> InputError:
         if error.what not in ("force", "maximum"):

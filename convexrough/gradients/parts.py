@@ -1,16 +1,17 @@
-"""Derivatives of a number at one load level, as balls in the scaled units of the level.
+"""The parts of a number that come from load levels, and their derivatives, as balls.
 
 A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
-indentations n (minus the gap where open), and energy V. It depends on the offsets d, the
-coefficients k of Hertz's law and the compliance matrix A. (1), (2) and (4) of
+indentations n (minus the gap where open), and energy V, in scaled units. It depends on the offsets
+d, the coefficients k of Hertz's law and the compliance matrix A. (1), (2) and (4) of
 docs/theory/gradients.md give its derivatives; the names v, w and lambda in this module are those
 of (4).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -23,6 +24,20 @@ ZERO = Ball.exact(0.0)
 
 #: Derivatives of a level's total load (in scaled units), by the names of the parameters.
 Moves: TypeAlias = Mapping[str, Ball]
+
+
+class Slopes(NamedTuple):
+    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a `Part`.
+
+    offsets, local, left : (n,) coefficients in this derivative
+    load  : coefficient of the change dL of the total load L; for L = 0 without the part due to D0,
+        whose derivative dD0/dL is infinite there
+    """
+
+    offsets: Ball
+    local: Ball
+    left: Ball
+    load: Ball
 
 
 @dataclass(frozen=True)
@@ -43,57 +58,41 @@ class Part:
     moves: Moves = field(default_factory=dict)
 
     @property
+    def scaled(self) -> Ball:
+        """The energies and loads in the sum, which scale with the modulus and all loads."""
+        total = self.energy * self.level.energy if self.energy.size > 0.0 else ZERO
+        return total if self.loads is None else total + self.loads.dot(self.level.loads)
+
+    @property
     def value(self) -> Ball:
-        level = self.level
-        total = self.approach * level.approach
-        if self.energy.size > 0.0:
-            total = total + self.energy * level.energy
-        if self.loads is not None:
-            total = total + self.loads.dot(level.loads)
+        """The sum; its lengths do not change if the modulus and all loads are scaled."""
+        total = self.scaled + self.approach * self.level.approach
         if self.indentations is not None:
-            total = total + self.indentations.dot(level.indentation)
+            total = total + self.indentations.dot(self.level.indentation)
         return total
 
     @property
-    def length(self) -> Ball:
-        """The part of the value that is a sum of lengths and so does not scale with forces."""
-        far = self.approach * self.level.approach
-        if self.indentations is not None:
-            far = far + self.indentations.dot(self.level.indentation)
-        return far
+    def weight(self) -> Ball:
+        """The weight of D0 in the sum, also as a term of the indentations."""
+        v = self.indentations
+        return self.approach if v is None else self.approach + v.sum()
 
+    @property
+    def coupled(self) -> Ball:
+        """(n,) A P."""
+        level = self.level
+        return level.approach + level.problem.exact.offsets - level.indentation
 
-class Pulled(NamedTuple):
-    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a `Part`.
-
-    offsets, local, left : (n,) coefficients in this derivative
-    load  : coefficient of the change dL of the total load L
-    loads, coupled : (n,) P and A P
-    total : L
-    steep : weight of D0 if L = 0, where the derivative dD0/dL is infinite
-    """
-
-    offsets: Ball
-    local: Ball
-    left: Ball
-    load: Ball
-    loads: Ball
-    coupled: Ball
-    total: Ball
-    steep: Ball = ZERO
-
-    @classmethod
-    def of(cls, part: Part) -> Pulled:
-        level, v, w = part.level, part.indentations, part.loads
-        weight = part.approach if v is None else part.approach + v.sum()
-        P, zero = level.loads, Ball.exact(np.zeros(len(level.problem)))
-        coupled = level.approach + level.problem.exact.offsets - level.indentation
-        own = part.energy * P
-        by_load = part.energy * level.approach
+    @cached_property
+    def slopes(self) -> Slopes:
+        """The derivative of the sum. Raises InputError if it does not exist, at the load 0."""
+        level, v, w, weight = self.level, self.indentations, self.loads, self.weight
+        zero = Ball.exact(np.zeros(len(level.problem)))
+        own, by_load = self.energy * level.loads, self.energy * level.approach
         if level.trial is None:
             moved, jump = _first_touch(level, weight, w)
             lifted = moved if v is None else moved + v
-            return cls(lifted, zero, zero, by_load + jump, zero, zero, level.load, weight)
+            return Slopes(lifted, zero, zero, by_load + jump)
         moved = zero  # lambda - weight q
         if w is not None or v is not None:
             right = zero if w is None else w
@@ -106,16 +105,11 @@ class Pulled(NamedTuple):
             by_load = by_load + weight * level.tangent.approach
         lifted = moved if v is None else moved + v
         local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
-        return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, coupled, level.load)
+        return Slopes(lifted - own, local, own * 0.5 - lifted, by_load)
 
-    def times(self, factor: Ball) -> Pulled:
-        return self._replace(
-            offsets=factor * self.offsets,
-            local=factor * self.local,
-            left=factor * self.left,
-            load=factor * self.load,
-            steep=factor * self.steep,
-        )
+    def times(self, factor: Ball) -> Part:
+        """This part of a number that consists of energies and approaches, times a factor."""
+        return replace(self, energy=factor * self.energy, approach=factor * self.approach)
 
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
@@ -139,7 +133,3 @@ def product(level: Level, weights: Ball) -> Ball:
             coupled.mid, coupled.radius + weights.radius.sum() * problem.largest_entry
         )
     return coupled
-
-
-def value_of(parts: Iterable[Part]) -> Ball:
-    return sum((part.value for part in parts), start=ZERO)

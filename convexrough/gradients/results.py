@@ -1,0 +1,334 @@
+"""Gradients of each result: its parts at load levels, and how the total loads of these move.
+
+A result is a sum over levels (`gradients.parts`): a contact has one level, its load P; a friction
+state and a cycle have two, P and L = P - T with T = Q / f; a load path has many. Q is the shear
+force, f the coefficient of friction, and c_t Mindlin's ratio. Losses are proportional to c_t f^2,
+displacements and slips to c_t f, and shear forces of asperities to f.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arithmetic import balls
+from convexrough.arithmetic.balls import Ball
+from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.contact import Contact
+from convexrough.errors import InputError, ProofError
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.onset import indices, root
+from convexrough.friction.order import Order
+from convexrough.friction.path import LoadPath
+from convexrough.friction.shear import ShearState
+from convexrough.gradients.along import NONE, Along
+from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
+from convexrough.gradients.parts import ZERO, Moves, Part, product
+from convexrough.normal.level import Level, Levels
+from convexrough.normal.proved import Obstacle, proved
+from convexrough.normal.refine import refined_loads
+from convexrough.normal.units import Units
+
+#: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
+#: about 1e-15 at first, and each step raises it to the power 3/2.
+NEWTON = 3
+
+
+def with_friction(result: ShearState | Cycle | LoadPath) -> FrictionLevels:
+    """The levels of a result. Raises InputError if general steps computed it, or without load."""
+    if result.order == "fails":
+        expected = "a result whose indentations do not fall as the load rises"
+        raise InputError("order", found='"fails"', expected=expected)
+    levels(result.contact)
+    return result.contact.cached(FrictionLevels)
+
+
+def level_below(
+    known: FrictionLevels, what: str, force: float | Fraction, holding: Holding
+) -> Level:
+    """The level at the load L = P - |Q| / f, for the shear force Q = `force`."""
+    height = abs(known.height(force))
+    if height == known.load and holding == "approach":
+        expected = "a force below f P: at constant approach f P may fall below the force"
+        raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)
+    return known.at(known.load - height)
+
+
+def by_load(units: Units) -> Moves:
+    """The derivative of the load P, in scaled units, by itself."""
+    return {"load": Ball.exact(1.0) / units.force}
+
+
+def by_forces(known: FrictionLevels, height: Ball, /, **shares: float) -> Moves:
+    """Derivatives of L = P - T, T = Q / f, by load, friction and forces.
+
+    shares : derivative of Q by each force, by name
+    """
+    by_force = -1.0 / known.force_unit
+    rates = {name: by_force * share for name, share in shares.items()}
+    return {**by_load(known.units), "friction": height / known.coefficient, **rates}
+
+
+def by_ratio(known: FrictionLevels) -> Ball:
+    """The derivative of log c_t (Mindlin's ratio) by nu (Poisson's ratio)."""
+    nu = Ball.exact(known.scene.material.poisson_ratio)
+    return 1.0 / ((1.0 - nu) * (2.0 - nu))
+
+
+def at_fixed_levels(
+    known: FrictionLevels, loss: Ball = ZERO, displacement: Ball = ZERO, force: Ball = ZERO
+) -> dict[str, Ball]:
+    """Derivatives of a sum of a loss, a displacement and shear forces by f and Poisson's ratio."""
+    return {
+        "friction": (loss * 2.0 + displacement + force) / known.coefficient,
+        "poisson_ratio": (loss + displacement) * by_ratio(known),
+    }
+
+
+def contact_gradient(
+    contact: Contact, holding: Holding | None = None, **weights: ArrayLike | None
+) -> Gradient:
+    """The result of `Contact.gradient`."""
+    holding = control_held(contact, holding)
+    top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
+    on_loads, units = on_loads + P, top.problem.units
+    far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
+    if len(far):
+        top = _wider(top, np.union1d(top.problem.candidates, far))
+    which, length = top.problem.candidates, units.length
+    gap_weights = _where_open(top, -on_gaps[which]) * length if on_gaps.any() else None
+    part = Part(
+        top,
+        approach=Ball.exact(D) * length,
+        loads=Ball.exact(on_loads[which]) * units.force if on_loads.any() else None,
+        indentations=gap_weights,
+        moves=by_load(units),
+    )
+    explicit = {} if contact.scene.friction is None else {"friction": ZERO}
+    return Gradient.of(Number.of(contact, top, part.value, [part], explicit), holding)
+
+
+def state_gradient(
+    state: ShearState, holding: Holding | None = None, **weights: ArrayLike | None
+) -> Gradient:
+    """The result of `ShearState.gradient`."""
+    contact, known = state.contact, with_friction(state)
+    holding = control_held(contact, holding)
+    X, on_forces, on_slips = _checked(contact, weights)
+    sign = -1.0 if state.force < 0 else 1.0
+    top, low = known.top, level_below(known, "force", state.force, holding)
+    which, travel = top.problem.candidates, known.travel_unit
+    weight = travel * (sign * X)
+    # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
+    carried = known.force_unit * Ball.exact(sign * on_forces[which])
+    slid = _where_open(low, -sign * on_slips[which]) * travel
+    slid = balls.where(~top.open, slid, 0.0 * slid)
+    moves = by_forces(known, top.load - low.load, force=sign)
+    parts = [
+        Part(top, approach=weight, loads=carried, moves=by_load(known.units)),
+        Part(low, approach=-weight, loads=-carried, indentations=slid, moves=moves),
+    ]
+    moved = weight * (top.approach - low.approach) + slid.dot(low.indentation)
+    borne = carried.dot(top.loads - low.loads)
+    explicit = at_fixed_levels(known, displacement=moved, force=borne)
+    return Gradient.of(Number.of(contact, top, moved + borne, parts, explicit), holding)
+
+
+def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
+    """Derivatives of the shear force at which one asperity starts to slide on first loading.
+
+    asperity : index of the asperity in the scene
+    holding  : quantity kept constant, as in `Contact.gradient`
+
+    Raises InputError if the scene has no friction, if the asperity carries no load, or if it is one
+    of several that slide last: then there is no derivative. Raises ProofError if it is not proved
+    that the indentation of the asperity rises with the load.
+
+    >>> gradient = cr.onset_gradient(contact, 36)
+    >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
+    0.176 0.352
+    """
+    holding, found = control_held(contact, holding), levels(contact)
+    known = contact.cached(FrictionLevels)
+    top, f, unit = known.top, known.coefficient, known.units.force
+    which = indices("asperity", [asperity], len(contact.scene))[0]
+    if contact.loads[which] == 0.0:
+        expected = "an asperity that carries a load: others never slide"
+        raise InputError("asperity", found=asperity, expected=expected)
+    place, parts = int(top.problem.places[which]), []
+    first = ~known.at(Fraction(0)).open
+    total, start = top.load * f * unit, root(known, place)
+    if start > 0:
+        low, slope = _just_touching(found, place, known.at(start).load)
+        if known.order([start]) == "fails":
+            raise ProofError("an indentation falls as the load rises: no onset is known")
+        only = Ball.exact(among_zeros(np.ones(1), np.array([place]), len(first)))
+        # n(L) = 0, so that -f dL = f dn / (dn/dL)
+        parts = [Part(low, indentations=only * (f * unit / slope))]
+        total = (top.load - low.load) * f * unit
+    elif np.count_nonzero(first) > 1 or not first[place]:  # all of these slide at f P
+        expected = "one that slides before another, or last and alone"
+        said = f"{asperity}, which slides last, together with others"
+        raise InputError("asperity", found=said, expected=expected)
+    explicit = {"load": f, "friction": total / f}
+    return Gradient.of(Number.of(contact, top, total, parts, explicit), holding)
+
+
+def _just_touching(known: Levels, place: int, near: Ball) -> tuple[Level, Ball]:
+    """The level at which the indentation n of a candidate is 0, and dn/dL at this level.
+
+    near : an estimate of the load L of this level
+
+    The load of the result is an interval that contains the root of n; n increases on all of it.
+    """
+
+    def at(load: Ball) -> tuple[Level, Ball]:
+        level = known.at(load)
+        coupled = product(level, level.tangent.loads)[place]
+        return level, level.tangent.approach - coupled
+
+    load = Ball.exact(near.mid)
+    for _ in range(NEWTON):
+        level, slope = at(load)
+        load = Ball.exact((load - level.indentation[place] / slope).mid)
+    level, slope = at(load)
+    left = float(level.indentation[place].size)
+    radius = 2.0 * left / float(slope.lower) if slope.positive else np.inf
+    level, slope = at(Ball.around(load.mid, radius))
+    if not left <= float(slope.lower) * radius:
+        raise ProofError("the onset is not proved: the indentation may fall as the load rises")
+    return level, slope
+
+
+def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
+    """The result of `Cycle.gradient`.
+
+    At constant load the loss W is given by (1) of docs/theory/losses.md. At varying load W is the
+    sum over the pieces of the second cycle (`Along`).
+    """
+    contact, known = cycle.contact, with_friction(cycle)
+    holding = control_held(contact, holding)
+    if (cycle.loads != float(known.load)).any():
+        m = len(cycle.loads)
+        first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
+        again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
+        along = Along.of(known, Fraction(0), first + again, cycle.loads, cycle.forces)
+        return _gradient(contact, along, holding, paths=True, order=cycle.order)
+    amplitude = (Fraction(cycle.maximum) - Fraction(cycle.minimum)) / 2
+    top, low = known.top, level_below(known, "maximum", amplitude, holding)
+    T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
+    weight = known.loss_unit * 8.0
+    along_T = weight * T * -0.5
+    moves = by_forces(known, T, maximum=0.5, minimum=-0.5)
+    parts = [
+        Part(top, energy=weight, approach=along_T, moves=by_load(known.units)),
+        Part(low, energy=-weight, approach=along_T, moves=moves),
+    ]
+    W = weight * (top.energy - low.energy - T * mean)
+    explicit = at_fixed_levels(known, loss=W)
+    for name in ("maximum", "minimum", "friction"):  # dT = dP - dL
+        explicit[name] = explicit.get(name, ZERO) + weight * mean * moves[name]
+    return Gradient.of(_loss(Number.of(contact, top, W, parts, explicit), cycle.order), holding)
+
+
+def path_gradient(
+    path: LoadPath,
+    *,
+    losses: ArrayLike | None = None,
+    displacements: ArrayLike | None = None,
+    holding: Holding | None = None,
+) -> Gradient:
+    """The result of `LoadPath.gradient`."""
+    known, m = with_friction(path), len(path.forces)
+    holding = control_held(path.contact, holding)
+    spent, far = (
+        checks.array(name, 0.0 if given is None else given, length=m, one="force")
+        for name, given in (("losses", losses), ("displacements", displacements))
+    )
+    if losses is None and displacements is None:
+        spent = np.eye(m)[-1]
+    later = np.cumsum(spent[::-1])[::-1]  # a loss on one segment is part of all later losses
+    steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
+    along = Along.of(known, Fraction(path.start), steps, path.loads, path.forces)
+    sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
+    if path.load_constant and any(sliding):
+        expected = "forces below f P: in gross sliding a history has no derivative"
+        raise InputError("forces", found="gross sliding", expected=expected)
+    order = path.order if spent.any() else "proved"
+    return _gradient(path.contact, along, holding, paths=not path.load_constant, order=order)
+
+
+def _gradient(
+    contact: Contact, along: Along, holding: Holding, *, paths: bool, order: Order
+) -> Gradient:
+    """The gradient of a weighted sum along a path.
+
+    paths : True to add the derivatives by the loads of all points
+    """
+    if paths and holding == "approach":
+        expected = '"load", because the loads of all points are prescribed'
+        raise InputError("holding", found='"approach"', expected=expected)
+    known = along.known
+    lost, moved = along.parts({} if paths else by_load(known.units))
+    loss, far = (sum((part.value for part in parts), start=ZERO) for parts in (lost, moved))
+    m, T, f = len(along.loads), along.heights, known.coefficient
+    nothing = [Fraction(0)] * m
+    each = [[Fraction(int(i == k)) for i in range(m)] for k in range(m)]
+    explicit, sides = at_fixed_levels(known, loss, far), {}
+    scaled, _ = along.slopes([(nothing, T)], 1.0 / f)
+    by_friction = explicit["friction"] - scaled[0]
+    explicit["friction"] = NONE if np.isnan(scaled.value[0]) else by_friction
+    by_T = [(nothing, one) for one in each]
+    explicit["forces"], sides["forces"] = along.slopes(by_T, 1.0 / f)
+    if paths:
+        by_P = [(one, nothing) for one in each]
+        explicit["loads"], sides["loads"] = along.slopes(by_P, Ball.exact(1.0))
+    parts = [*lost, *moved]
+    number = Number.of(contact, known.top, loss + far, parts, explicit, sides)
+    return Gradient.of(_loss(number, order), holding)
+
+
+def _loss(number: Number, order: Order) -> Number:
+    """The given `Number`, a loss, with infinite error bounds if order is not proved."""
+    return number if order == "proved" else number.times(Ball.around(1.0, np.inf), {})
+
+
+def _where_open(level: Level, weights: Array) -> Ball:
+    """(n,) weights of gaps: 0 where touching; where undecided, intervals from 0 to the weight."""
+    if level.solution is None:
+        shut = level.springs.touching if level.trial is not None else ~level.open
+        return Ball.exact(np.where(shut, 0.0, weights))
+    low, high = np.minimum(weights, 0.0), np.maximum(weights, 0.0)
+    doubtful = ~level.touching & ~level.open
+    known = Ball.exact(np.where(level.open, weights, 0.0))
+    return balls.where(doubtful, Ball.between(low, high), known) if doubtful.any() else known
+
+
+def _wider(level: Level, which: Indices) -> Level:
+    """The same level with the asperities `which` as further, open candidates."""
+    problem = level.problem.widened(which)
+    assert level.trial is not None
+    places = np.searchsorted(which, level.problem.candidates)
+    state = refined_loads(problem, among_zeros(level.trial.loads.high, places, len(which)))
+    found = proved(problem, state)
+    if isinstance(found, Obstacle):
+        return Level.unproved(problem, state, level.load)
+    return Level.of(found, level.load)
+
+
+def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
+    """The checked weights: numbers, or arrays (n,) for asperities; 0 in place of None."""
+    if all(value is None for value in weights.values()):
+        expected = "weights of at least one of these results"
+        raise InputError(", ".join(weights), found="none", expected=expected)
+    for name, value in weights.items():
+        if name in ("load", "approach", "displacement"):
+            yield 0.0 if value is None else checks.finite(name, value)
+        else:
+            yield checks.array(name, 0.0 if value is None else value, length=len(contact.scene))
