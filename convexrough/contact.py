@@ -22,10 +22,11 @@ from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
-from convexrough.normal.level import Level, Levels
+from convexrough.normal.level import Level
+from convexrough.normal.levels import Levels
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import Trial, refined_loads, refines
+from convexrough.normal.proved import proved
+from convexrough.normal.refine import refined_loads, refines
 from convexrough.normal.units import Units
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -241,12 +242,9 @@ def levels_of(contact: Contact) -> Levels:
 
     `contact.cached(levels_of)` returns the same object each time.
     """
-    problem, state, found = vars(contact).get("_known") or _proved_again(contact)
-    if isinstance(found, Obstacle):
-        total = Ball.exact(state.loads).sum() if problem.load is None else problem.total
-        top = Level.unproved(problem, state, total)
-    else:
-        top = Level.of(found, found.total if problem.load is None else problem.total)
+    top = vars(contact).get("_top") or _proved_again(contact)
+    assert top.trial is not None
+    loads = top.trial.loads.high
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
 
@@ -254,19 +252,19 @@ def levels_of(contact: Contact) -> Levels:
         try:
             return solver.solve(at_load, start).loads
         except SolverError:  # happens if contacts are crowded
-            return solver.solve(at_load, state.loads.high).loads
+            return solver.solve(at_load, loads).loads
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
-def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
+def _proved_again(contact: Contact) -> Level:
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
     problem = NormalProblem.assemble(
         contact.scene, approach=approach, load=load, influence=contact.influence
     )
-    state = refined_loads(problem, contact.loads[problem.candidates] / problem.units.force)
-    return problem, state, proved(problem, state)
+    loads = contact.loads[problem.candidates] / problem.units.force
+    return proved(problem, refined_loads(problem, loads))
 
 
 def _contact(
@@ -277,7 +275,7 @@ def _contact(
 ) -> Contact:
     scene = problem.scene
     force = problem.units.force
-    first, known = None, None
+    first, top = None, None
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
@@ -297,9 +295,9 @@ def _contact(
         LOGGER.info("certifying")
         if refine:
             assert state is not None
-            found = proved(problem, state)
-            certificate = certificate_of(problem, loads, state, found)
-            known = (problem, state, found) if problem.influence.stored else None  # a small problem
+            level = proved(problem, state)
+            certificate = certificate_of(level, loads, state)
+            top = level if problem.influence.stored else None  # a small problem
         else:
             certificate = certify_on(problem, loads)
     contact = Contact(
@@ -319,7 +317,7 @@ def _contact(
         prescribed_load=None if problem.load is None else problem.load * force,
     )
     # Pickles omit these two. For an unpickled contact `levels_of` therefore proves the loads again.
-    contact.__dict__.update(_by=solver, _known=known)
+    contact.__dict__.update(_by=solver, _top=top)
     return contact
 
 

@@ -21,7 +21,8 @@ from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
 from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
 from convexrough.gradients.scene import Derivatives
-from convexrough.normal.level import Level, Levels
+from convexrough.normal.level import Level
+from convexrough.normal.levels import Levels
 from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table

@@ -24,7 +24,7 @@ from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.pulled import ZERO, Moves, Part, product
 from convexrough.normal.level import Level
-from convexrough.normal.proved import Obstacle, proved
+from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 
 #: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
@@ -206,7 +206,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
 
 def _where_open(level: Level, weights: Array) -> Ball:
     """(n,) weights of gaps: 0 where touching; where undecided, intervals from 0 to the weight."""
-    if level.solution is None:
+    if level.box is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
     low, high = np.minimum(weights, 0.0), np.maximum(weights, 0.0)
@@ -221,10 +221,7 @@ def _wider(level: Level, which: Indices) -> Level:
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)
     state = refined_loads(problem, among_zeros(level.trial.loads.high, places, len(which)))
-    found = proved(problem, state)
-    if isinstance(found, Obstacle):
-        return Level.unproved(problem, state, level.load)
-    return Level.of(found, level.load)
+    return proved(problem, state)
 
 
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:

@@ -86,7 +86,7 @@ class NormalProblem:
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     approach_bound : upper bound on D0 at any solution
-    exact_load, exact_approach : the prescribed number as a ball; None if it is a float64 number
+    exact_control : the prescribed number as a ball; None if it is a float64 number
     """
 
     scene: Scene
@@ -100,8 +100,7 @@ class NormalProblem:
     approach: float | None
     load: float | None
     approach_bound: float
-    exact_load: Ball | None = None
-    exact_approach: Ball | None = None
+    exact_control: Ball | None = None
 
     def __len__(self) -> int:
         return len(self.candidates)
@@ -125,32 +124,37 @@ class NormalProblem:
         sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
+    @property
+    def by_load(self) -> bool:
+        """True if the total load is prescribed, not the approach."""
+        return self.load is not None
+
+    @cached_property
+    def control(self) -> Ball:
+        """The prescribed load or approach as a ball."""
+        given = self.approach if self.load is None else self.load
+        assert given is not None
+        return Ball.exact(given) if self.exact_control is None else self.exact_control
+
     def at_load(self, load: Ball) -> NormalProblem:
         """The problem of the same asperities under a load that needs at most `approach_bound`."""
-        return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
+        return self._like(approach=None, load=float(load.value), exact_control=load)
 
     def at_approach(self, approach: Ball) -> NormalProblem:
         """The problem of the same asperities at an approach of at most `approach_bound`."""
-        prescribed = float(approach.value)
-        return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
+        return self._like(approach=float(approach.value), load=None, exact_control=approach)
 
-    def _like(self, other: NormalProblem) -> NormalProblem:
-        """`other`, a problem of the same asperities, after copying the cached data of this one."""
+    def _like(self, **changed: Any) -> NormalProblem:
+        """A problem of the same asperities, with the cached data of this one."""
+        other = replace(self, **changed)
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
 
-    @property
-    def total(self) -> Ball:
-        """The prescribed total load as a ball."""
-        assert self.load is not None
-        return Ball.exact(self.load) if self.exact_load is None else self.exact_load
-
-    @property
-    def depth(self) -> Ball:
-        """The prescribed approach as a ball."""
-        assert self.approach is not None
-        return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
+    @cached_property
+    def squares(self) -> Array:
+        """(n,) [length^2] squared distances of the summits from the axis."""
+        return self.scene.asperities.distances[self.candidates] ** 2
 
     @cached_property
     def places(self) -> Indices:
@@ -164,10 +168,14 @@ class NormalProblem:
         """(n,) D = D0 + d for a prescribed approach D0; cached for at most MOST_KEPT candidates."""
         found: Ball | None = self.__dict__.get("_depths")
         if found is None:
-            found = self.exact.offsets + self.depth
+            found = self.exact.offsets + self.control
             if len(self) <= MOST_KEPT:
                 self.__dict__["_depths"] = found
         return found
+
+    def apply(self, loads: Array) -> Array:
+        """(n,) A P in float64."""
+        return self.influence.apply(loads)
 
     def product(self, loads: Pair) -> Ball:
         """(n,) A P to about thirty digits."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,8 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
+from convexrough.normal.law import Problem
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import Stack
 from convexrough.sphere import hertz
 
 #: Largest number of corrections.
@@ -40,10 +40,6 @@ FEW = 700
 #: If the sum of the loads misses the total by a smaller part, only the largest load is changed;
 #: otherwise all loads are scaled first. A heuristic.
 FITS = 1e-6
-
-
-#: One problem, or a stack with one problem in each row.
-Problem: TypeAlias = NormalProblem | Stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +111,7 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
         gap = residual(data.coefficients, exact, product, problem.exact_depths)
-        return Trial(problem, loads, product, local, gap, problem.depth, missing)
+        return Trial(problem, loads, product, local, gap, problem.control, missing)
     above = residual(data.coefficients, exact, product, data.offsets)  # D0 where touching
     weights = np.cbrt(loads.high)
     total = summed(weights)
@@ -189,7 +185,7 @@ def scaled(problem: Problem, loads: Pair) -> Pair:
         return loads
     power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
     loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-    return loads * (problem.total.mid / sums(loads))
+    return loads * (problem.control.mid / sums(loads))
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
@@ -197,8 +193,8 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
-        return loads, problem.total
-    total = problem.total.mid
+        return loads, problem.control
+    total = problem.control.mid
     if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
         loads = scaled(problem, loads)
     missing = total - sums(loads)
@@ -208,7 +204,7 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
     np.put_along_axis(high, which, most.high, -1)
     np.put_along_axis(low, which, most.low, -1)
     rounding = 8 * PAIR_ROUNDOFF * problem.load + (high.shape[-1] + 2) * TINY
-    return Pair(high, low), Ball.around(np.zeros_like(rounding), problem.total.radius + rounding)
+    return Pair(high, low), Ball.around(np.zeros_like(rounding), problem.control.radius + rounding)
 
 
 def sums(values: Pair) -> Pair:

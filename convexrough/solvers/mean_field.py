@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from convexrough.arrays import Array, Indices
+from convexrough.normal.law import smooth_reach
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
@@ -66,7 +67,7 @@ def _mean_field(problem: NormalProblem) -> Array:
     approach = problem.approach_bound
     w = np.zeros(count)
     if problem.scene.curved:
-        touching = smooth_contact_radius(problem), problem.scene.mean_radius
+        touching = np.sqrt(smooth_reach(problem)), problem.scene.mean_radius
         w = hertz.surface_displacement(middle, *touching) / problem.units.length
     for _ in range(30):
         indentation = approach + offsets - rings.between(w)
@@ -122,17 +123,6 @@ class _Rings:
     def between(self, values: Array) -> Array:
         """(n,) values at the asperities, interpolated linearly between the middles of the rings."""
         return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
-
-
-def smooth_contact_radius(problem: NormalProblem) -> float:
-    """[length] contact radius of a smooth sphere at the same approach or load; infinite if flat."""
-    scene, units = problem.scene, problem.units
-    radius, modulus = scene.mean_radius, scene.material.contact_modulus
-    if radius == np.inf:
-        return np.inf
-    if problem.load is None:
-        return float(np.sqrt(radius * max(problem.approach_bound, 0.0) * units.length))
-    return float(hertz.contact_radius(problem.load * units.force, modulus, radius))
 
 
 def _disc(distance: Array, radius: Array) -> Array:
