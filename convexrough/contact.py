@@ -24,10 +24,9 @@ from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import NormalProblem
+from convexrough.normal.problem import NormalProblem, Units
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads, refines
-from convexrough.normal.units import Units
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table

@@ -120,11 +120,12 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
     """An upper bound on the approach of every solution; `displacement` is A `loads`.
 
-    Under a prescribed load it is the smaller of `problem.approach_bound` and `problem.overhang`.
+    Under a prescribed load it is the smaller of `problem.highest` and `problem.overhang`.
     """
     if problem.load is None:
         return problem.approach_bound
-    return min(problem.approach_bound, problem.overhang(loads, displacement))
+    bound = problem.overhang(loads, displacement)
+    return bound if problem.highest is None else min(problem.highest, bound)
 
 
 def box_of_touching(

@@ -279,20 +279,23 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
-        excess += 2 * ROUNDOFF * (start.local + start.product.size)
+        excess = excess + 2 * ROUNDOFF * (start.local + start.product.size)
         moved = moved + ROUNDOFF * loads
-    excess[box.fixed_open & (loads == 0)] = 0.0
-    if (box.fixed_open & (loads > 0)).any():
-        q = np.where(box.fixed_open, loads * (1 + SAFETY), 0.0)
-        displacement = problem.influence.apply(q)
-        excess += displacement + problem.influence.rounding(q).of(displacement)
-    most = np.maximum(box.loads, loads * (1 + SAFETY))
-    most[box.fixed_open] = 0.0
-    # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
-    part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min(initial=1.0)
-    convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
-    if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
-        return np.inf
+    most, opened = loads * (1 + SAFETY), box.fixed_open
+    if opened.any():
+        excess = np.where(opened & (loads == 0), 0.0, excess)
+        if (opened & (loads > 0)).any():
+            q = np.where(opened, most, 0.0)
+            displacement = problem.influence.apply(q)
+            excess = excess + displacement + problem.influence.rounding(q).of(displacement)
+        most[opened] = 0.0
+    if (most > box.loads).any():  # A >= -theta H on the box
+        most = np.maximum(box.loads, most)
+        # At larger loads H is at least this fraction of its value on the box.
+        part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
+        convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
+        if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
+            return np.inf
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)
 
@@ -316,7 +319,7 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
         return _Screened(others, others > 0, None, np.zeros(0), np.zeros(0))
     coupling = problem.influence.onto(scene.contact_points[others])
     product, offsets = coupling.apply(loads), scene.offsets[others] / length
-    below = (offsets != 0) | (problem.approach_bound != 0)
+    below = (offsets != 0) | (problem.highest != 0)
     approach = float(start.approach.value)
     rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
     rounding += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))

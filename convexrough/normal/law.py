@@ -28,6 +28,7 @@ class Pressed(NamedTuple):
     own      : max(delta, 0) = k P^(2/3), scaled to a prescribed total
     loads, displacement : P and A P
     gap      : k P^(2/3) + A P - D, the gradient of the energy
+    defect   : the residual F of the contact law: the gap where loaded, elsewhere min(gap, 0)
     approach : D0: the prescribed one, or the one that fits the gaps of the touching best
     """
 
@@ -35,6 +36,7 @@ class Pressed(NamedTuple):
     loads: Array
     displacement: Array
     gap: Array
+    defect: Array
     approach: Any
 
     @classmethod
@@ -52,23 +54,20 @@ class Pressed(NamedTuple):
         approach = problem.approach
         if approach is None:
             approach = summed(root * gap) / summed(root)
-        return cls(own, loads, displacement, gap - approach, approach)
-
-    @property
-    def defect(self) -> Array:
-        """The residual F: the gap where loaded, elsewhere min(gap, 0)."""
-        return np.where(self.loads > 0, self.gap, np.minimum(self.gap, 0.0))
+        gap = gap - approach
+        defect = np.where(own > 0, gap, np.minimum(gap, 0.0))
+        return cls(own, loads, displacement, gap, defect, approach)
 
     @property
     def unknown(self) -> Array:
         """The indentation; of open asperities, whose loads do not depend on it, min(-gap, 0)."""
-        return np.where(self.loads > 0, self.own, np.minimum(-self.gap, 0.0))
+        return np.asarray(self.own + (self.defect - self.gap))
 
     @property
     def slopes(self) -> Array:
         """The derivatives dP/d(delta); 0 where open."""
-        inside = self.loads > 0
-        return np.divide(1.5 * self.loads, self.own, out=np.zeros(inside.shape), where=inside)
+        own = self.own
+        return np.divide(1.5 * self.loads, own, out=np.zeros(own.shape), where=own > 0)
 
 
 @np.errstate(all="ignore")
@@ -80,8 +79,10 @@ def on_hertz_pressure(problem: Problem) -> Array:
     energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If the smooth body would not touch there, P is
     a load on the asperity with the largest offset only.
     """
-    load = problem.load
-    prescribed = problem.offsets + (0.0 if problem.approach is None else problem.approach)
+    load, approach = problem.load, problem.approach
+    if approach is None:  # from the highest asperity, so that no digits of small loads are lost
+        approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
+    prescribed = problem.offsets + approach
     s = np.sqrt(np.fmax(1.0 - problem.squares / (WIDER * smooth_reach(problem)), 0.0))
     poor = ~(summed(s * prescribed if load is None else s + 0.0 * prescribed) > 0)
     if np.any(poor):
@@ -91,11 +92,11 @@ def on_hertz_pressure(problem: Problem) -> Array:
     if load is not None:
         cubed = load / summed(s + 0.0 * prescribed)  # x^3
         needed = np.cbrt(cubed) ** 2 * own + cubed * displacement - prescribed
-        approach = summed(np.cbrt(s) * needed) / summed(np.cbrt(s))
-        return np.asarray(approach + prescribed - cubed * displacement)
+        risen = summed(np.cbrt(s) * needed) / summed(np.cbrt(s))
+        return np.asarray(risen + prescribed - cubed * displacement)
     work, local, coupled = (summed(s * each) for each in (prescribed, own, displacement))
     x = np.sqrt(work / local)
-    for _ in range(8):  # Newton's method from the right of the root
+    for _ in range(5):  # Newton's method from the right of the root
         x = x - (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - np.where(work > 0, x, 0.0) ** 3 * displacement)
 

@@ -28,6 +28,7 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, taken
 from convexrough.convex.newton_step import correct
+from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.load_control import (
@@ -36,11 +37,14 @@ from convexrough.normal.load_control import (
     shifted_to_load,
     smooth_displacement,
 )
-from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
+
+#: In a scene of at most FEW asperities all may touch under a prescribed load, which costs less than
+#: a bound on the approach.
+FEW = 128
 
 #: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
 #: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
@@ -60,6 +64,36 @@ INVERSE_PI = Fraction("0.3183098861837906715377675267450287240689192914809128974
 
 #: Factor by which one correction by conjugate gradients reduces the residual.
 REDUCTION = 1e-7
+
+
+@dataclass(frozen=True)
+class Units:
+    """Scaled units of length and force: numbers of a problem are about 1 in them.
+
+    They are the units of the scene times powers of two (of eight for the force). So scaling a
+    float64 number by them, or a force to the power 2/3, does not round.
+    """
+
+    length: float  # [length] the scaled unit of length
+    force: float  # [force] the scaled unit of force
+
+    @property
+    def local(self) -> float:
+        """force^(2/3) / length, a power of two: k in scaled units is k times this factor."""
+        return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
+
+    @classmethod
+    def of(cls, approach: float, coefficient: float) -> Units:
+        """Units of the size of `approach` [length] and of the load whose indentation it is.
+
+        coefficient : k of Hertz's law, indentation = k load^(2/3)
+
+        Raises InputError if the approach is not positive and finite.
+        """
+        if not 0 < approach < math.inf:
+            raise InputError("scene", found=f"indentations of {approach:g}", expected=checks.SIZED)
+        length = 2.0 ** round(math.log2(approach))
+        return cls(length, 8.0 ** round(math.log2(length / coefficient) / 2.0))
 
 
 class Data(NamedTuple):
@@ -85,7 +119,7 @@ class NormalProblem:
         A + diag(shells) positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
-    approach_bound : upper bound on D0 at any solution
+    highest       : upper bound on D0 at any solution; None to compute it when it is needed
     exact_control : the prescribed number as a ball; None if it is a float64 number
     """
 
@@ -99,7 +133,7 @@ class NormalProblem:
     shells: Array
     approach: float | None
     load: float | None
-    approach_bound: float
+    highest: float | None
     exact_control: Ball | None = None
 
     def __len__(self) -> int:
@@ -123,6 +157,15 @@ class NormalProblem:
         offsets = self.twofold_offsets()
         sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
+
+    @cached_property
+    def approach_bound(self) -> float:
+        """An upper bound on D0 at every solution."""
+        if self.highest is not None:
+            return self.highest
+        assert self.load is not None
+        load = self.load * self.units.force
+        return highest_approach(self.scene, load, self.influence.name) / self.units.length
 
     @property
     def by_load(self) -> bool:
@@ -254,18 +297,21 @@ class NormalProblem:
         modulus = scene.material.contact_modulus
         coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
-            approach_bound = approach = checks.finite("approach", approach)
+            highest = approach = checks.finite("approach", approach)
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            approach_bound = (
-                highest_approach(scene, load, influence) if highest is None else highest
-            )
+            if highest is None and len(scene) > FEW:
+                highest = highest_approach(scene, load, influence)
 
-        # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
-        prescribed = approach_bound + offsets + errors + 6 * ROUNDOFF * abs(approach_bound)
-        candidates = scene.asperities.layout.sorted(prescribed > 0)
-        top = float(prescribed.max(initial=0.0)) or 1.0
+        if highest is not None:
+            # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
+            prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
+            candidates = scene.asperities.layout.sorted(prescribed > 0)
+            top = float(prescribed.max(initial=0.0)) or 1.0
+        else:
+            candidates = scene.asperities.layout.sorted(np.ones(len(scene), dtype=bool))
+            top = float(hertz.indentation(load, coefficients.max()))  # of one under the whole load
         units = Units.of(top, _middle(coefficients))
 
         scale = units.force / units.length / (np.pi * modulus)
@@ -281,7 +327,7 @@ class NormalProblem:
             shells=shells(coupling),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
-            approach_bound=approach_bound / units.length,
+            highest=None if highest is None else highest / units.length,
         )
 
     def restricted(self, which: Indices) -> NormalProblem:

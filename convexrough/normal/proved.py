@@ -128,8 +128,9 @@ class _Missing(NamedTuple):
         grows = coupled + 2.0 / 3.0 * local
         middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
         rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
+        found = part * loads, part * coupled, part * rest
         known = part <= 0.5
-        return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
+        return cls(*(found if np.all(known) else (np.where(known, x, np.inf) for x in found)))
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
@@ -163,9 +164,12 @@ def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, mov
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.compliance(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
+    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
+    closest = each.min(**across)
+    if np.isfinite(closest).all():
+        return closest * (1 + 4 * SAFETY) + state.approach.radius
     above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
     above = np.where(box.fixed_open, np.inf, above)
-    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
     below = state.approach.upper - (-exact.offsets.upper).min(**across)
-    closest = np.minimum(each.min(**across), np.maximum(above.min(**across), below))
+    closest = np.minimum(closest, np.maximum(above.min(**across), below))
     return closest * (1 + 4 * SAFETY) + state.approach.radius

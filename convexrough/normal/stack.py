@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, largest
-from convexrough.normal.problem import Data, NormalProblem
-from convexrough.normal.units import Units
+from convexrough.normal.problem import Data, NormalProblem, Units
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 

@@ -76,9 +76,8 @@ class Pressing:
         if problem.load is not None:  # Phi has D0 = 0 under load control
             total = at.approach * problem.load
         energy = float(at.loads @ (at.gap - 0.4 * at.own - 0.5 * at.displacement)) + total
-        defect = at.defect
-        residual, scale = float(np.abs(defect).max()), abs(at.approach) + self.farthest
-        return PressingState(at.unknown, at.loads, defect, energy, residual, scale, at)
+        residual, scale = float(np.abs(at.defect).max()), float(abs(at.approach)) + self.farthest
+        return PressingState(at.unknown, at.loads, at.defect, energy, residual, scale, at)
 
     def direction(self, state: PressingState, left: float) -> Array:
         return correct(
@@ -146,16 +145,15 @@ class Newton:
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
-        answer = Solution.of(problem, loads, approach, iterations)
-        return replace(answer, refine=not self.tolerance > 0)
+        refine = not self.tolerance > 0
+        return Solution.of(problem, loads, approach, iterations, refine=refine)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
         indentation = _start(problem, start)
-        highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
-        near = np.arange(len(problem))
+        near, iterations = np.arange(len(problem)), 0
         if len(problem) > ALL_ITERATED and start is None:
+            highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
             near = np.flatnonzero(indentation > -MARGIN * highest)
-        iterations = 0
         while True:
             begin = indentation[near]
             del indentation  # saves memory

@@ -23,7 +23,7 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
-from convexrough.normal.units import Units
+from convexrough.normal.problem import Units
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import annulus
