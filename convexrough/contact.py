@@ -35,6 +35,10 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
+#: In a scene of at most FEW asperities a press by load includes all of them, because a bound on the
+#: approach, from which some are known to be open, takes more time.
+FEW = 128
+
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
     from convexrough.gradients.gradient import Gradient, Holding
@@ -223,8 +227,7 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return _contact(problem, solver, start, began)
+    return _contact(_problem(scene, approach, load, influence), solver, start, began)
 
 
 def solve(
@@ -259,11 +262,18 @@ def levels_of(contact: Contact) -> Levels:
 def _proved_again(contact: Contact) -> Level:
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
-    problem = NormalProblem.assemble(
-        contact.scene, approach=approach, load=load, influence=contact.influence
-    )
+    problem = _problem(contact.scene, approach, load, contact.influence)
     loads = contact.loads[problem.candidates] / problem.units.force
     return proved(problem, refined_loads(problem, loads))
+
+
+def _problem(
+    scene: Scene, approach: float | None, load: float | None, influence: Kind | None
+) -> NormalProblem:
+    highest = np.inf if load is not None and len(scene) <= FEW else None
+    return NormalProblem.assemble(
+        scene, approach=approach, load=load, influence=influence, highest=highest
+    )
 
 
 def _contact(

@@ -124,8 +124,7 @@ def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Ar
     """
     if problem.load is None:
         return problem.approach_bound
-    bound = problem.overhang(loads, displacement)
-    return bound if problem.highest is None else min(problem.highest, bound)
+    return min(problem.highest, problem.overhang(loads, displacement))
 
 
 def box_of_touching(

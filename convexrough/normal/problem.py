@@ -42,10 +42,6 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: In a scene of at most FEW asperities all may touch under a prescribed load, which costs less than
-#: a bound on the approach.
-FEW = 128
-
 #: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
 #: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
 #: box", 3).
@@ -119,7 +115,7 @@ class NormalProblem:
         A + diag(shells) positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
-    highest       : upper bound on D0 at any solution; None to compute it when it is needed
+    highest       : upper bound on D0 at any solution; infinite to compute one when it is needed
     exact_control : the prescribed number as a ball; None if it is a float64 number
     """
 
@@ -133,7 +129,7 @@ class NormalProblem:
     shells: Array
     approach: float | None
     load: float | None
-    highest: float | None
+    highest: float
     exact_control: Ball | None = None
 
     def __len__(self) -> int:
@@ -161,9 +157,8 @@ class NormalProblem:
     @cached_property
     def approach_bound(self) -> float:
         """An upper bound on D0 at every solution."""
-        if self.highest is not None:
+        if self.load is None or self.highest < np.inf:
             return self.highest
-        assert self.load is not None
         load = self.load * self.units.force
         return highest_approach(self.scene, load, self.influence.name) / self.units.length
 
@@ -290,7 +285,8 @@ class NormalProblem:
         """The problem of a scene. `approach` [length] or `load` [force] is given, exactly one.
 
         influence : compliance operator; None for the cheapest
-        highest   : [length] upper bound on the approach under this load; default `highest_approach`
+        highest   : [length] upper bound on the approach under this load, or inf to include all
+            asperities; default `highest_approach`
         """
         checks.exactly_one("approach", approach, "load", load)
         offsets, errors = scene.offsets, scene.offset_errors
@@ -301,16 +297,14 @@ class NormalProblem:
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            if highest is None and len(scene) > FEW:
+            if highest is None:
                 highest = highest_approach(scene, load, influence)
 
-        if highest is not None:
-            # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
-            prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
-            candidates = scene.asperities.layout.sorted(prescribed > 0)
-            top = float(prescribed.max(initial=0.0)) or 1.0
-        else:
-            candidates = scene.asperities.layout.sorted(np.ones(len(scene), dtype=bool))
+        # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
+        prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
+        candidates = scene.asperities.layout.sorted(prescribed > 0)
+        top = float(prescribed.max(initial=0.0)) or 1.0
+        if highest == np.inf:
             top = float(hertz.indentation(load, coefficients.max()))  # of one under the whole load
         units = Units.of(top, _middle(coefficients))
 
@@ -327,7 +321,7 @@ class NormalProblem:
             shells=shells(coupling),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
-            highest=None if highest is None else highest / units.length,
+            highest=highest / units.length,
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
