@@ -186,28 +186,21 @@ class Level:
         state = self.trial
         if state is None:
             raise ProofError("at no load the approach has no derivative")
-        zero = Ball.exact(np.zeros(len(self.problem)))
-        if self.box is None:
-            inside = np.asarray(state.inside)
-            own = state.gap + state.indentation  # k P^(2/3)
-            ratio = where(inside, own / where(inside, Ball.exact(state.loads), 1 + zero), zero)
-            compliance = ratio / 1.5
-            nowhere = np.full(len(self.problem), np.inf)
-            slopes = np.where(inside, 1.0 / np.where(inside, compliance.value, 1.0), 0.0)
-            return Springs(inside, ~inside & False, slopes, compliance, nowhere, 0.0)
         stiffness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
-        touching = self.touching & self.loads.positive  # else nothing bounds its compliance
-        with np.errstate(divide="ignore"):
-            known = np.maximum(self.compliance, (1.0 - SAFETY) / stiffness.upper)
-        bound = np.where(self.open, np.inf, known)
-        return Springs(
-            touching,
-            ~touching & ~self.open,
-            np.where(touching, stiffness.value, 0.0),
-            where(touching, 1.0 / where(touching, stiffness, 1 + zero), zero),
-            bound,
-            1.0 - min(self.box.convexity_number, self.box.problem.convexity_at(bound)),
-        )
+        touching, bound, margin = state.inside, np.full(len(self.problem), np.inf), 0.0
+        doubtful = np.zeros(len(touching), dtype=bool)
+        if self.box is not None:
+            touching = self.touching & self.loads.positive  # else nothing bounds its compliance
+            doubtful = ~touching & ~self.open
+            with np.errstate(divide="ignore"):
+                known = np.maximum(self.compliance, (1.0 - SAFETY) / stiffness.upper)
+            bound = np.where(self.open, np.inf, known)
+            convexity = self.box.problem.convexity_at(bound)
+            margin = 1.0 - min(self.box.convexity_number, convexity)
+        one, zero = (Ball.exact(np.full(len(touching), x)) for x in (1.0, 0.0))
+        compliance = where(touching, 1.0 / where(touching, stiffness, one), zero)
+        slopes = np.where(touching, stiffness.value, 0.0)
+        return Springs(touching, doubtful, slopes, compliance, bound, margin)
 
     def response(self, right: Ball, total: Ball) -> Response:
         """The solution x (n,) and beta, a number, of  x / c + A x = right + beta,  sum x = total.

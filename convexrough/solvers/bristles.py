@@ -50,7 +50,6 @@ from convexrough.solvers.programs import (
     ProgramAnswer,
     QuadraticProgram,
     RawAnswer,
-    Reduction,
     run_osqp,
 )
 from convexrough.solvers.solution import Solution
@@ -107,7 +106,7 @@ class BristleQP:
     ) -> Solution:
         """The solution in scaled units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
-        loads, approach, iterations = program.through(self.run)
+        loads, approach, iterations = program.invert(self.run(program.apply()))
         if self.newton_step:
             last = newton_step(problem, loads)
             loads, approach = last.loads, last.approach
@@ -120,7 +119,7 @@ class BristleQP:
 
 
 @dataclass(frozen=True, eq=False)
-class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
+class BristleProgram:
     """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row.
 
     m       : number of bristles in each row

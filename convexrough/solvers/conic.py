@@ -20,7 +20,6 @@ from convexrough.solvers.programs import (
     ConeProgram,
     ProgramAnswer,
     RawAnswer,
-    Reduction,
     run_clarabel,
 )
 
@@ -72,7 +71,7 @@ class Conic(ConeSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
+class LiftedProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity these

@@ -9,7 +9,7 @@ contact, until the others are found to be open.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,16 +42,6 @@ ACCURATE = 1e-12
 MARGIN = 0.03
 
 
-class PressingState(NamedTuple):
-    unknown: Array  # delta, the indentation; minus the gap, or 0, where open
-    forces: Array  # the loads P(delta) by Hertz's law
-    defect: Array  # F = delta + A P - D
-    energy: float  # Phi(P)
-    residual: float  # max |F|
-    scale: float  # |D0| + max |d_i|
-    at: Pressed  # the loads, A P, the gaps and D0
-
-
 @dataclass(frozen=True)
 class Pressing:
     """The contact law, in the form of `convex.newton`: docs/theory/newton.md, "The normal map".
@@ -65,8 +55,8 @@ class Pressing:
     solver: ClassVar[str] = "newton"
     unit: ClassVar[str] = "the approach"
 
-    def evaluate(self, unknown: Array) -> PressingState | None:
-        """The state whose loads have the prescribed total; None if none is positive."""
+    def evaluate(self, unknown: Array) -> newton.Iterate | None:
+        """The state with loads of the prescribed total, `Pressed`; None if none is positive."""
         problem, total = self.problem, 0.0
         if problem.approach is not None:
             unknown = np.minimum(unknown, problem.approach + problem.offsets)
@@ -77,9 +67,9 @@ class Pressing:
             total = at.approach * problem.load
         energy = float(at.loads @ (at.gap - 0.4 * at.own - 0.5 * at.displacement)) + total
         residual, scale = float(np.abs(at.defect).max()), float(abs(at.approach)) + self.farthest
-        return PressingState(at.unknown, at.loads, at.defect, energy, residual, scale, at)
+        return newton.Iterate(at.unknown, at.loads, at.defect, energy, residual, scale, at)
 
-    def direction(self, state: PressingState, left: float) -> Array:
+    def direction(self, state: newton.Iterate, left: float) -> Array:
         return correct(
             self.problem.influence,
             self.problem.shells,
@@ -89,17 +79,17 @@ class Pressing:
             tolerance=left,
         )
 
-    def gradient(self, state: PressingState) -> Array:
+    def gradient(self, state: newton.Iterate) -> Array:
         """The gradient of the energy: the gap."""
-        return state.at.gap
+        return np.asarray(state.at.gap)
 
-    def energy_rounding(self, state: PressingState) -> float:
+    def energy_rounding(self, state: newton.Iterate) -> float:
         return SAFETY * float(state.forces.sum()) * state.scale
 
-    def noise(self, state: PressingState) -> float:
+    def noise(self, state: newton.Iterate) -> float:
         return self.problem.influence.rounding(state.forces).negligible(state.at.displacement)
 
-    def advice(self, state: PressingState) -> str:
+    def advice(self, state: newton.Iterate) -> str:
         """What to try, which depends on the convexity number where the method stopped."""
         number = self.problem.convexity_number(state.forces)
         if number < 1:
@@ -162,7 +152,8 @@ class Newton:
             if len(near) == len(problem):
                 return state.forces, float(state.at.approach), iterations
             # The iteration left out some asperities: compute the gaps of all.
-            loads, gap = _everywhere(problem, near, state)
+            loads = among_zeros(state.forces, near, len(problem))
+            gap = problem.gap(loads, problem.influence.apply(loads), float(state.at.approach))
             touched = gap < 0
             touched[near] = False
             if not touched.any():
@@ -180,7 +171,7 @@ class Newton:
         problem: NormalProblem,
         near: Indices,
         indentation: Array,
-    ) -> tuple[PressingState, int]:
+    ) -> tuple[newton.Iterate, int]:
         """The solution in which only the asperities `near` carry loads, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
@@ -224,8 +215,3 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     if problem.load is not None:
         loads = loads / loads.max() * problem.load  # also if they are too small for a sum
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
-
-
-def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    loads = among_zeros(state.forces, near, len(problem))
-    return loads, problem.gap(loads, problem.influence.apply(loads), float(state.at.approach))
