@@ -30,18 +30,12 @@ ROUNDING = 1e-9
 #: Convexity numbers tried with overlapping shells, and with Cholesky factorisation.
 CROWDED = (0.9, 0.99, 0.999, 0.9999)
 
-#: Weight of the contact radii in the radii of fitted shells; the other weight is on distances.
-FITTED = 0.9
-
 #: Radii of overlapping shells, divided by the smallest radii that are enough without overlap.
 WIDTHS = (2.0, 4.0, 8.0)
 
 #: Relative distance from the radii to the upper ends of a box in which all asperities that do not
 #: touch are fixed open: for radii with thirty digits, float64 numbers, and less accurate ones.
 LEEWAY = (1e-12, 1e-6, 1e-2)
-
-#: The box, the convexity number and the shells of an argument.
-Reason = tuple[Array, float, Array | None]
 
 
 class Argument(NamedTuple):
@@ -118,22 +112,19 @@ class TrialState:
 
     def arguments(self) -> Iterator[Argument]:
         """The arguments that are valid in floating point, the most general first."""
-        top = self.ceiling[0]
-        for argument in self._tried():
-            yield Argument(*argument, top)
-
-    def _tried(self) -> Iterator[Reason]:
         for beyond, least in ROOM:
-            box = self._box(beyond, least)
-            room = self._room(box)
-            yield from _by_shells(box, room)
-            yield from self._crowded(box)
-            yield from self._local(box, room)
-            yield from self._local(box, self._fitted(room))
+            yield from self._on(self._box(beyond, least))
         for beyond in LEEWAY:
-            box = self.radii * (1 + beyond)
-            yield from _by_shells(box, self._room(box))
-            yield from self._crowded(box)
+            yield from self._on(self.radii * (1 + beyond))
+
+    def _on(self, box: Array) -> Iterator[Argument]:
+        """At most two arguments on a box: by shells that do not overlap, and one for crowds."""
+        shells, able = self._room(box) * (1 - ROUNDING), box > 0
+        least = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING))
+        if (number := least * (1 + ROUNDING)) < 1:
+            yield Argument(box, number, shells, self.ceiling[0])
+        if crowded := self._crowded(box):
+            yield crowded
 
     def _room(self, box: Array) -> Array:
         """(n,) [length] half the distances to the nearest asperity in the box; 0 for others."""
@@ -151,8 +142,8 @@ class TrialState:
         box[(deepest < -ROUNDING * size) & (self.radii == 0)] = 0.0
         return box
 
-    def _crowded(self, box: Array) -> Iterator[Reason]:
-        """At most one argument: by overlapping shells, or if none is found by Cholesky's method."""
+    def _crowded(self, box: Array) -> Argument | None:
+        """An argument by overlapping shells, or if none is found by Cholesky's method."""
         able = np.flatnonzero(box)
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:
@@ -164,8 +155,7 @@ class TrialState:
                 if (overlaps < s * (width - 1)).all():
                     shells = np.zeros(len(box))
                     shells[able] = s * (1 + ROUNDING)
-                    yield box, number, shells
-                    return
+                    return Argument(box, number, shells, self.ceiling[0])
         root = np.sqrt(2 * box[able])
         scaled = root[:, None] / (np.pi * apart) * root
         for number in CROWDED:
@@ -174,29 +164,5 @@ class TrialState:
                 cholesky(scaled, lower=True, check_finite=False)
             except LinAlgError:
                 continue
-            yield box, number, None
-            return
-
-    def _fitted(self, room: Array) -> Array:
-        """(n,) shells 0.9 a / c + 0.1 room, with the largest (a_i + a_j) / r_ij as c."""
-        able = np.flatnonzero(room)
-        a = self.radii[able]
-        crowding = float(((a[:, None] + a) / self.apart[np.ix_(able, able)]).max(initial=0.0))
-        if crowding == 0:
-            return room
-        return np.where(room > 0, FITTED * self.radii / crowding + (1 - FITTED) * room, 0.0)
-
-    def _local(self, box: Array, shells: Array) -> Iterator[Reason]:
-        """Arguments on a box that ends half-way between the radii and the limit of convexity."""
-        end = np.pi / 2 * shells
-        number = float((self.radii[box > 0] / end[box > 0]).max(initial=0.0))
-        if number < 1:
-            yield from _by_shells(np.minimum(box, (1 + number) / 2 * end), shells)
-
-
-def _by_shells(box: Array, shells: Array) -> Iterator[Reason]:
-    able = box > 0
-    shells = shells * (1 - ROUNDING)
-    number = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING)) * (1 + ROUNDING)
-    if number < 1:
-        yield box, number, shells
+            return Argument(box, number, None, self.ceiling[0])
+        return None
