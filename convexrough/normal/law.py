@@ -83,20 +83,21 @@ def on_hertz_pressure(problem: Problem) -> Array:
     if approach is None:  # from the highest asperity, so that no digits of small loads are lost
         approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
     prescribed = problem.offsets + approach
-    s = np.sqrt(np.fmax(1.0 - problem.squares / (WIDER * smooth_reach(problem)), 0.0))
-    poor = ~(summed(s * prescribed if load is None else s + 0.0 * prescribed) > 0)
+    inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))
+    s = np.sqrt(np.fmax(inside, 0.0)) + 0.0 * prescribed
+    poor = ~(summed(s if load is not None else s * prescribed) > 0)
     if np.any(poor):
         highest = prescribed == prescribed.max(axis=-1, keepdims=True)
         s = np.where(poor, 1.0 * highest, s)
     displacement, own = problem.apply(s), problem.coefficients * np.cbrt(s) ** 2
     if load is not None:
-        cubed = load / summed(s + 0.0 * prescribed)  # x^3
+        cubed = load / summed(s)  # x^3
         needed = np.cbrt(cubed) ** 2 * own + cubed * displacement - prescribed
         risen = summed(np.cbrt(s) * needed) / summed(np.cbrt(s))
         return np.asarray(risen + prescribed - cubed * displacement)
     work, local, coupled = (summed(s * each) for each in (prescribed, own, displacement))
     x = np.sqrt(work / local)
-    for _ in range(5):  # Newton's method from the right of the root
+    for _ in range(8):  # Newton's method from the right of the root
         x = x - (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - np.where(work > 0, x, 0.0) ** 3 * displacement)
 

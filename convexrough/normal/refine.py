@@ -213,7 +213,8 @@ def _missing(loads: Pair, total: Pair) -> Pair:
     """(m,) the prescribed totals minus the sums of loads (m, n)."""
     m, n = loads.high.shape
     if m == 1 and n <= FEW_TERMS and np.isfinite(loads.high).all():
-        terms = [*total, *(-loads.high[0]).tolist(), *(-loads.low[0]).tolist()]
+        given = [np.asarray(part).item() for part in total]
+        terms = [*given, *(-loads.high[0]).tolist(), *(-loads.low[0]).tolist()]
         return Pair.exact([math.fsum(terms)])
     return Pair(*(np.reshape(part, -1) for part in total)) - loads.total()
 
