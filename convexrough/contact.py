@@ -227,7 +227,7 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    return _contact(_problem(scene, approach, load, influence), solver, start, began)
+    return _contact(assembled(scene, approach, load, influence), solver, start, began)
 
 
 def solve(
@@ -262,15 +262,21 @@ def levels_of(contact: Contact) -> Levels:
 def _proved_again(contact: Contact) -> Level:
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
-    problem = _problem(contact.scene, approach, load, contact.influence)
+    problem = assembled(contact.scene, approach, load, contact.influence)
     loads = contact.loads[problem.candidates] / problem.units.force
     return proved(problem, refined_loads(problem, loads))
 
 
-def _problem(
-    scene: Scene, approach: float | None, load: float | None, influence: Kind | None
+def assembled(
+    scene: Scene,
+    approach: float | None,
+    load: float | None,
+    influence: Kind | None = None,
+    highest: float | None = None,
 ) -> NormalProblem:
-    highest = np.inf if load is not None and len(scene) <= FEW else None
+    """The problem that `press` solves; few asperities are all included under a prescribed load."""
+    if highest is None and load is not None and len(scene) <= FEW:
+        highest = np.inf
     return NormalProblem.assemble(
         scene, approach=approach, load=load, influence=influence, highest=highest
     )

@@ -84,7 +84,7 @@ def on_hertz_pressure(problem: Problem) -> Array:
         approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
     prescribed = problem.offsets + approach
     inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))
-    s = np.sqrt(np.fmax(inside, 0.0)) + 0.0 * prescribed
+    s = np.sqrt(np.fmax(inside, 0.0)) + 0.0 * (prescribed + problem.control.value)
     poor = ~(summed(s if load is not None else s * prescribed) > 0)
     if np.any(poor):
         highest = prescribed == prescribed.max(axis=-1, keepdims=True)
