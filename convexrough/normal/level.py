@@ -80,6 +80,7 @@ class Level:
     row for each: arrays are (m, n) or, if they hold one number per problem, (m, 1).
 
     loads, indentation : P_i and n_i;  approach : () D0
+    open      : (n,) True where an asperity is proved to have a gap
     trial     : the loads from which the solution was proved, and their residuals; None at L = 0
     box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
         L = 0. Where nothing is proved, the radii of the balls are infinite
@@ -93,6 +94,7 @@ class Level:
     loads: Ball
     indentation: Ball
     approach: Ball
+    open: NDArray[np.bool_]
     trial: Trial | None
     box: Box | None = None
     distance: Any = np.inf
@@ -105,7 +107,8 @@ class Level:
         loads = Ball.around(state.loads, np.inf)
         indentation = Ball.around(state.indentation.mid, np.inf)
         approach = Ball.around(state.approach.mid, np.inf if problem.by_load else 0.0)
-        return cls(problem, loads, indentation, approach, state, obstacle=obstacle)
+        none = np.zeros(len(problem), dtype=bool)
+        return cls(problem, loads, indentation, approach, none, state, obstacle=obstacle)
 
     @classmethod
     def unloaded(cls, problem: NormalProblem) -> Level:
@@ -116,18 +119,14 @@ class Level:
         ties = np.flatnonzero(offsets.upper >= ends[0])
         if len(ties) > 1:
             highest = Ball.around(highest.mid, highest.radius + (ends[1] - ends[0]))
-        loads = Ball.exact(np.zeros(len(problem)))
-        return cls(problem.at_load(Ball.exact(0.0)), loads, offsets - highest, -highest, None)
+        loads, below = Ball.exact(np.zeros(len(problem))), offsets - highest
+        unloaded = problem.at_load(Ball.exact(0.0))
+        return cls(unloaded, loads, below, -highest, below.negative, None)
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
         """(n,) True where an asperity is proved to carry a load."""
         return self.indentation.positive | self.loads.positive
-
-    @cached_property
-    def open(self) -> NDArray[np.bool_]:
-        """(n,) True where an asperity is proved to have a gap."""
-        return self.indentation.negative
 
     @cached_property
     def load(self) -> Ball:
@@ -151,7 +150,7 @@ class Level:
         assert it is not None
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
         trial = Trial(problem, *own, it.approach[k, 0], it.missing[k, 0])
-        found = self.loads[k], self.indentation[k], self.approach[k, 0]
+        found = self.loads[k], self.indentation[k], self.approach[k, 0], self.open[k]
         norm = float(self.distance[k, 0]), self.compliance[k]
         return Level(problem, *found, trial, self.box, *norm)
 

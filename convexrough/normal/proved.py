@@ -100,10 +100,10 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
-    found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
-    loads = _sharpened(problem, found, indentation)
-    level = Level(cast(Any, problem), loads, indentation, approach, state, box, within, h)
-    return inside, at_first, level
+    opened = indentation.negative
+    found = Ball.around(state.loads, np.where(opened, 0.0, errors))
+    solution = _sharpened(problem, found, indentation), indentation, approach, opened
+    return inside, at_first, Level(cast(Any, problem), *solution, state, box, within, h)
 
 
 class _Missing(NamedTuple):
