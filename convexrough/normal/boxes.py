@@ -93,8 +93,8 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
 
     displacement : (n,) A `loads`
     """
-    approach_bound = lowest_approach_bound(problem, loads, displacement)
-    corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
+    highest = problem.overhang(loads, displacement)
+    corner = np.maximum(problem.bounds(highest), loads)  # the box must hold both states
     h = problem.compliance(corner)
     nowhere, none = even(np.inf, len(problem)), np.zeros(len(problem), dtype=bool)
     if (theta := problem.convexity_at(h)) < 1:
@@ -105,7 +105,8 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
         return
     theta = problem.convexity_number(loads)
     if theta > FIT_FROM:
-        fitted = problem.fitted_to(loads)
+        radii = problem.radii(problem.compliance(loads))
+        fitted = replace(problem, shells=fitted_shells(problem.influence, radii, FITTED))
         if (number := fitted.convexity_number(loads)) < theta:
             problem, theta = fitted, number
     if theta < 1:
@@ -115,16 +116,6 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
         local = np.minimum(corner, faces)
         beyond = np.where(faces < corner, faces, np.inf)
         yield Box("local", problem, local, problem.compliance(local), theta, beyond, none)
-
-
-def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
-    """An upper bound on the approach of every solution; `displacement` is A `loads`.
-
-    Under a prescribed load it is the smaller of `problem.highest` and `problem.overhang`.
-    """
-    if problem.load is None:
-        return problem.approach_bound
-    return min(problem.highest, problem.overhang(loads, displacement))
 
 
 def box_of_touching(

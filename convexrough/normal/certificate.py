@@ -20,7 +20,7 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
-from convexrough.normal.boxes import Box, Scope, lowest_approach_bound
+from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
@@ -202,8 +202,8 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
         return _unproved(level, start, gaps)
     others = NO_OTHERS
     if box.scope != "global":
-        approach_bound = lowest_approach_bound(problem, level.loads.value, start.product.value)
-        others = OtherSolutions.of(problem, level.loads.upper, approach_bound)
+        highest = problem.overhang(level.loads.value, start.product.value)
+        others = OtherSolutions.of(problem, level.loads.upper, highest)
     load_errors = _load_errors(problem, loads, level)
     moved = _apart(start.loads.high, level) + np.abs(start.loads.low)
     shift = float((level.approach - start.approach.value).size)

@@ -30,12 +30,10 @@ from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, tak
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
-from convexrough.influence.shells import fitted_shells, shells
+from convexrough.influence.shells import shells
 from convexrough.normal.load_control import (
     approach_bound,
     highest_approach,
-    shifted_to_load,
-    smooth_displacement,
 )
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import Radius, along
@@ -353,11 +351,6 @@ class NormalProblem:
             shells=shells(influence),
         )
 
-    def fitted_to(self, loads: Array) -> NormalProblem:
-        """The same problem, with shells fitted to the contact radii at these loads."""
-        shells = fitted_shells(self.influence, self.radii(self.compliance(loads)), FITTED)
-        return replace(self, shells=shells)
-
     def radii(self, compliance: Array) -> Array:
         """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
         return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
@@ -392,22 +385,6 @@ class NormalProblem:
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
         return h
 
-    def smooth_indentation(self) -> Array:
-        """(n,) initial indentations: offset minus the displacement by a smooth sphere, plus a
-        number with which the loads have the prescribed or an estimated total.
-        """
-        scene, load = self.scene, self.load
-        if load is None:
-            load = alone = float(self.bounds(self.approach_bound).sum())
-            if scene.curved:
-                smooth = hertz.local_coefficient(scene.material.contact_modulus, scene.mean_radius)
-                load = min(float(hertz.load(self.approach_bound, smooth * self.units.local)), alone)
-                load = load or alone
-        distances = scene.asperities.distances[self.candidates]
-        sunk = smooth_displacement(scene, distances, load * self.units.force) / self.units.length
-        indentation: Array = self.offsets - sunk
-        return shifted_to_load(indentation, self.coefficients, load)
-
     def convexity_number(self, loads: Array) -> float:
         """The largest shells_i / h_i with the compliances h at `loads`.
 
@@ -436,15 +413,18 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """An upper bound on D0 at every solution under load control: `load_control.approach_bound`.
+        """An upper bound on D0 at every solution: D0 itself if it is prescribed, else the smaller
+        of `highest` and `load_control.approach_bound`.
 
         weights      : (n,) approximate loads, not negative, not all 0
         displacement : (n,) A times weights
         """
-        assert self.load is not None
+        if self.load is None:
+            return self.highest
         displacement = displacement + self.influence.rounding(weights).of(displacement)
         least = self.offsets - self.offset_errors
-        return float(approach_bound(weights, displacement, self.coefficients, least, self.load))
+        found = approach_bound(weights, displacement, self.coefficients, least, self.load)
+        return min(self.highest, float(found))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""

@@ -163,12 +163,6 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
 
     enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
     """
-    loads, missing = completed(problem, _after_step(problem, state, enough, todo))
-    return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
-
-
-def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
-    """(n,) the loads of `corrected`, before they are scaled to a prescribed total."""
     loads, inside, defect = state.loads, state.inside, state.defect
     own = np.where(inside, state.local, np.minimum(-state.gap.value, 0.0))
     slopes = np.divide(1.5 * loads.high, own, out=np.zeros(own.shape), where=inside)
@@ -180,7 +174,9 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
     grown = loads.high * np.expm1(1.5 * np.log1p(np.where(near, ratio, 0.0)))
     following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
     loaded = near | (ends > 0)
-    return Pair(following.high * loaded, following.low * loaded)
+    following, missing = completed(problem, Pair(*(part * loaded for part in following)))
+    product = problem.moved(loads, state.product, following)
+    return trial(problem, following, missing, product)
 
 
 def scaled(problem: Problem, loads: Pair) -> Pair:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.normal.law import smooth_reach
+from convexrough.normal.law import on_hertz_pressure, smooth_reach
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
@@ -32,13 +32,13 @@ OWN_SHARE = 1.10
 def mean_field_indentation(problem: NormalProblem) -> Array:
     """(n,) initial indentations in scaled units, negative where open.
 
-    If the rings lead to no finite solution: `NormalProblem.smooth_indentation`.
+    If the rings lead to no finite solution: `on_hertz_pressure`.
     """
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
-        return problem.smooth_indentation()
-    return start if np.isfinite(start).all() else problem.smooth_indentation()
+        return on_hertz_pressure(problem)
+    return start if np.isfinite(start).all() else on_hertz_pressure(problem)
 
 
 def _mean_field(problem: NormalProblem) -> Array:
