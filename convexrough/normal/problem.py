@@ -40,11 +40,6 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
-#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
-#: box", 3).
-FITTED = 0.9
-
 #: Number of candidates up to which the prescribed displacements are cached.
 MOST_KEPT = 2**20
 

@@ -45,7 +45,7 @@ from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
 from convexrough.normal.law import on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import TooDenseError
+from convexrough.solvers.conic import TooDenseError
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import (
     ProgramAnswer,

@@ -16,7 +16,7 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import ConeBoxes, ConeSolver, judged
+from convexrough.solvers.conic import ConeBoxes, ConeSolver, judged
 from convexrough.solvers.programs import ProgramAnswer, load_library
 from convexrough.solvers.solution import Solution
 

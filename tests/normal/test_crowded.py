@@ -20,9 +20,8 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.normal.boxes import CROWDED_MARGINS
+from convexrough.normal.boxes import CROWDED_MARGINS, overlapping_margin, overlaps
 from convexrough.normal.certificate import OtherSolutions
-from convexrough.normal.overlap import overlapping_margin, overlaps
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import solution_in
 from convexrough.normal.refine import trial
