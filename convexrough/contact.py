@@ -35,8 +35,8 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
-#: In a scene of at most FEW asperities a press by load includes all of them, because a bound on the
-#: approach, from which some are known to be open, takes more time.
+#: In a scene of at most FEW asperities Newton's method under a load includes all of them, because a
+#: bound on the approach, from which some are known to be open, takes more time.
 FEW = 128
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    return _contact(assembled(scene, approach, load, influence), solver, start, began)
+    return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
 
 
 def solve(
@@ -244,11 +244,11 @@ def levels_of(contact: Contact) -> Levels:
 
     `contact.cached(levels_of)` returns the same object each time.
     """
-    top = vars(contact).get("_top") or _proved_again(contact)
-    assert top.trial is not None
-    loads = top.trial.loads.high
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
+    top = vars(contact).get("_top") or _proved_again(contact, solver)
+    assert top.trial is not None
+    loads = top.trial.loads.high
 
     def pressed(at_load: NormalProblem, start: Array | None) -> Array:
         try:
@@ -259,23 +259,25 @@ def levels_of(contact: Contact) -> Levels:
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
-def _proved_again(contact: Contact) -> Level:
+def _proved_again(contact: Contact, solver: Solver) -> Level:
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
-    problem = assembled(contact.scene, approach, load, contact.influence)
+    problem = assembled(solver, contact.scene, approach, load, contact.influence)
     loads = contact.loads[problem.candidates] / problem.units.force
     return proved(problem, refined_loads(problem, loads))
 
 
 def assembled(
+    solver: Solver,
     scene: Scene,
     approach: float | None,
     load: float | None,
     influence: Kind | None = None,
     highest: float | None = None,
 ) -> NormalProblem:
-    """The problem that `press` solves; few asperities are all included under a prescribed load."""
-    if highest is None and load is not None and len(scene) <= FEW:
+    """The problem that `press` solves; Newton's method includes all of few under a load."""
+    few = len(scene) <= FEW and isinstance(solver, solvers.Newton)
+    if few and highest is None and load is not None:
         highest = np.inf
     return NormalProblem.assemble(
         scene, approach=approach, load=load, influence=influence, highest=highest

@@ -74,7 +74,7 @@ class Task(Record):
     def press(self) -> Contact:
         """The contact under the prescribed approach or load. Raises the errors of `press`."""
         given = self.approach, self.load, self.influence, self.highest_approach
-        return solve(assembled(self.scene, *given), self.solver)
+        return solve(assembled(self.solver, self.scene, *given), self.solver)
 
     def cautions(self, contact: Contact) -> Iterator[str]:
         """Warnings about stages that do not fit the contact, before they are computed."""
