@@ -58,7 +58,7 @@ class Contact(Cached, Table, Plottable):
         because point forces replace pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
         1, contact discs overlap and the model fails
-    candidates    : number of asperities that can touch; the solver leaves out the others
+    candidates    : number of asperities that may touch; the solver leaves out the others
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
