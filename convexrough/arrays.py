@@ -33,7 +33,7 @@ def largest(values: NDArray[Any]) -> Any:
 
 def even(value: float, length: int) -> Array:
     """A read-only array (length,) of equal values that stores only one number."""
-    return np.broadcast_to(np.float64(value), (length,))
+    return np.ndarray((length,), np.float64, np.float64(value), strides=(0,))
 
 
 def evenly(function: Callable[[Array], Array], values: Array) -> Array:

@@ -22,11 +22,11 @@ from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
-from convexrough.normal.level import Level, Levels
-from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import Trial, refined_loads, refines
-from convexrough.normal.units import Units
+from convexrough.normal.level import Level
+from convexrough.normal.levels import Levels
+from convexrough.normal.problem import NormalProblem, Units
+from convexrough.normal.proved import proved
+from convexrough.normal.refine import refined_loads, refines
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table
@@ -34,6 +34,10 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
+
+#: In a scene of at most FEW asperities Newton's method under a load includes all of them, because a
+#: bound on the approach, from which some are known to be open, takes more time.
+FEW = 128
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
@@ -54,7 +58,7 @@ class Contact(Cached, Table, Plottable):
         because point forces replace pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
         1, contact discs overlap and the model fails
-    candidates    : number of asperities that can touch; the solver leaves out the others
+    candidates    : number of asperities that may touch; the solver leaves out the others
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
@@ -223,8 +227,7 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return _contact(problem, solver, start, began)
+    return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
 
 
 def solve(
@@ -241,32 +244,44 @@ def levels_of(contact: Contact) -> Levels:
 
     `contact.cached(levels_of)` returns the same object each time.
     """
-    problem, state, found = vars(contact).get("_known") or _proved_again(contact)
-    if isinstance(found, Obstacle):
-        total = Ball.exact(state.loads).sum() if problem.load is None else problem.total
-        top = Level.unproved(problem, state, total)
-    else:
-        top = Level.of(found, found.total if problem.load is None else problem.total)
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
+    top = vars(contact).get("_top") or _proved_again(contact, solver)
+    assert top.trial is not None
+    loads = top.trial.loads.high
 
     def pressed(at_load: NormalProblem, start: Array | None) -> Array:
         try:
             return solver.solve(at_load, start).loads
         except SolverError:  # happens if contacts are crowded
-            return solver.solve(at_load, state.loads.high).loads
+            return solver.solve(at_load, loads).loads
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
-def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
+def _proved_again(contact: Contact, solver: Solver) -> Level:
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
-    problem = NormalProblem.assemble(
-        contact.scene, approach=approach, load=load, influence=contact.influence
+    problem = assembled(solver, contact.scene, approach, load, contact.influence)
+    loads = contact.loads[problem.candidates] / problem.units.force
+    return proved(problem, refined_loads(problem, loads))
+
+
+def assembled(
+    solver: Solver,
+    scene: Scene,
+    approach: float | None,
+    load: float | None,
+    influence: Kind | None = None,
+    highest: float | None = None,
+) -> NormalProblem:
+    """The problem that `press` solves; Newton's method includes all of few under a load."""
+    few = len(scene) <= FEW and isinstance(solver, solvers.Newton)
+    if few and highest is None and load is not None:
+        highest = np.inf
+    return NormalProblem.assemble(
+        scene, approach=approach, load=load, influence=influence, highest=highest
     )
-    state = refined_loads(problem, contact.loads[problem.candidates] / problem.units.force)
-    return problem, state, proved(problem, state)
 
 
 def _contact(
@@ -277,7 +292,7 @@ def _contact(
 ) -> Contact:
     scene = problem.scene
     force = problem.units.force
-    first, known = None, None
+    first, top = None, None
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
@@ -297,9 +312,9 @@ def _contact(
         LOGGER.info("certifying")
         if refine:
             assert state is not None
-            found = proved(problem, state)
-            certificate = certificate_of(problem, loads, state, found)
-            known = (problem, state, found) if problem.influence.stored else None  # a small problem
+            level = proved(problem, state)
+            certificate = certificate_of(level, loads, state)
+            top = level if problem.influence.stored else None  # a small problem
         else:
             certificate = certify_on(problem, loads)
     contact = Contact(
@@ -319,7 +334,7 @@ def _contact(
         prescribed_load=None if problem.load is None else problem.load * force,
     )
     # Pickles omit these two. For an unpickled contact `levels_of` therefore proves the loads again.
-    contact.__dict__.update(_by=solver, _known=known)
+    contact.__dict__.update(_by=solver, _top=top)
     return contact
 
 

@@ -23,12 +23,12 @@ from convexrough.friction.levels import AT_THE_END
 from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
 from convexrough.normal.boxes import Box
+from convexrough.normal.level import Rows
+from convexrough.normal.levels import NUMBERS, solved
 from convexrough.normal.problem import Data, NormalProblem
 from convexrough.normal.stack import Stack
-from convexrough.normal.together import NUMBERS, Rows, solved
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz
 
 #: Scenes with more asperities are solved one by one, because for these stacks save no time.
 MOST = 512
@@ -46,7 +46,7 @@ class PressedRows(NamedTuple):
 
     places  : (m,) indices of the scenes;  problem : a problem that has the units of the stack
     stack, box : the problems, and the boxes of loads in which their solutions were proved
-    high    : the solutions;  squares : (m, n) [length^2] squared distances of summits from the axis
+    high    : the solutions
     """
 
     places: Indices
@@ -54,7 +54,6 @@ class PressedRows(NamedTuple):
     stack: Stack
     box: Box
     high: Rows
-    squares: Array
 
     def contacts(self) -> dict[str, NDArray[Any]]:
         """The fields of `Contacts` for these rows, by name."""
@@ -86,10 +85,9 @@ class PressedRows(NamedTuple):
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
         total = where(inside, total, high.load)[:, None]  # the result omits rows not `inside`
-        rows = replace(self.stack, exact_load=total, exact_approach=None)
-        offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
-        found = solved(rows, offsets, self.squares, reach, self.box.closed)
-        low = found.rows._replace(load=total[:, 0])
+        rows = replace(self.stack, control=total, by_load=True)
+        level, good = solved(rows, self.box.closed)
+        low = level.rows
         ordered = proved_in_rows(rows, self.box, high, low)
         slip, slide = asperity_losses(high, low)
         travel = f * ((2.0 - nu) / ((1.0 - nu) * 2.0)) * units.length
@@ -98,7 +96,7 @@ class PressedRows(NamedTuple):
         status = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
         status[high.touching & low.touching] = "partial"
         status[high.touching & low.open] = "sliding"
-        return found.good & ordered & inside, {
+        return good & ordered & inside, {
             "losses": loss.value,
             "loss_errors": loss.error,
             "displacement_amplitudes": moved.value,
@@ -176,23 +174,15 @@ def _proved(
         start += m
     unit = units.force if by_load else units.length
     given = Ball.exact(controls[places][:, None]).scaled(1.0 / unit)
-    total, depth = (given, None) if by_load else (None, given)
     shelled = np.concatenate(wells)
     exact = Data(joined(known), joined(offsets), first.exact.scale)
-    rows = Stack(coupled, exact, shelled, total, depth)
     squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
-    if by_load:
-        prescribed, reach = rows.exact.offsets.value, _reach(first, given.value)
-    else:
-        prescribed = rows.exact.offsets.value + given.value
-        reach = first.scene.mean_radius * np.maximum(given.value, 0.0) * units.length
-    found = solved(rows, prescribed, squares, reach)
-    good = np.flatnonzero(found.good)
-    if len(good):
-        high = found.rows if total is None else found.rows._replace(load=total[:, 0])
+    rows = Stack(coupled, exact, shelled, squares, given, by_load)
+    level, proved = solved(rows)
+    good = np.flatnonzero(proved)
+    if len(good) and level.box is not None:
         some = rows.only(good)
-        box = found.box.at(good, some)
-        yield PressedRows(places[good], first, some, box, high.at(good), squares[good])
+        yield PressedRows(places[good], first, some, level.box.at(good, some), level.rows.at(good))
 
 
 def _repeated(values: Array, shape: tuple[int, int]) -> Array:
@@ -210,9 +200,3 @@ def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
     offsets = Pair.exact(heights) + Pair(*(part[None, :] for part in drops))
     sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(drops.high))
     return Ball.around(offsets, 2.0**-98 * sizes)
-
-
-def _reach(problem: NormalProblem, loads: Array) -> Array:
-    scene, force = problem.scene, loads * problem.units.force
-    a = hertz.contact_radius(force, scene.material.contact_modulus, scene.mean_radius)
-    return np.asarray(a**2)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -39,35 +39,19 @@ PROMISED = 1e-4
 SHORTEST = 1e-12
 
 
-class Iterate(Protocol):
-    """A point of the iteration, with the symbols of this module.
+class Iterate(NamedTuple):
+    """A point of the iteration, with the symbols of this module."""
 
-    unknown  : eta
-    forces   : p(eta), which satisfy the constraints, such as a prescribed total
-    defect   : F(eta)
-    energy   : Phi(p)
-    residual : the largest |F|
-    scale    : the unit of residuals
-    """
-
-    @property
-    def unknown(self) -> Array: ...
-    @property
-    def forces(self) -> Array: ...
-    @property
-    def defect(self) -> Array: ...
-    @property
-    def energy(self) -> float: ...
-    @property
-    def residual(self) -> float: ...
-    @property
-    def scale(self) -> float: ...
+    unknown: Array  # eta
+    forces: Array  # p(eta), which satisfy the constraints, such as a prescribed total
+    defect: Array  # F(eta)
+    energy: float  # Phi(p)
+    residual: float  # the largest |F|
+    scale: float  # the unit of residuals
+    at: Any  # what else the law knows at this point
 
 
-Point = TypeVar("Point", bound=Iterate)
-
-
-class Law(Protocol[Point]):
+class Law(Protocol):
     """A law of contact, as Newton's method needs it.
 
     solver, unit : names of the solver and of the unit of residuals, for error messages
@@ -78,27 +62,27 @@ class Law(Protocol[Point]):
     @property
     def unit(self) -> str: ...
 
-    def evaluate(self, unknown: Array) -> Point | None:
+    def evaluate(self, unknown: Array) -> Iterate | None:
         """The state at `unknown`, eta, moved onto the constraints; None if that is impossible."""
         ...
 
-    def direction(self, state: Point, left: float) -> Array:
+    def direction(self, state: Iterate, left: float) -> Array:
         """The step d of eta; the 2-norm of F + F' d is at most about `left` times that of F."""
         ...
 
-    def gradient(self, state: Point) -> Array:
+    def gradient(self, state: Iterate) -> Array:
         """The derivative of the energy, dPhi/dp, without multipliers of the constraints."""
         ...
 
-    def energy_rounding(self, state: Point) -> float:
+    def energy_rounding(self, state: Iterate) -> float:
         """Bound on the rounding error of a change of the energy."""
         ...
 
-    def noise(self, state: Point) -> float:
+    def noise(self, state: Iterate) -> float:
         """2-norm of a defect that is small compared with the rounding errors of A p."""
         ...
 
-    def advice(self, state: Point) -> str:
+    def advice(self, state: Iterate) -> str:
         """What a user can try if the method fails at this state."""
         ...
 
@@ -121,12 +105,12 @@ class Stopping:
 
 
 def solve(
-    law: Law[Point],
-    state: Point,
+    law: Law,
+    state: Iterate,
     stopping: Stopping,
     *,
     before: float = np.inf,
-) -> tuple[Point, int]:
+) -> tuple[Iterate, int]:
     """The final state, and the number of steps.
 
     before : estimate of the 2-norm of the defect that a step before the start would have had; it
@@ -168,7 +152,7 @@ def _relative(state: Iterate) -> float:
     return state.residual / state.scale if state.scale != 0 else np.inf
 
 
-def descend(law: Law[Point], state: Point, direction: Array) -> Point:
+def descend(law: Law, state: Iterate, direction: Array) -> Iterate:
     """The state after the step, halved until the energy decreases enough by Armijo's rule."""
     gradient, rounding = law.gradient(state).ravel(), law.energy_rounding(state)
     length = 1.0

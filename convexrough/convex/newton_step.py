@@ -13,6 +13,7 @@ return A W y, from which the step d of every asperity follows, touching or not.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -84,8 +85,7 @@ def _factorise(
     defect: Array,
     balanced: bool,
 ) -> Array:
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
+    dpotrf, dpotrs = _cholesky()
     w = root[touching]
     matrix = influence.submatrix(touching)
     matrix *= w
@@ -104,6 +104,14 @@ def _factorise(
     changes = np.zeros(len(root))
     changes[touching] = w * y
     return shift - defect + influence.apply(changes)
+
+
+@cache
+def _cholesky() -> tuple[Any, Any]:
+    """LAPACK's factorisation and solution."""
+    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
+
+    return dpotrf, dpotrs
 
 
 def _iterate(

@@ -28,8 +28,7 @@ from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
-from convexrough.normal.level import Level, rows_of
-from convexrough.normal.together import Rows
+from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
@@ -73,7 +72,7 @@ class FrictionLevels:
     @property
     def proved(self) -> bool:
         """True if the normal solution at P is proved."""
-        return self.top.solution is not None
+        return self.top.box is not None
 
     @property
     def presses(self) -> int:
@@ -163,7 +162,7 @@ class FrictionLevels:
             coupled = self._beyond.apply(loads)
             high[others] -= coupled
             radius[others] += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
-            radius[others] += level.solution.moves(self._beyond) if level.solution else np.inf
+            radius[others] += level.moves(self._beyond)
         return Ball(Pair(high, low), radius * (1 + SAFETY))
 
     @cached_property

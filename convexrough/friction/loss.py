@@ -21,8 +21,8 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.friction.curve import Piece
 from convexrough.friction.levels import FrictionLevels, exactly
-from convexrough.normal.level import Level, energies
-from convexrough.normal.together import NUMBERS, Rows
+from convexrough.normal.level import Level, Rows, energies
+from convexrough.normal.levels import NUMBERS
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 

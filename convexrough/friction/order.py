@@ -68,9 +68,8 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.friction.sweeping import swept_rates
 from convexrough.normal.boxes import Box
-from convexrough.normal.level import Level, rows_of
+from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.normal.stack import Stack
-from convexrough.normal.together import Rows
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
@@ -143,11 +142,11 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rising : (n,) true for asperities that may touch at the highest load of the path
     most   : as in `order_between`
     """
-    found, problem = upper.solution, upper.problem
-    if found is None or (found.box.fixed_open & ~upper.open).any():
+    box, problem = upper.box, upper.problem
+    if box is None or (box.fixed_open & ~upper.open).any():
         return False
     influence = problem.influence
-    span = _Span.of(rows_of([upper]), rows_of([lower]), problem.exact.coefficients, found.box)
+    span = _Span.of(rows_of([upper]), rows_of([lower]), problem.exact.coefficients, box)
     (c,), support = span.c, np.flatnonzero(~upper.open)
     coupled = influence.apply(c)
     coupled = coupled + influence.rounding(c).of(coupled)
@@ -288,9 +287,9 @@ class _Span(NamedTuple):
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
     """True unless each asperity is proved open at `lower`, or is rising and proved deeper above."""
-    if upper.solution is None:
+    if upper.box is None:
         return True
-    if lower.solution is None:
+    if lower.box is None:
         return float(lower.load.size) > 0
     grows = (upper.indentation - lower.indentation).positive
     return not (lower.open | (rising & grows)).all()

@@ -21,7 +21,8 @@ from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
 from convexrough.gradients.parts import ZERO, Moves, Part
 from convexrough.gradients.scene import Bending, Geometry
-from convexrough.normal.level import Level, Levels
+from convexrough.normal.level import Level
+from convexrough.normal.levels import Levels
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.base import named

@@ -30,10 +30,11 @@ from convexrough.friction.shear import ShearState
 from convexrough.gradients.along import NONE, Along
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.parts import ZERO, Moves, Part, product
-from convexrough.normal.level import Level, Levels
-from convexrough.normal.proved import Obstacle, proved
+from convexrough.normal.level import Level
+from convexrough.normal.levels import Levels
+from convexrough.normal.problem import Units
+from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
-from convexrough.normal.units import Units
 
 #: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
 #: about 1e-15 at first, and each step raises it to the power 3/2.
@@ -301,7 +302,7 @@ def _loss(number: Number, order: Order) -> Number:
 
 def _where_open(level: Level, weights: Array) -> Ball:
     """(n,) weights of gaps: 0 where touching; where undecided, intervals from 0 to the weight."""
-    if level.solution is None:
+    if level.box is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
     low, high = np.minimum(weights, 0.0), np.maximum(weights, 0.0)
@@ -316,10 +317,7 @@ def _wider(level: Level, which: Indices) -> Level:
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)
     state = refined_loads(problem, among_zeros(level.trial.loads.high, places, len(which)))
-    found = proved(problem, state)
-    if isinstance(found, Obstacle):
-        return Level.unproved(problem, state, level.load)
-    return Level.of(found, level.load)
+    return proved(problem, state)
 
 
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:

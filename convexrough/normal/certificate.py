@@ -20,10 +20,10 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
-from convexrough.normal.boxes import Scope, lowest_approach_bound
-from convexrough.normal.other_solutions import NO_OTHERS, OtherSolutions
+from convexrough.normal.boxes import Box, Scope
+from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import Obstacle, Proved, proved
+from convexrough.normal.proved import proved
 from convexrough.normal.refine import Trial, completed, refined, refines, scaled, trial
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -33,6 +33,11 @@ from convexrough.sphere import hertz
 #: Statuses by their codes.
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
+
+#: If contact radii are at most this fraction of the distance to the nearest neighbour, in every
+#: other solution a disc covers a neighbour's summit. In units of this distance it is the radius a
+#: for which (1), with the radius b = 1 in the other solution, gives m = pi / 4; rounded down.
+ROOMY = 0.52
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -172,39 +177,39 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     pair, missing = completed(problem, scaled(problem, Pair.exact(given)))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
     start = trial(problem, pair, missing, product)
-    found = proved(problem, start)
+    level = proved(problem, start)
     if refines(problem) and len(problem):
         better = proved(problem, refined(problem, start))
-        found = better if isinstance(better, Proved) else found
-    return certificate_of(problem, loads, start, found)
+        level = level if better.box is None else better
+    return certificate_of(level, loads, start)
 
 
-def certificate_of(
-    problem: NormalProblem, loads: Array, start: Trial, found: Proved | Obstacle
-) -> Certificate:
+def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     """The certificate of loads (N,) [force] of all asperities of the scene.
 
+    level : the solution proved near them, or the obstacle to a proof
     start : the loads of the asperities that can touch, scaled to the total if that is prescribed
-    found : a solution proved near them, or the obstacle to a proof
     """
+    problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
-    others = NO_OTHERS
-    if isinstance(found, Proved) and found.box.scope != "global":
-        approach_bound = lowest_approach_bound(problem, found.loads.value, start.product.value)
-        others = OtherSolutions.of(problem, found.loads.upper, approach_bound)
     screened = _screened(problem, start)
-    here = isinstance(found, Proved) and start is found.trial
-    known = found.indentation if isinstance(found, Proved) and here else start.indentation
+    here = box is not None and start is level.trial
+    known = level.indentation if here else start.indentation
     indentation = problem.to_scene(known.value)
     indentation[screened.which] = screened.indentation
-    if isinstance(found, Obstacle):
-        return _unproved(problem, start, indentation, found)
-    load_errors = _load_errors(problem, loads, found)
-    moved = _apart(start.loads.high, found) + np.abs(start.loads.low)
-    shift = float((found.approach - start.approach.value).size)
-    energy = _energy_error(problem, start, found, moved)
+    gaps, approach = frozen(np.maximum(-indentation, 0.0) * length), float(start.approach.value)
+    if box is None:
+        return _unproved(level, start, gaps)
+    others = NO_OTHERS
+    if box.scope != "global":
+        highest = problem.overhang(level.loads.value, start.product.value)
+        others = OtherSolutions.of(problem, level.loads.upper, highest)
+    load_errors = _load_errors(problem, loads, level)
+    moved = _apart(start.loads.high, level) + np.abs(start.loads.low)
+    shift = float((level.approach - start.approach.value).size)
+    energy = _energy_error(level, box, start, moved)
     errors = problem.to_scene(
-        found.indentation.error if here else (found.indentation - known.value).size
+        level.indentation.error if here else (level.indentation - known.value).size
     )
     errors[screened.which] = screened.rounding + shift
     if screened.coupling is not None:
@@ -213,31 +218,49 @@ def certificate_of(
     errors *= 1 + SAFETY
     codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
     codes[screened.which[screened.below]] = OPEN
-    codes[problem.candidates[found.touching]] = TOUCHING
-    codes[problem.candidates[found.open]] = OPEN
+    codes[problem.candidates[level.touching]] = TOUCHING
+    codes[problem.candidates[level.open]] = OPEN
     energy += _screened_energy(problem, loads, indentation, errors)
     return Certificate(
         scope="local" if others.possible else "global",
-        convexity_number=found.box.convexity_number,
+        convexity_number=box.convexity_number,
         codes=frozen(codes),
         load_errors=frozen(load_errors),
-        gaps=frozen(np.maximum(-indentation, 0.0) * length),
+        gaps=gaps,
         gap_errors=frozen(errors * length),
-        approach=float(start.approach.value) * length,
+        approach=approach * length,
         approach_error=0.0 if problem.load is None else shift * (1 + SAFETY) * length,
         duality_gap=energy * (force * length),
-        fixed_open=int(found.box.fixed_open.sum()),
+        fixed_open=int(box.fixed_open.sum()),
         other_solutions_crowding=others.crowding,
         other_solutions_cover=others.cover,
     )
 
 
-def _apart(loads: Array, found: Proved) -> Array:
+def _unproved(level: Level, start: Trial, gaps: Array) -> Certificate:
+    problem, n = level.problem, len(gaps)
+    reason, which = level.obstacle or ("", np.zeros(0, dtype=np.intp))
+    return Certificate(
+        scope="none",
+        convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
+        codes=frozen(np.zeros(n, dtype=np.int8)),
+        load_errors=frozen(np.full(n, np.inf)),
+        gaps=gaps,
+        gap_errors=frozen(np.full(n, np.inf)),
+        approach=float(start.approach.value) * problem.units.length,
+        approach_error=0.0 if problem.load is None else np.inf,
+        duality_gap=np.inf,
+        in_the_way=frozen(problem.candidates[which]),
+        obstacle=reason,
+    )
+
+
+def _apart(loads: Array, found: Level) -> Array:
     """(n,) bounds on |load - solution| of the asperities that can touch, in scaled units."""
     return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
 
 
-def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
+def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
     """(N,) [force] bounds on |load - solution|; the load itself where an asperity cannot touch."""
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
@@ -245,7 +268,7 @@ def _load_errors(problem: NormalProblem, loads: Array, found: Proved) -> Array:
     return errors
 
 
-def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
+def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
     It is e'|P - P*| if Phi is convex from P to P*, with the violations e of the contact law at P.
@@ -254,22 +277,25 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 
     moved : (n,) bounds on |P - P*|
     """
-    box, loads, excess = found.box, start.loads.high, start.excess
+    problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
-        excess += 2 * ROUNDOFF * (start.local + start.product.size)
+        excess = excess + 2 * ROUNDOFF * (start.local + start.product.size)
         moved = moved + ROUNDOFF * loads
-    excess[box.fixed_open & (loads == 0)] = 0.0
-    if (box.fixed_open & (loads > 0)).any():
-        q = np.where(box.fixed_open, loads * (1 + SAFETY), 0.0)
-        displacement = problem.influence.apply(q)
-        excess += displacement + problem.influence.rounding(q).of(displacement)
-    most = np.maximum(box.loads, loads * (1 + SAFETY))
-    most[box.fixed_open] = 0.0
-    # A >= -theta H on the box; at larger loads H is at least this fraction of its value on the box.
-    part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min(initial=1.0)
-    convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
-    if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
-        return np.inf
+    most, opened = loads * (1 + SAFETY), box.fixed_open
+    if opened.any():
+        excess = np.where(opened & (loads == 0), 0.0, excess)
+        if (opened & (loads > 0)).any():
+            q = np.where(opened, most, 0.0)
+            displacement = problem.influence.apply(q)
+            excess = excess + displacement + problem.influence.rounding(q).of(displacement)
+        most[opened] = 0.0
+    if (most > box.loads).any():  # A >= -theta H on the box
+        most = np.maximum(box.loads, most)
+        # At larger loads H is at least this fraction of its value on the box.
+        part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
+        convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
+        if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
+            return np.inf
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)
 
@@ -293,7 +319,7 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
         return _Screened(others, others > 0, None, np.zeros(0), np.zeros(0))
     coupling = problem.influence.onto(scene.contact_points[others])
     product, offsets = coupling.apply(loads), scene.offsets[others] / length
-    below = (offsets != 0) | (problem.approach_bound != 0)
+    below = (offsets != 0) | (problem.highest != 0)
     approach = float(start.approach.value)
     rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
     rounding += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
@@ -327,20 +353,43 @@ def _screened_energy(
     return max(energy, checks.SMALLEST)
 
 
-def _unproved(
-    problem: NormalProblem, start: Trial, indentation: Array, obstacle: Obstacle
-) -> Certificate:
-    n, length = len(indentation), problem.units.length
-    return Certificate(
-        scope="none",
-        convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
-        codes=frozen(np.zeros(n, dtype=np.int8)),
-        load_errors=frozen(np.full(n, np.inf)),
-        gaps=frozen(np.maximum(-indentation, 0.0) * length),
-        gap_errors=frozen(np.full(n, np.inf)),
-        approach=float(start.approach.value) * length,
-        approach_error=0.0 if problem.load is None else np.inf,
-        duality_gap=np.inf,
-        in_the_way=frozen(problem.candidates[obstacle.which]),
-        obstacle=obstacle.reason,
-    )
+class OtherSolutions(NamedTuple):
+    """Properties of all solutions other than the one found, which a local certificate describes.
+
+    docs/theory/crowded.md, "Other solutions", derives them; (1) is an equation of that page.
+    """
+
+    possible: bool  # False if it is proved that there are none
+    crowding: float  # lower bound on their crowding (see `Certificate`); infinite if there are none
+    cover: bool  # in each of them a disc covers the nearest neighbour's summit
+
+    @classmethod
+    def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
+        """The properties of solutions other than the one found.
+
+        near           : (n,) upper bounds on the loads of the solution found
+        approach_bound : upper bound on the approach of every solution
+        """
+
+        def radii(loads: Array) -> Array:
+            return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
+
+        A = problem.influence
+        perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
+        a = radii(near)
+        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(approach_bound)))
+        if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
+            return NO_OTHERS
+        crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
+        cover = bool((a <= ROOMY * A.separations()).all())
+        return cls(True, max(crowding, 0.0), cover)
+
+
+NO_OTHERS = OtherSolutions(False, np.inf, True)
+
+
+def _mean(a: Array, b: Array) -> Array:
+    """(n,) m of (1) for contact radii a and b in two solutions; it increases with both."""
+    total = a + b
+    product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

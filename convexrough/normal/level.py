@@ -1,4 +1,4 @@
-"""Normal solutions of a scene at total loads L, from which friction and gradients are computed.
+"""A normal solution of a scene at a total load L, from which friction and gradients are computed.
 
 A proved solution is the only one in a box of loads. At the total load L it has the loads P_i(L),
 the approach D0(L), the indentations n_i(L) (minus the gap where open), and the energy
@@ -12,39 +12,29 @@ with c = dP/dn = (3/2) P^(1/3) / k; elsewhere q_i = 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball, where
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices, summed
 from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
+from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box
 from convexrough.normal.problem import REDUCTION, NormalProblem
-from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, refined_loads
-from convexrough.normal.stack import Stack
-from convexrough.normal.together import NUMBERS, Rows, solved
+from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial
 from convexrough.roundoff import SAFETY
-from convexrough.sphere import hertz
 
 #: Largest accepted residual of `Level.response` after refinement, divided by that before it.
 SOLVED = 1e-6
-
-#: Largest number of candidates for which levels are solved together: for more this saves no time.
-MOST = 512
-
-#: A function of a problem and initial loads (or None) that returns loads, all in scaled units.
-Press = Callable[[NormalProblem, Array | None], Array]
 
 
 class Response(NamedTuple):
@@ -75,55 +65,50 @@ class Springs(NamedTuple):
     margin: float
 
 
+class Obstacle(NamedTuple):
+    """The reason why nothing is proved, and the indices of the candidates that cause this."""
+
+    reason: str
+    which: Indices
+
+
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The normal solution at one total load, as balls in scaled units.
+    """A normal solution near computed loads, as balls in scaled units.
 
-    load, approach : () the total load L and the approach D0(L)
-    loads, indentation : (n,) P_i(L) and n_i(L) of the asperities that could touch (candidates)
-    touching : (n,) True where the asperity is proved to touch
-    open     : (n,) True where it is proved to be open
-    solution : what is proved; None without a proof, and at L = 0
-    trial    : the computed loads and their residuals; None at L = 0
+    All arrays are (n,), for the asperities of `problem`. The level of a stack of m problems has one
+    row for each: arrays are (m, n) or, if they hold one number per problem, (m, 1).
+
+    loads, indentation : P_i and n_i;  approach : () D0
+    open      : (n,) True where an asperity is proved to have a gap
+    trial     : the loads from which the solution was proved, and their residuals; None at L = 0
+    box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
+        L = 0. Where nothing is proved, the radii of the balls are infinite
+    distance  : bound on the norm of P - P* for the loads P of `trial` and the solution P*; the
+        square of the norm is sum_i h_i (P_i - P*_i)^2
+    compliance : (n,) h of this norm, the diagonal of H for a smaller box
+    obstacle  : the reason why nothing is proved, or None
     """
 
     problem: NormalProblem
-    load: Ball
-    approach: Ball
     loads: Ball
     indentation: Ball
-    touching: NDArray[np.bool_]
+    approach: Ball
     open: NDArray[np.bool_]
-    solution: Proved | None = None
-    trial: Trial | None = None
+    trial: Trial | None
+    box: Box | None = None
+    distance: Any = np.inf
+    compliance: Array = field(default_factory=lambda: np.zeros(0))
+    obstacle: Obstacle | None = None
 
     @classmethod
-    def of(cls, found: Proved, load: Ball) -> Level:
-        """The level of a proved solution whose total load is `load`."""
-        return cls(
-            found.problem,
-            load,
-            found.approach,
-            found.loads,
-            found.indentation,
-            found.touching,
-            found.open,
-            found,
-            found.trial,
-        )
-
-    @classmethod
-    def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """A level of loads near which nothing is proved.
-
-        The balls of loads and indentations have infinite radii. So has that of the approach, unless
-        the approach is prescribed; then its radius is 0.
-        """
-        unknown = Ball.around(state.loads, np.inf)
-        none = np.zeros(len(problem), dtype=bool)
-        approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
+    def unproved(cls, problem: NormalProblem, state: Trial, obstacle: Obstacle) -> Level:
+        """A level of loads near which nothing is proved; a prescribed approach is still known."""
+        loads = Ball.around(state.loads, np.inf)
         indentation = Ball.around(state.indentation.mid, np.inf)
-        return cls(problem, load, approach, unknown, indentation, none, none, None, state)
+        approach = Ball.around(state.approach.mid, np.inf if problem.by_load else 0.0)
+        none = np.zeros(len(problem), dtype=bool)
+        return cls(problem, loads, indentation, approach, none, state, obstacle=obstacle)
 
     @classmethod
     def unloaded(cls, problem: NormalProblem) -> Level:
@@ -134,11 +119,55 @@ class Level:
         ties = np.flatnonzero(offsets.upper >= ends[0])
         if len(ties) > 1:
             highest = Ball.around(highest.mid, highest.radius + (ends[1] - ends[0]))
-        below = offsets - highest
-        n = len(problem)
-        touching = np.zeros(n, dtype=bool)
-        zero = Ball.exact(np.zeros(n))
-        return cls(problem, Ball.exact(0.0), -highest, zero, below, touching, below.negative)
+        loads, below = Ball.exact(np.zeros(len(problem))), offsets - highest
+        unloaded = problem.at_load(Ball.exact(0.0))
+        return cls(unloaded, loads, below, -highest, below.negative, None)
+
+    @cached_property
+    def touching(self) -> NDArray[np.bool_]:
+        """(n,) True where an asperity is proved to carry a load."""
+        return self.indentation.positive | self.loads.positive
+
+    @cached_property
+    def load(self) -> Ball:
+        """() the total load L; if it is not prescribed, with an error bound by Cauchy's inequality.
+
+        Where nothing is proved it is the sum of the computed loads.
+        """
+        if self.problem.by_load:
+            return self.problem.control
+        assert self.trial is not None
+        total = Ball.exact(self.trial.loads).sum()
+        if self.box is None:
+            return total
+        with np.errstate(invalid="ignore"):  # nan only in rows of a stack that are not proved
+            spread = self.distance * np.sqrt(summed(1.0 / self.compliance)) * (1 + SAFETY)
+        return Ball.around(total.mid, total.radius + np.reshape(spread, total.shape))
+
+    def row(self, k: int, problem: NormalProblem) -> Level:
+        """The level in row k of a stack, for the problem of this row, in a box of all rows."""
+        it = self.trial
+        assert it is not None
+        own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
+        trial = Trial(problem, *own, it.approach[k, 0], it.missing[k, 0])
+        found = self.loads[k], self.indentation[k], self.approach[k, 0], self.open[k]
+        norm = float(self.distance[k, 0]), self.compliance[k]
+        return Level(problem, *found, trial, self.box, *norm)
+
+    @property
+    def rows(self) -> Rows:
+        """The levels of a stack."""
+        load = self.load if self.load.radius.ndim == 1 else self.load[:, 0]
+        known = self.loads, self.indentation, self.touching, self.open
+        return Rows(load, self.approach[:, 0], *known)
+
+    def moves(self, coupling: Coupling) -> Any:
+        """(m,) bounds on |A P - A P*| at the m points to which `coupling` maps loads."""
+        if self.box is None or self.trial is None:
+            return np.inf
+        missing = self.trial.missing.size * self.problem.largest_entry
+        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
+        return (self.distance * reach + missing) * (1 + SAFETY)
 
     @cached_property
     def energy(self) -> Ball:
@@ -153,31 +182,24 @@ class Level:
     @cached_property
     def springs(self) -> Springs:
         """The asperities as linear springs, for `response`. Raises ProofError at L = 0."""
-        found, state = self.solution, self.trial
+        state = self.trial
         if state is None:
             raise ProofError("at no load the approach has no derivative")
-        zero = Ball.exact(np.zeros(len(self.problem)))
-        if found is None:
-            inside = np.asarray(state.inside)
-            own = state.gap + state.indentation  # k P^(2/3)
-            ratio = where(inside, own / where(inside, Ball.exact(state.loads), 1 + zero), zero)
-            compliance = ratio / 1.5
-            nowhere = np.full(len(self.problem), np.inf)
-            slopes = np.where(inside, 1.0 / np.where(inside, compliance.value, 1.0), 0.0)
-            return Springs(inside, ~inside & False, slopes, compliance, nowhere, 0.0)
         stiffness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
-        touching = self.touching & self.loads.positive  # else nothing bounds its compliance
-        with np.errstate(divide="ignore"):
-            known = np.maximum(found.compliance, (1.0 - SAFETY) / stiffness.upper)
-        bound = np.where(self.open, np.inf, known)
-        return Springs(
-            touching,
-            ~touching & ~self.open,
-            np.where(touching, stiffness.value, 0.0),
-            where(touching, 1.0 / where(touching, stiffness, 1 + zero), zero),
-            bound,
-            1.0 - min(found.box.convexity_number, found.box.problem.convexity_at(bound)),
-        )
+        touching, bound, margin = state.inside, np.full(len(self.problem), np.inf), 0.0
+        doubtful = np.zeros(len(touching), dtype=bool)
+        if self.box is not None:
+            touching = self.touching & self.loads.positive  # else nothing bounds its compliance
+            doubtful = ~touching & ~self.open
+            with np.errstate(divide="ignore"):
+                known = np.maximum(self.compliance, (1.0 - SAFETY) / stiffness.upper)
+            bound = np.where(self.open, np.inf, known)
+            convexity = self.box.problem.convexity_at(bound)
+            margin = 1.0 - min(self.box.convexity_number, convexity)
+        one, zero = (Ball.exact(np.full(len(touching), x)) for x in (1.0, 0.0))
+        compliance = where(touching, 1.0 / where(touching, stiffness, one), zero)
+        slopes = np.where(touching, stiffness.value, 0.0)
+        return Springs(touching, doubtful, slopes, compliance, bound, margin)
 
     def response(self, right: Ball, total: Ball) -> Response:
         """The solution x (n,) and beta, a number, of  x / c + A x = right + beta,  sum x = total.
@@ -286,108 +308,19 @@ class Level:
         return rates
 
 
-class Levels:
-    """The normal solutions of one scene up to the load of the level `top`; `at` caches them.
+class Rows(NamedTuple):
+    """Levels with k total loads: (k,) or (k, n), in scaled units."""
 
-    top      : the level of a pressed contact
-    press    : the function that computes the loads of other levels
-    together : True if Newton's method may solve several levels at once, as rows of a stack
-    """
+    load: Ball
+    approach: Ball
+    loads: Ball
+    indentation: Ball
+    touching: NDArray[np.bool_]
+    open: NDArray[np.bool_]
 
-    def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
-        self.top, self.problem, self._press, self._together = top, top.problem, press, together
-        self._known: dict[tuple[float, float, float], Level] = {}
-
-    @property
-    def presses(self) -> int:
-        """The number of levels that `at` and `prepare` have computed."""
-        return len(self._known)
-
-    def below(self, drop: Ball) -> Level:
-        """The level at the load of `top` minus `drop`, both in scaled units."""
-        return self.at(self.top.load - drop)
-
-    def at(self, load: Ball) -> Level:
-        """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
-        key = _key(load)
-        if key not in self._known:
-            self._known[key] = self._level(load)
-        return self._known[key]
-
-    def _level(self, load: Ball) -> Level:
-        if not load.positive:
-            if load.size == 0.0:
-                return Level.unloaded(self.problem)
-            raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
-        return self._solved(self.problem.at_load(load), load)
-
-    def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at k positive loads, solved together; None for a level that is not found.
-
-        `at` may still find such a level.
-        """
-        found, problem = self.top.solution, self.problem
-        able = self._together and problem.influence.stored and len(problem) <= MOST
-        if not able or found is None:
-            return [None] * len(loads)
-        rows, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
-        for start in range(0, len(loads), rows):
-            levels += _together(problem, found.box.closed, loads[start : start + rows])
-        self._known |= {_key(level.load): level for level in levels if level is not None}
-        return levels
-
-    def at_approach(self, approach: Ball) -> Level:
-        """The level at an approach above first touch, in scaled units. It is not cached."""
-        return self._solved(self.problem.at_approach(approach), None)
-
-    def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The level of `problem`, computed first without initial loads, then from those of `top`.
-
-        The second attempt is made if the first proves nothing. The level is proved in the box of
-        `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only
-        the loads of `top` are tried as initial loads. Without a proof: `Level.unproved`.
-        """
-        top = self.top.solution
-        local = top is not None and top.box.scope == "local"
-        state, found = self._sought(problem, top.trial.loads.high if top and local else None)
-        if isinstance(found, Obstacle) and top is not None and not local:
-            with suppress(SolverError):
-                state, found = self._sought(problem, top.trial.loads.high)
-        if isinstance(found, Obstacle):
-            total = Ball.exact(state.loads).sum() if load is None else load
-            return Level.unproved(problem, state, total)
-        return Level.of(found, found.total if load is None else load)
-
-    def _sought(
-        self, problem: NormalProblem, start: Array | None
-    ) -> tuple[Trial, Proved | Obstacle]:
-        """Refined loads, and the solution proved near them in the box of `top`.
-
-        If nothing is proved, the second is the obstacle to a proof.
-        """
-        state = refined_loads(problem, self._press(problem, start))
-        boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
-        return state, proved(problem, state, boxes)
-
-
-def _key(load: Ball) -> tuple[float, float, float]:
-    return float(load.mid.high), float(load.mid.low), float(load.radius)
-
-
-def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
-    scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
-    rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
-    force, modulus = total.value * problem.units.force, scene.material.contact_modulus
-    reach = hertz.contact_radius(force, modulus, scene.mean_radius) ** 2
-    squares = scene.asperities.distances[problem.candidates] ** 2
-    found = solved(rows, problem.offsets, squares, reach, box)
-
-    def level(k: int) -> Level:
-        it = found.row(k, problem.at_load(loads[k]))
-        known = it.approach, it.loads, it.indentation, found.rows.touching[k], found.rows.open[k]
-        return Level(it.problem, loads[k], *known, it, it.trial)
-
-    return [level(k) if found.good[k] else None for k in range(m)]
+    def at(self, which: Indices) -> Rows:
+        """The levels with these indices."""
+        return Rows._make(each[which] for each in self)
 
 
 def rows_of(levels: Sequence[Level]) -> Rows:
@@ -424,7 +357,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         uncertainty = np.array([float(level.load.radius) for level in loaded])
         rate = np.array([float(level.approach.size) for level in loaded])
         error = found.radius + above + (missing.size + uncertainty) * rate * (1 + SAFETY)
-        proved_ones = np.array([level.solution is not None for level in loaded])
+        proved_ones = np.array([level.box is not None for level in loaded])
         known = Ball.around(found.mid, np.where(proved_ones, error, np.inf))
         high[which], low[which], radius[which] = *known.mid, known.radius
     return Ball(Pair(high, low), radius)

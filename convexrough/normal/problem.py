@@ -28,24 +28,17 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, taken
 from convexrough.convex.newton_step import correct
+from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
-from convexrough.influence.shells import fitted_shells, shells
+from convexrough.influence.shells import shells
 from convexrough.normal.load_control import (
     approach_bound,
     highest_approach,
-    shifted_to_load,
-    smooth_displacement,
 )
-from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
-
-#: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
-#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
-#: box", 3).
-FITTED = 0.9
 
 #: Number of candidates up to which the prescribed displacements are cached.
 MOST_KEPT = 2**20
@@ -60,6 +53,36 @@ INVERSE_PI = Fraction("0.3183098861837906715377675267450287240689192914809128974
 
 #: Factor by which one correction by conjugate gradients reduces the residual.
 REDUCTION = 1e-7
+
+
+@dataclass(frozen=True)
+class Units:
+    """Scaled units of length and force: numbers of a problem are about 1 in them.
+
+    They are the units of the scene times powers of two (of eight for the force). So scaling a
+    float64 number by them, or a force to the power 2/3, does not round.
+    """
+
+    length: float  # [length] the scaled unit of length
+    force: float  # [force] the scaled unit of force
+
+    @property
+    def local(self) -> float:
+        """force^(2/3) / length, a power of two: k in scaled units is k times this factor."""
+        return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
+
+    @classmethod
+    def of(cls, approach: float, coefficient: float) -> Units:
+        """Units of the size of `approach` [length] and of the load whose indentation it is.
+
+        coefficient : k of Hertz's law, indentation = k load^(2/3)
+
+        Raises InputError if the approach is not positive and finite.
+        """
+        if not 0 < approach < math.inf:
+            raise InputError("scene", found=f"indentations of {approach:g}", expected=checks.SIZED)
+        length = 2.0 ** round(math.log2(approach))
+        return cls(length, 8.0 ** round(math.log2(length / coefficient) / 2.0))
 
 
 class Data(NamedTuple):
@@ -85,8 +108,8 @@ class NormalProblem:
         A + diag(shells) positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
-    approach_bound : upper bound on D0 at any solution
-    exact_load, exact_approach : the prescribed number as a ball; None if it is a float64 number
+    highest       : upper bound on D0 at any solution; infinite to compute one when it is needed
+    exact_control : the prescribed number as a ball; None if it is a float64 number
     """
 
     scene: Scene
@@ -99,9 +122,8 @@ class NormalProblem:
     shells: Array
     approach: float | None
     load: float | None
-    approach_bound: float
-    exact_load: Ball | None = None
-    exact_approach: Ball | None = None
+    highest: float
+    exact_control: Ball | None = None
 
     def __len__(self) -> int:
         return len(self.candidates)
@@ -125,32 +147,45 @@ class NormalProblem:
         sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
+    @cached_property
+    def approach_bound(self) -> float:
+        """An upper bound on D0 at every solution."""
+        if self.load is None or self.highest < np.inf:
+            return self.highest
+        load = self.load * self.units.force
+        return highest_approach(self.scene, load, self.influence.name) / self.units.length
+
+    @property
+    def by_load(self) -> bool:
+        """True if the total load is prescribed, not the approach."""
+        return self.load is not None
+
+    @cached_property
+    def control(self) -> Ball:
+        """The prescribed load or approach as a ball."""
+        given = self.approach if self.load is None else self.load
+        assert given is not None
+        return Ball.exact(given) if self.exact_control is None else self.exact_control
+
     def at_load(self, load: Ball) -> NormalProblem:
         """The problem of the same asperities under a load that needs at most `approach_bound`."""
-        return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
+        return self._like(approach=None, load=float(load.value), exact_control=load)
 
     def at_approach(self, approach: Ball) -> NormalProblem:
         """The problem of the same asperities at an approach of at most `approach_bound`."""
-        prescribed = float(approach.value)
-        return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
+        return self._like(approach=float(approach.value), load=None, exact_control=approach)
 
-    def _like(self, other: NormalProblem) -> NormalProblem:
-        """`other`, a problem of the same asperities, after copying the cached data of this one."""
+    def _like(self, **changed: Any) -> NormalProblem:
+        """A problem of the same asperities, with the cached data of this one."""
+        other = replace(self, **changed)
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
 
-    @property
-    def total(self) -> Ball:
-        """The prescribed total load as a ball."""
-        assert self.load is not None
-        return Ball.exact(self.load) if self.exact_load is None else self.exact_load
-
-    @property
-    def depth(self) -> Ball:
-        """The prescribed approach as a ball."""
-        assert self.approach is not None
-        return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
+    @cached_property
+    def squares(self) -> Array:
+        """(n,) [length^2] squared distances of the summits from the axis."""
+        return self.scene.asperities.distances[self.candidates] ** 2
 
     @cached_property
     def places(self) -> Indices:
@@ -164,10 +199,14 @@ class NormalProblem:
         """(n,) D = D0 + d for a prescribed approach D0; cached for at most MOST_KEPT candidates."""
         found: Ball | None = self.__dict__.get("_depths")
         if found is None:
-            found = self.exact.offsets + self.depth
+            found = self.exact.offsets + self.control
             if len(self) <= MOST_KEPT:
                 self.__dict__["_depths"] = found
         return found
+
+    def apply(self, loads: Array) -> Array:
+        """(n,) A P in float64."""
+        return self.influence.apply(loads)
 
     def product(self, loads: Pair) -> Ball:
         """(n,) A P to about thirty digits."""
@@ -239,25 +278,27 @@ class NormalProblem:
         """The problem of a scene. `approach` [length] or `load` [force] is given, exactly one.
 
         influence : compliance operator; None for the cheapest
-        highest   : [length] upper bound on the approach under this load; default `highest_approach`
+        highest   : [length] upper bound on the approach under this load, or inf to include all
+            asperities; default `highest_approach`
         """
         checks.exactly_one("approach", approach, "load", load)
         offsets, errors = scene.offsets, scene.offset_errors
         modulus = scene.material.contact_modulus
         coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
-            approach_bound = approach = checks.finite("approach", approach)
+            highest = approach = checks.finite("approach", approach)
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            approach_bound = (
-                highest_approach(scene, load, influence) if highest is None else highest
-            )
+            if highest is None:
+                highest = highest_approach(scene, load, influence)
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
-        prescribed = approach_bound + offsets + errors + 6 * ROUNDOFF * abs(approach_bound)
+        prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
+        if highest == np.inf:
+            top = float(hertz.indentation(load, coefficients.max()))  # of one under the whole load
         units = Units.of(top, _middle(coefficients))
 
         scale = units.force / units.length / (np.pi * modulus)
@@ -273,7 +314,7 @@ class NormalProblem:
             shells=shells(coupling),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
-            approach_bound=approach_bound / units.length,
+            highest=highest / units.length,
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
@@ -304,11 +345,6 @@ class NormalProblem:
             influence=influence,
             shells=shells(influence),
         )
-
-    def fitted_to(self, loads: Array) -> NormalProblem:
-        """The same problem, with shells fitted to the contact radii at these loads."""
-        shells = fitted_shells(self.influence, self.radii(self.compliance(loads)), FITTED)
-        return replace(self, shells=shells)
 
     def radii(self, compliance: Array) -> Array:
         """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
@@ -350,22 +386,6 @@ class NormalProblem:
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
         return h
 
-    def smooth_indentation(self) -> Array:
-        """(n,) initial indentations: offset minus the displacement by a smooth sphere, plus a
-        number with which the loads have the prescribed or an estimated total.
-        """
-        scene, load = self.scene, self.load
-        if load is None:
-            load = alone = float(self.bounds(self.approach_bound).sum())
-            if scene.curved:
-                smooth = hertz.local_coefficient(scene.material.contact_modulus, scene.mean_radius)
-                load = min(float(hertz.load(self.approach_bound, smooth * self.units.local)), alone)
-                load = load or alone
-        distances = scene.asperities.distances[self.candidates]
-        sunk = smooth_displacement(scene, distances, load * self.units.force) / self.units.length
-        indentation: Array = self.offsets - sunk
-        return shifted_to_load(indentation, self.coefficients, load)
-
     def convexity_number(self, loads: Array) -> float:
         """The largest shells_i / h_i with the compliances h at `loads`.
 
@@ -394,15 +414,18 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """An upper bound on D0 at every solution under load control: `load_control.approach_bound`.
+        """An upper bound on D0 at every solution: D0 itself if it is prescribed, else the smaller
+        of `highest` and `load_control.approach_bound`.
 
         weights      : (n,) approximate loads, not negative, not all 0
         displacement : (n,) A times weights
         """
-        assert self.load is not None
+        if self.load is None:
+            return self.highest
         displacement = displacement + self.influence.rounding(weights).of(displacement)
         least = self.offsets - self.offset_errors
-        return float(approach_bound(weights, displacement, self.coefficients, least, self.load))
+        found = approach_bound(weights, displacement, self.coefficients, least, self.load)
+        return min(self.highest, float(found))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""

@@ -8,23 +8,20 @@ star marks the solution. H is diagonal, the local part of the Hessian at the upp
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball, elementwise, where
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices, summed
+from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
-from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
+from convexrough.normal.law import Problem
+from convexrough.normal.level import Level, Obstacle
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import Problem, Trial
+from convexrough.normal.refine import Trial
 from convexrough.roundoff import SAFETY
 
 #: Number of boxes of touching asperities that are tried, and the distance from the loads to the end
@@ -42,121 +39,47 @@ ELSEWHERE = "no given box is proved to hold their loads"
 NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
-class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the indices of the candidates that cause this."""
-
-    reason: str
-    which: Indices
-
-
-@dataclass(frozen=True, eq=False)
-class Proved:
-    """A proved solution in scaled units: a ball for each of the n asperities of `problem`.
-
-    trial     : the loads P from which it was proved
-    box       : a box of loads that contains exactly one solution
-    distance  : bound on the norm of P - P*, whose square is sum_i h_i (P_i - P*_i)^2
-    compliance : (n,) h, the diagonal of H for the smaller box
-    loads, indentation : (n,) of the solution; a negative indentation is minus the gap
-    approach  : approach of the solution
-    """
-
-    problem: NormalProblem
-    trial: Trial
-    box: Box
-    distance: float
-    compliance: Array
-    loads: Ball
-    indentation: Ball
-    approach: Ball
-
-    @cached_property
-    def touching(self) -> NDArray[np.bool_]:
-        """(n,) True where an asperity is proved to carry a load."""
-        return self.indentation.positive | self.loads.positive
-
-    @cached_property
-    def open(self) -> NDArray[np.bool_]:
-        """(n,) True where an asperity is proved to have a gap."""
-        return self.indentation.negative
-
-    @property
-    def total(self) -> Ball:
-        """The sum of the loads, with an error bound by Cauchy's inequality."""
-        trial = Ball.exact(self.trial.loads).sum()
-        spread = self.distance * math.sqrt(float((1.0 / self.compliance).sum())) * (1 + SAFETY)
-        return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
-
-    def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on |A P - A P*| at the m points to which `coupling` maps loads."""
-        missing = self.trial.missing.size * self.problem.largest_entry
-        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
-        return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
-
-
-def proved(
-    problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None
-) -> Proved | Obstacle:
-    """The solution in the first box that is proved to hold it, or the obstacle to a proof.
+def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:
+    """The solution in the first box that is proved to hold it, or else a level with an obstacle.
 
     boxes : default: those of `normal.boxes.tried`, and if none of these succeeds, boxes in which
         all candidates without a load are fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
-        found = _in_box(problem, box, state)
-        if isinstance(found, Proved) and not (
-            box.fixed_open.any() and (box.fixed_open & ~found.open).any()
-        ):
+        inside, _, found = solution_in(problem, box, state)
+        if inside and not (box.fixed_open.any() and (box.fixed_open & ~found.open).any()):
             return found
     if boxes is not None:
-        return Obstacle(ELSEWHERE, NONE)
+        return Level.unproved(problem, state, Obstacle(ELSEWHERE, NONE))
     touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
     for _ in range(ATTEMPTS):
         fixed = box_of_touching(problem, loads, touching, room)
         if fixed is None:
             break
-        found = _in_box(problem, fixed, state)
-        if not isinstance(found, Proved):
-            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + found >= fixed.faces))
-            room = np.maximum(room, ROOM * found)
+        inside, errors, found = solution_in(problem, fixed, state)
+        if not inside:
+            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + errors >= fixed.faces))
+            room = np.maximum(room, ROOM * errors)
             continue
         doubtful = fixed.fixed_open & ~found.open
         if not doubtful.any():
             return found
         obstacle = Obstacle(NOT_OPEN, np.flatnonzero(doubtful))
         touching, room = touching | doubtful, np.maximum(room, ROOM * found.loads.radius)
-    return obstacle if obstacle.reason else Obstacle(CROWDED, crowded(problem, loads))
-
-
-def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution proved in this box; or bounds (n,) on load errors that reach beyond the box."""
-    known = solution_in(problem, box, state)
-    if not known.inside:
-        return known.at_first
-    return Proved(problem, state, box, *known[2:])
-
-
-class Known(NamedTuple):
-    """What the theorem proves in a box, for one problem or for a stack with one problem per row.
-
-    inside   : True if it is proved that the box contains the solution; if not, nothing is proved
-    at_first : (n,) bounds on the errors of the trial loads, valid if `inside`
-    distance, compliance, loads, indentation, approach : the fields of `Proved`
-    """
-
-    inside: Any
-    at_first: Array
-    distance: Any
-    compliance: Array
-    loads: Ball
-    indentation: Ball
-    approach: Ball
+    if not obstacle.reason:
+        obstacle = Obstacle(CROWDED, crowded(problem, loads))
+    return Level.unproved(problem, state, obstacle)
 
 
 @np.errstate(all="ignore")
-def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
-    """The solution near the trial loads, by the theorem on the box and then on a smaller box."""
+def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
+    """The solution near the trial loads, by the theorem on the box and then on a smaller box.
+
+    Three results: True if it is proved that the box contains the solution, else nothing is proved
+    ((m,) for a stack); (n,) the bounds on the errors of the trial loads that hold if it is True;
+    and the level that is then proved.
+    """
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
 
@@ -177,9 +100,10 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> Known:
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
-    found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
-    loads = _sharpened(problem, found, indentation)
-    return Known(inside, at_first, within, h, loads, indentation, approach)
+    opened = indentation.negative
+    found = Ball.around(state.loads, np.where(opened, 0.0, errors))
+    solution = _sharpened(problem, found, indentation), indentation, approach, opened
+    return inside, at_first, Level(cast(Any, problem), *solution, state, box, within, h)
 
 
 class _Missing(NamedTuple):
@@ -204,8 +128,9 @@ class _Missing(NamedTuple):
         grows = coupled + 2.0 / 3.0 * local
         middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
         rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
+        found = part * loads, part * coupled, part * rest
         known = part <= 0.5
-        return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
+        return cls(*(found if np.all(known) else (np.where(known, x, np.inf) for x in found)))
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
@@ -239,9 +164,12 @@ def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, mov
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.compliance(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
+    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
+    closest = each.min(**across)
+    if np.isfinite(closest).all():
+        return closest * (1 + 4 * SAFETY) + state.approach.radius
     above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
     above = np.where(box.fixed_open, np.inf, above)
-    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
     below = state.approach.upper - (-exact.offsets.upper).min(**across)
-    closest = np.minimum(each.min(**across), np.maximum(above.min(**across), below))
+    closest = np.minimum(closest, np.maximum(above.min(**across), below))
     return closest * (1 + 4 * SAFETY) + state.approach.radius

@@ -10,9 +10,10 @@ docs/theory/newton.md in float64.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
+from convexrough.normal.law import Problem
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import Stack
 from convexrough.sphere import hertz
 
 #: Largest number of corrections.
@@ -41,9 +42,8 @@ FEW = 700
 #: otherwise all loads are scaled first. A heuristic.
 FITS = 1e-6
 
-
-#: One problem, or a stack with one problem in each row.
-Problem: TypeAlias = NormalProblem | Stack
+#: Number of loads up to which `math.fsum`, which rounds once, is fastest.
+FEW_TERMS = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +70,12 @@ class Trial:
         """(n,) True where the load is not 0."""
         return np.asarray(self.loads.high > 0)
 
-    @property
+    @cached_property
     def excess(self) -> Array:
         """(n,) bounds on violations of the law: |gap| where loaded, max(-gap, 0) elsewhere."""
-        return excess(self.gap, self.inside)
+        return frozen(excess(self.gap, self.inside))
 
-    @property
+    @cached_property
     def defect(self) -> Array:
         """(n,) the residual of the contact law: gap where loaded; elsewhere min(gap, 0)."""
         gap = self.gap.value
@@ -115,7 +115,7 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
         gap = residual(data.coefficients, exact, product, problem.exact_depths)
-        return Trial(problem, loads, product, local, gap, problem.depth, missing)
+        return Trial(problem, loads, product, local, gap, problem.control, missing)
     above = residual(data.coefficients, exact, product, data.offsets)  # D0 where touching
     weights = np.cbrt(loads.high)
     total = summed(weights)
@@ -163,12 +163,6 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
 
     enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
     """
-    loads, missing = completed(problem, _after_step(problem, state, enough, todo))
-    return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
-
-
-def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
-    """(n,) the loads of `corrected`, before they are scaled to a prescribed total."""
     loads, inside, defect = state.loads, state.inside, state.defect
     own = np.where(inside, state.local, np.minimum(-state.gap.value, 0.0))
     slopes = np.divide(1.5 * loads.high, own, out=np.zeros(own.shape), where=inside)
@@ -180,7 +174,9 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
     grown = loads.high * np.expm1(1.5 * np.log1p(np.where(near, ratio, 0.0)))
     following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
     loaded = near | (ends > 0)
-    return Pair(following.high * loaded, following.low * loaded)
+    following, missing = completed(problem, Pair(*(part * loaded for part in following)))
+    product = problem.moved(loads, state.product, following)
+    return trial(problem, following, missing, product)
 
 
 def scaled(problem: Problem, loads: Pair) -> Pair:
@@ -189,7 +185,7 @@ def scaled(problem: Problem, loads: Pair) -> Pair:
         return loads
     power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
     loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-    return loads * (problem.total.mid / sums(loads))
+    return loads * (problem.control.mid / sums(loads))
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
@@ -197,18 +193,26 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
-        return loads, problem.total
-    total = problem.total.mid
+        return loads, problem.control
     if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
         loads = scaled(problem, loads)
-    missing = total - sums(loads)
-    which = np.argmax(loads.high, axis=-1, keepdims=True)
-    most = Pair(*(np.take_along_axis(part, which, -1) for part in loads)) + missing
-    high, low = loads.high.copy(), loads.low.copy()
-    np.put_along_axis(high, which, most.high, -1)
-    np.put_along_axis(low, which, most.low, -1)
-    rounding = 8 * PAIR_ROUNDOFF * problem.load + (high.shape[-1] + 2) * TINY
-    return Pair(high, low), Ball.around(np.zeros_like(rounding), problem.total.radius + rounding)
+    completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
+    rows = Pair(*(part.reshape(-1, n) for part in completed))  # views
+    missing = _missing(rows, problem.control.mid)
+    largest_ones = np.arange(len(rows.high)), rows.high.argmax(axis=1)
+    rows.high[largest_ones], rows.low[largest_ones] = rows.at(largest_ones) + missing
+    rounding = 8 * PAIR_ROUNDOFF * problem.load + (n + 2) * TINY
+    return completed, Ball.around(np.zeros_like(rounding), problem.control.radius + rounding)
+
+
+def _missing(loads: Pair, total: Pair) -> Pair:
+    """(m,) the prescribed totals minus the sums of loads (m, n)."""
+    m, n = loads.high.shape
+    if m == 1 and n <= FEW_TERMS and np.isfinite(loads.high).all():
+        given = [np.asarray(part).item() for part in total]
+        terms = [*given, *(-loads.high[0]).tolist(), *(-loads.low[0]).tolist()]
+        return Pair.exact([math.fsum(terms)])
+    return Pair(*(np.reshape(part, -1) for part in total)) - loads.total()
 
 
 def sums(values: Pair) -> Pair:

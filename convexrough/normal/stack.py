@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, largest
-from convexrough.normal.problem import Data, NormalProblem
+from convexrough.normal.problem import Data, NormalProblem, Units
 from convexrough.roundoff import SAFETY
+from convexrough.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,44 +27,53 @@ class Stack:
 
     coupled : slices of the rows, each with a problem whose compliance operator these rows share
     exact   : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
-    exact_load, exact_approach : (m, 1) the prescribed quantity; the other one is None
+    squares : [length^2] squared distances of summits from the axis
+    control : (m, 1) the prescribed loads if `by_load` is True, else the prescribed approaches
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
     exact: Data
     shells: Array
-    exact_load: Ball | None
-    exact_approach: Ball | None
+    squares: Array
+    control: Ball
+    by_load: bool
 
     def __len__(self) -> int:
         return int(self.coupled[-1][0].stop)
+
+    @property
+    def scene(self) -> Scene:
+        """A scene that has the same base and material as those of all rows."""
+        return self.coupled[0][1].scene
+
+    @property
+    def units(self) -> Units:
+        return self.coupled[0][1].units
 
     @cached_property
     def coefficients(self) -> Array:
         """The coefficients k, rounded to float64."""
         return self.exact.coefficients.value
 
+    @cached_property
+    def offsets(self) -> Array:
+        """The offsets d, rounded to float64."""
+        return self.exact.offsets.value
+
     @property
     def load(self) -> Array | None:
-        """(m, 1) the prescribed total loads, or None under approach control."""
-        return None if self.exact_load is None else self.exact_load.value
+        """(m, 1) the prescribed loads, or None."""
+        return self.control.value if self.by_load else None
 
     @property
-    def total(self) -> Ball:
-        """(m, 1) the prescribed loads."""
-        assert self.exact_load is not None
-        return self.exact_load
-
-    @property
-    def depth(self) -> Ball:
-        """(m, 1) the prescribed approaches."""
-        assert self.exact_approach is not None
-        return self.exact_approach
+    def approach(self) -> Array | None:
+        """(m, 1) the prescribed approaches, or None."""
+        return None if self.by_load else self.control.value
 
     @cached_property
     def exact_depths(self) -> Ball:
         """(m, n) D, the prescribed approaches plus the offsets."""
-        return self.exact.offsets + self.depth
+        return self.exact.offsets + self.control
 
     @cached_property
     def row_norm(self) -> Array:
@@ -86,16 +96,17 @@ class Stack:
         ends = np.searchsorted(rows, [0, *(some.stop for some, _ in self.coupled)]).tolist()
         slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
 
-        def pick(ball: Ball | None) -> Any:
-            return ball if ball is None or len(ball) != len(self) else ball[rows]
+        def pick(values: Any) -> Any:
+            return values[rows] if len(values.shape) == 2 and len(values) == len(self) else values
 
         k, d, scale = self.exact
         return Stack(
             [(some, problem) for some, (_, problem) in slices if some.stop > some.start],
             Data(pick(k), pick(d), scale),
-            self.shells[rows] if self.shells.ndim == 2 else self.shells,
-            pick(self.exact_load),
-            pick(self.exact_approach),
+            pick(self.shells),
+            pick(self.squares),
+            pick(self.control),
+            self.by_load,
         )
 
     def apply(self, loads: Array) -> Array:

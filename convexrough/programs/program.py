@@ -25,8 +25,7 @@ from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.solvers.bristles import BristleProgram, BristleQP
-from convexrough.solvers.cone_boxes import ConeBoxes
-from convexrough.solvers.conic import LiftedProgram
+from convexrough.solvers.conic import ConeBoxes, LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 from convexrough.version import __version__
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from convexrough.contact import Contact, solve
+from convexrough.contact import Contact, assembled, solve
 from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
@@ -73,7 +73,8 @@ class Task(Record):
 
     def press(self) -> Contact:
         """The contact under the prescribed approach or load. Raises the errors of `press`."""
-        return solve(self.problem(), self.solver)
+        given = self.approach, self.load, self.influence, self.highest_approach
+        return solve(assembled(self.solver, self.scene, *given), self.solver)
 
     def cautions(self, contact: Contact) -> Iterator[str]:
         """Warnings about stages that do not fit the contact, before they are computed."""

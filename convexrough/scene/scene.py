@@ -159,7 +159,7 @@ class Scene(Record):
             return 0.0
         return 3 * 2.0**-53 * float(np.abs(self.contact_points).max())
 
-    @property
+    @cached_property
     def drops(self) -> Array:
         """(n,) [length] gaps between the sphere and asperities of height 0, at the approach 0.
 

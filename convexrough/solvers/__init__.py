@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 from convexrough.errors import InputError
 from convexrough.solvers.bristles import BristleQP
-from convexrough.solvers.cone_boxes import TooDenseError
-from convexrough.solvers.conic import Conic
+from convexrough.solvers.conic import Conic, TooDenseError
 from convexrough.solvers.conic_cvxpy import ConicCVXPY, LiftedModel
 from convexrough.solvers.newton import Newton
 from convexrough.solvers.solution import Solution, Solver

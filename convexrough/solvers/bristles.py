@@ -43,14 +43,14 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
+from convexrough.normal.law import on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import TooDenseError
+from convexrough.solvers.conic import TooDenseError
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import (
     ProgramAnswer,
     QuadraticProgram,
     RawAnswer,
-    Reduction,
     run_osqp,
 )
 from convexrough.solvers.solution import Solution
@@ -107,7 +107,7 @@ class BristleQP:
     ) -> Solution:
         """The solution in scaled units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
-        loads, approach, iterations = program.through(self.run)
+        loads, approach, iterations = program.invert(self.run(program.apply()))
         if self.newton_step:
             last = newton_step(problem, loads)
             loads, approach = last.loads, last.approach
@@ -120,7 +120,7 @@ class BristleQP:
 
 
 @dataclass(frozen=True, eq=False)
-class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
+class BristleProgram:
     """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row.
 
     m       : number of bristles in each row
@@ -196,12 +196,8 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
     """The upper ends B (n,), True where a box was cut (n,), and the definite matrix A + diag(h)."""
-    approach_bound = problem.approach_bound
-    if problem.load is not None:
-        trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
-        approach_bound = min(
-            approach_bound, problem.overhang(trial, problem.influence.apply(trial))
-        )
+    trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
+    approach_bound = problem.overhang(trial, problem.apply(trial))
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
     box = problem.bounds(approach_bound)

@@ -1,28 +1,51 @@
-"""The contact law as one second-order cone program, solved with Clarabel.
+"""The contact law as one second-order cone program: boxes of loads, checks of answers, Clarabel.
 
 docs/theory/exact-cones.md states the program (1) and proves that its solution satisfies the contact
 law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
 approach; if the load is prescribed, an upper bound takes the place of the approach.
+
+The loads are limited to boxes 0 <= P_i <= B_i ("Which box" of that page). The numbers
+S_i = (3/2) sigma_i B_i^(1/3) / k_i, with the coefficients k, must be at most 21/25 for the form
+with four cones per asperity, or 1 for that with five. Where S_i would be larger, B_i is reduced:
+the box is cut. If a cut box limits a load, five cones are tried; if that happens again, the scene
+is refused.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.convex.cones import power_cones
-from convexrough.errors import SolverError
+from convexrough.arrays import Array, Indices
+from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
+from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import ConeBoxes, ConeSolver
-from convexrough.solvers.programs import (
-    ConeProgram,
-    ProgramAnswer,
-    RawAnswer,
-    Reduction,
-    run_clarabel,
-)
+from convexrough.solvers.newton import newton_step
+from convexrough.solvers.programs import ConeProgram, ProgramAnswer, RawAnswer, run_clarabel
+from convexrough.solvers.solution import Solution
+from convexrough.sphere import hertz
+
+#: Asperities whose a priori bound on the load is below this part of the largest such bound are left
+#: out of the program. A Newton step can give them a load. A heuristic: all loads are checked.
+NEGLIGIBLE = 1e-12
+
+#: Contact radius at the upper end of a box that is not cut, divided by the contact radius at the a
+#: priori bound on the load. If the box ended at this bound, an isolated asperity would have a slack
+#: and a multiplier of 0, and interior-point methods would lose half their digits. A heuristic.
+WIDENED = 1.1
+
+#: With a Newton step: the largest accepted residual of the contact law, divided by |D0| + max |d_i|
+#: with the approach D0 and the offsets d. If the first step leaves more, a second one follows.
+ACCURATE = 1e-13
+
+#: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
+#: the tolerance: errors of loads are proportional to the root of that of the energy. P(delta) is
+#: Hertz's load at the indentation delta. The value is a heuristic.
+ROOTS = 10.0
 
 #: Number of asperities from which Clarabel's supernodal factorisation is faster.
 SUPERNODAL = 300
@@ -30,6 +53,215 @@ SUPERNODAL = 300
 #: Statuses of Clarabel after which its solution is checked against the contact law. With tight
 #: tolerances Clarabel often reports AlmostSolved at a correct solution.
 STOPPED = ("Solved", "AlmostSolved")
+
+
+class TooDenseError(InputError):
+    """Some asperities have contact radii too large for a convex program: a_i > (pi/2) s_i.
+
+    asperities : (m,) the indices of these asperities in the scene
+    ratios     : (m,) an estimate of the contact radius that each would need, divided by (pi/2) s_i;
+        s_i is half the distance to the nearest neighbour
+    """
+
+    def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
+        self.asperities, self.ratios = asperities, ratios
+        worst = np.argsort(-ratios, kind="stable")[:8]
+        described = ", ".join(f"{asperities[i]} ({ratios[i]:.4g})" for i in worst)
+        more = f" and {len(ratios) - len(worst)} more" if len(ratios) > len(worst) else ""
+        super().__init__(
+            "asperities too dense for a convex program",
+            found="contact radii pressed towards these multiples of pi/4 of the distance to the "
+            f"nearest neighbour, by asperity: {described}{more}",
+            expected=f"less than {limit:g}",
+            where=solver,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ConeBoxes:
+    """The asperities of a cone program, their boxes, and the form of their cones.
+
+    members : (m,) the asperities in the program, as indices into `problem.candidates`
+    loads   : (m,) B_i, upper ends of the boxes
+    S       : (m,) convexity numbers of the boxes
+    cut     : (m,) True where B_i is below the a priori bound
+    five    : True for the form with five cones per asperity, False for four
+    limit   : largest S for which this form is exact
+    """
+
+    members: Indices
+    loads: Array
+    S: Array
+    cut: NDArray[np.bool_]
+    five: bool
+    limit: float
+
+    @classmethod
+    def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
+        """Boxes that end above the a priori bounds, cut where S_i would exceed `limit`."""
+        bounds = problem.bounds(problem.approach_bound)
+        members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
+        bounds, k = bounds[members], problem.coefficients[members]
+        limit = FIVE_CONES_LIMIT if five else FOUR_CONES_LIMIT
+        with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
+            faces = (2.0 / 3.0 * limit * k / problem.shells[members]) ** 3
+        loads = np.minimum(WIDENED**3 * bounds, faces)
+        S = problem.shells[members] / problem.compliance(loads, members)
+        return cls(members, loads, S, faces < bounds, five, limit)
+
+    def energies(self, problem: NormalProblem) -> Array:
+        """(m,) k B^(5/3). The local energy at P = B t^3 is k B^(5/3) ((3/5) t^5 - (S/3) t^6)."""
+        energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
+        return energies
+
+    def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
+        """(n,) loads of all candidates, from loads (m,) of the members; limited to the boxes."""
+        everywhere = np.zeros(len(problem))
+        everywhere[self.members] = np.clip(loads, 0.0, self.loads)
+        return everywhere
+
+    def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
+        """The error that names the members with `pressed` > 0; `pressed` (m,) gives `ratios`."""
+        which = np.flatnonzero(pressed)
+        indices = problem.candidates[self.members[which]]
+        return TooDenseError(solver, indices, pressed[which], self.limit)
+
+
+@dataclass(frozen=True)
+class ConeSolver(ABC):
+    """Base class of the solvers of the cone program; it checks their answers.
+
+    tolerance   : tolerance of the cone solver, in scaled units
+    newton_step : True to end with a step of Newton's method, which reduces errors of some 1e-8 of
+        the largest load to rounding. If one step is not accurate enough, a second follows
+
+    The checks use the loads P, gaps g, approach D0, offsets d and D = D0 + d. With `newton_step`,
+    |g_i| where loaded and -g_i elsewhere must be at most 1e-13 (|D0| + max |d_i|). Without it,
+    |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance) times the largest load, where
+    P(delta) is Hertz's load at the indentation delta. If a check fails, SolverError is raised. If
+    the cut boxes do not contain the solution, TooDenseError is raised.
+    """
+
+    tolerance: float = 1e-9
+    newton_step: bool = True
+
+    def __post_init__(self) -> None:
+        checks.positive("tolerance", self.tolerance)
+
+    @property
+    @abstractmethod
+    def formulation(self) -> str:
+        """The name of the solver without its Newton step."""
+
+    @abstractmethod
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
+        """The loads and the approach that the solver returns for these boxes, not yet checked."""
+
+    @property
+    def name(self) -> str:
+        return f"{self.formulation} + Newton step" if self.newton_step else self.formulation
+
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+    ) -> Solution:
+        """The solution by four cones or, if a cut box limits a load, by five.
+
+        start : not used
+        """
+        try:
+            return solve_in(self, problem, ConeBoxes.choose(problem))
+        except TooDenseError:
+            return solve_in(self, problem, ConeBoxes.choose(problem, five=True))
+
+
+def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
+    """The checked solution of the cone program on these boxes."""
+    most = float(boxes.loads.sum())
+    if problem.load is not None and most <= problem.load:  # the boxes end below the load
+        pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
+        raise boxes.too_dense(problem, solver.name, pressed)
+    return judged(solver, problem, boxes, solver.answer(problem, boxes))
+
+
+def judged(
+    solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes, answer: ProgramAnswer
+) -> Solution:
+    """The solver's answer as a `Solution`, after the checks that `ConeSolver` describes.
+
+    An asperity counts as open where D - A P <= 0, even if its computed load is not exactly 0.
+    Raises SolverError or TooDenseError if a check fails.
+    """
+    if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
+        raise SolverError(
+            "loads or an approach that are not numbers",
+            solver=solver.name,
+            advice="try a larger tolerance, or Newton's method",
+        )
+    loads, approach = boxes.to_candidates(problem, answer.loads), answer.approach
+    indentation = approach + problem.offsets - problem.influence.apply(loads)  # D - A P
+    if (pressed := _pressed_on(problem, boxes, loads, indentation)).any():
+        raise boxes.too_dense(problem, solver.name, pressed)
+    alone = hertz.load(indentation, problem.coefficients)  # P(D - A P)
+    loads = np.where(indentation > 0, loads, 0.0)
+    if solver.newton_step:
+        step = _after_newton_step(solver, problem, loads, alone)
+        theta = problem.shells / problem.compliance(step.loads)
+        if (theta >= FIVE_CONES_LIMIT).any():
+            beyond = np.where(theta < 1, 0.0, theta)[boxes.members]
+            raise boxes.too_dense(problem, solver.name, beyond)
+        return replace(step, iterations=answer.iterations + step.iterations)
+    missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
+    if not missed <= (accepted := ROOTS * np.sqrt(solver.tolerance)):
+        raise SolverError(
+            f"loads miss the contact law by {missed:.3g} of the largest, accepted {accepted:.3g}",
+            solver=solver.name,
+            advice="try newton_step=True or more iterations",
+            iterate=loads,
+        )
+    return Solution.of(problem, loads, approach, answer.iterations, refine=False)
+
+
+def _pressed_on(
+    problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
+) -> Array:
+    """(m,) `TooDenseError.ratios` of members whose load a cut box limits; 0 for other members.
+
+    indentation : (n,) D - A P for P = `loads`
+    """
+    k = problem.coefficients[boxes.members]
+    wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
+    room = 1.0 - loads[boxes.members] / boxes.loads
+    stopped = boxes.cut & (wanted - 1.0 > room)
+    return np.where(stopped, boxes.S * np.sqrt(np.maximum(wanted, 1.0)), 0.0)
+
+
+def _after_newton_step(
+    solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
+) -> Solution:
+    """The solution after one or two Newton steps from `loads`.
+
+    alone : (n,) Hertz's loads at the indentations D - A P for P = `loads`
+
+    An error e of the loads changes the indentation k_i P_i^(2/3) by h_i e_i, with the compliance
+    h_i, and D - A P by -A e. So asperity i starts from its load in `alone` where h_i exceeds the
+    sum of row i of A, and from its load in `loads` elsewhere.
+    """
+    light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
+    loads = np.where(light, alone, loads)
+    for steps in (1, 2):
+        step = newton_step(problem, loads)
+        missed = step.residual / (abs(step.approach) + float(np.abs(problem.offsets).max()))
+        if missed <= ACCURATE:
+            return replace(step, iterations=steps)
+        loads = step.loads
+    raise SolverError(
+        f"residual of {missed:.3g} of the approach after two Newton steps, accepted {ACCURATE:g}",
+        solver=solver.name,
+        advice="try a smaller tolerance, or Newton's method",
+        iterate=loads,
+    )
 
 
 @dataclass(frozen=True)
@@ -72,7 +304,7 @@ class Conic(ConeSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
+class LiftedProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity these

@@ -16,8 +16,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import ConeBoxes, ConeSolver, judged
-from convexrough.solvers.programs import ProgramAnswer, Reduction, load_library
+from convexrough.solvers.conic import ConeBoxes, ConeSolver, judged
+from convexrough.solvers.programs import ProgramAnswer, load_library
 from convexrough.solvers.solution import Solution
 
 
@@ -134,7 +134,7 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
+class LiftedModel:
     """The cone program as CVXPY objects, in the scaled units of `normal`.
 
     settings : the solver;  normal : the contact problem
@@ -187,9 +187,6 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         program = cp.Problem(cp.Minimize(energy), constraints + ([] if total is None else [total]))
         return cls(settings, normal, boxes, program, D0, p, link, total)
 
-    def apply(self) -> Any:
-        return self.program
-
     def invert(self, raw: Any) -> ProgramAnswer:
         """The loads and the approach, read from the variables of the program."""
         return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
@@ -211,7 +208,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     def answer(self) -> ProgramAnswer:
         """The loads and the approach that the solver returns for the current program."""
-        return self.through(self.settings.run)
+        return self.invert(self.settings.run(self.program))
 
     @property
     def variables(self) -> dict[str, Any]:

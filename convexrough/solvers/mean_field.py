@@ -9,11 +9,10 @@ solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
+from convexrough.normal.law import on_hertz_pressure, smooth_reach
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
@@ -33,27 +32,34 @@ OWN_SHARE = 1.10
 def mean_field_indentation(problem: NormalProblem) -> Array:
     """(n,) initial indentations in scaled units, negative where open.
 
-    If the rings lead to no finite solution: `NormalProblem.smooth_indentation`.
+    If the rings lead to no finite solution: `on_hertz_pressure`.
     """
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
-        return problem.smooth_indentation()
-    return start if np.isfinite(start).all() else problem.smooth_indentation()
+        return on_hertz_pressure(problem)
+    return start if np.isfinite(start).all() else on_hertz_pressure(problem)
 
 
 def _mean_field(problem: NormalProblem) -> Array:
     count = max(4, min(RINGS, len(problem) // LEAST))
-    squares = problem.scene.asperities.distances[problem.candidates] ** 2
     # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
-    limits = float(squares.max()) * np.linspace(0.0, 1.0, count + 1)
+    limits = float(problem.squares.max()) * np.linspace(0.0, 1.0, count + 1)
     edges, middle = np.sqrt(limits), np.sqrt((limits[1:] + limits[:-1]) / 2.0)
-    every = max(1, len(problem) // SAMPLE)
-    all_rings, rings = (_Rings.of(each / limits[1], count) for each in (squares, squares[::every]))
-    numbers = all_rings.sums(np.ones(len(squares)))
-    sampled = rings.sums(np.ones(len(squares[::every])))
-    share = np.divide(numbers, sampled, out=np.zeros(count), where=sampled > 0)
-    areas = np.pi * np.diff(limits)
+    some = slice(None, None, max(1, len(problem) // SAMPLE))
+    places = problem.squares / limits[1]
+    ring = np.minimum(places.astype(np.intp), count - 1)
+    numbers, areas = np.bincount(ring, minlength=count), np.pi * np.diff(limits)
+    share = numbers / np.maximum(np.bincount(ring[some], minlength=count), 1)
+
+    def between(w: Array) -> Array:
+        """(n,) values at the asperities, interpolated between the middles of the rings."""
+        first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
+        return np.asarray(w[first] + (places - 0.5 - first) * np.diff(w)[first])
+
+    def sums(values: Array) -> Array:
+        """(count,) sums over the rings, estimated from the sample."""
+        return share * np.bincount(ring[some], values, count)
 
     # K: displacement of each ring by a unit load on each ring, without an asperity's own share.
     K = np.diff(_disc(middle[:, None], edges[1:]), axis=1, prepend=0.0)
@@ -62,17 +68,17 @@ def _mean_field(problem: NormalProblem) -> Array:
     K.ravel()[:: count + 1] -= OWN_SHARE * 2.0 * np.sqrt(np.pi / (areas * np.maximum(numbers, 1.0)))
     K *= problem.influence.scale
 
-    offsets, coefficients = problem.offsets[::every], problem.coefficients[::every]
+    offsets, coefficients = problem.offsets[some], problem.coefficients[some]
     approach = problem.approach_bound
     w = np.zeros(count)
     if problem.scene.curved:
-        touching = smooth_contact_radius(problem), problem.scene.mean_radius
+        touching = np.sqrt(smooth_reach(problem)), problem.scene.mean_radius
         w = hertz.surface_displacement(middle, *touching) / problem.units.length
     for _ in range(30):
-        indentation = approach + offsets - rings.between(w)
+        indentation = approach + offsets - between(w)[some]
         loads = hertz.load(indentation, coefficients)
         slopes = 1.5 * loads / np.where(loads > 0, indentation, 1.0)
-        P, c = share * rings.sums(loads), share * rings.sums(slopes)
+        P, c = sums(loads), sums(slopes)
         defect = w - K @ P
         system = np.eye(count) + K * c
         if problem.load is not None:
@@ -87,52 +93,7 @@ def _mean_field(problem: NormalProblem) -> Array:
             w = w + step
         if np.abs(step).max() <= 1e-6 * abs(approach):
             break
-    start: Array = approach + problem.offsets - all_rings.between(w)
-    return start
-
-
-@dataclass(frozen=True, eq=False)
-class _Rings:
-    """The two nearest rings of each asperity, and its position between their middles.
-
-    Positions are squared distances from the axis, because the rings have equal areas.
-    """
-
-    first: Indices  # (n,) the inner one of the two rings
-    share: Array  # (n,) 0 in the middle of this ring, 1 in the middle of the next
-    count: int  # number of rings
-
-    @classmethod
-    def of(cls, places: Array, count: int) -> _Rings:
-        """The rings of n asperities.
-
-        places : (n,) squared distances from the axis, divided by the squared radius of the first
-            ring
-        """
-        first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
-        return cls(first, places - 0.5 - first, count)
-
-    def sums(self, values: Array) -> Array:
-        """(count,) sums of values (n,) by ring; a value is divided between its two rings."""
-        outer = np.clip(self.share, 0.0, 1.0) * values  # beyond its middle an end ring gets all
-        total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
-        total[1:] += np.bincount(self.first, outer, self.count)[:-1]
-        return total
-
-    def between(self, values: Array) -> Array:
-        """(n,) values at the asperities, interpolated linearly between the middles of the rings."""
-        return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
-
-
-def smooth_contact_radius(problem: NormalProblem) -> float:
-    """[length] contact radius of a smooth sphere at the same approach or load; infinite if flat."""
-    scene, units = problem.scene, problem.units
-    radius, modulus = scene.mean_radius, scene.material.contact_modulus
-    if radius == np.inf:
-        return np.inf
-    if problem.load is None:
-        return float(np.sqrt(radius * max(problem.approach_bound, 0.0) * units.length))
-    return float(hertz.contact_radius(problem.load * units.force, modulus, radius))
+    return np.asarray(approach + problem.offsets - between(w))
 
 
 def _disc(distance: Array, radius: Array) -> Array:

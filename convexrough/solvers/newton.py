@@ -9,21 +9,29 @@ contact, until the others are found to be open.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
+from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
+from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import refined_loads
-from convexrough.solvers.pressing import Pressing, PressingState, negligible, on_constraint
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
-from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: If at most so many asperities could touch, the iteration includes all. It affects speed only.
+#: Newton's method may end if the next step is expected to leave a defect whose norm is this
+#: fraction of that of the indentations. Refinement then makes the next correction. A heuristic.
+NEGLIGIBLE = 88 * ROUNDOFF
+
+#: If at most so many asperities could touch, the iteration includes all, and the start uses a
+#: product with A. It affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
@@ -32,6 +40,68 @@ ACCURATE = 1e-12
 #: Asperities are near the contact if their gap is at most this part of the largest D_i. It affects
 #: speed only.
 MARGIN = 0.03
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """The contact law, in the form of `convex.newton`: docs/theory/newton.md, "The normal map".
+
+    farthest : max |d_i| over all candidates, also those that `problem` leaves out
+    """
+
+    problem: NormalProblem
+    farthest: float
+
+    solver: ClassVar[str] = "newton"
+    unit: ClassVar[str] = "the approach"
+
+    def evaluate(self, unknown: Array) -> newton.Iterate | None:
+        """The state with loads of the prescribed total, `Pressed`; None if none is positive."""
+        problem, total = self.problem, 0.0
+        if problem.approach is not None:
+            unknown = np.minimum(unknown, problem.approach + problem.offsets)
+        elif not unknown.max() > 0:
+            return None
+        at = Pressed.at(problem, unknown)
+        if problem.load is not None:  # Phi has D0 = 0 under load control
+            total = at.approach * problem.load
+        energy = float(at.loads @ (at.gap - 0.4 * at.own - 0.5 * at.displacement)) + total
+        residual, scale = float(np.abs(at.defect).max()), float(abs(at.approach)) + self.farthest
+        return newton.Iterate(at.unknown, at.loads, at.defect, energy, residual, scale, at)
+
+    def direction(self, state: newton.Iterate, left: float) -> Array:
+        return correct(
+            self.problem.influence,
+            self.problem.shells,
+            np.sqrt(state.at.slopes),  # W
+            state.defect,
+            balanced=self.problem.by_load,
+            tolerance=left,
+        )
+
+    def gradient(self, state: newton.Iterate) -> Array:
+        """The gradient of the energy: the gap."""
+        return np.asarray(state.at.gap)
+
+    def energy_rounding(self, state: newton.Iterate) -> float:
+        return SAFETY * float(state.forces.sum()) * state.scale
+
+    def noise(self, state: newton.Iterate) -> float:
+        return self.problem.influence.rounding(state.forces).negligible(state.at.displacement)
+
+    def advice(self, state: newton.Iterate) -> str:
+        """What to try, which depends on the convexity number where the method stopped."""
+        number = self.problem.convexity_number(state.forces)
+        if number < 1:
+            return (
+                f"the energy is convex (convexity number {number:.3g}): allow more steps, or "
+                "start from loads of a neighbouring problem"
+            )
+        return (
+            f"contacts are so crowded that the energy may not be convex (convexity number "
+            f"{number:.3g}, convex below 1): use a smaller approach or load, sharper tips, or "
+            "asperities further apart"
+        )
 
 
 @dataclass(frozen=True)
@@ -65,30 +135,29 @@ class Newton:
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
-        answer = Solution.of(problem, loads, approach, iterations)
-        return replace(answer, refine=not self.tolerance > 0)
+        refine = not self.tolerance > 0
+        return Solution.of(problem, loads, approach, iterations, refine=refine)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
         indentation = _start(problem, start)
-        highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
-        near = np.arange(len(problem))
+        near, iterations = np.arange(len(problem)), 0
         if len(problem) > ALL_ITERATED and start is None:
-            indentation = on_constraint(problem, indentation)
+            highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
             near = np.flatnonzero(indentation > -MARGIN * highest)
-        iterations = 0
         while True:
             begin = indentation[near]
             del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
-                return state.forces, state.approach, iterations
+                return state.forces, float(state.at.approach), iterations
             # The iteration left out some asperities: compute the gaps of all.
-            loads, gap = _everywhere(problem, near, state)
+            loads = among_zeros(state.forces, near, len(problem))
+            gap = problem.gap(loads, problem.influence.apply(loads), float(state.at.approach))
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                return loads, state.approach, iterations
+                return loads, float(state.at.approach), iterations
             indentation = -gap
             indentation[near] = state.unknown
             touched[near] = True  # `near` only grows, so the loop ends
@@ -102,7 +171,7 @@ class Newton:
         problem: NormalProblem,
         near: Indices,
         indentation: Array,
-    ) -> tuple[PressingState, int]:
+    ) -> tuple[newton.Iterate, int]:
         """The solution in which only the asperities `near` carry loads, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
@@ -110,8 +179,10 @@ class Newton:
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
+            assert state is not None  # an asperity is loaded at the start
             if self._refines(problem):  # refinement makes the remaining linear correction
-                stopping = replace(stopping, linear=negligible(indentation))
+                size = float(np.linalg.norm(np.maximum(indentation, 0.0)))
+                stopping = replace(stopping, linear=NEGLIGIBLE * size)
             return newton.solve(law, state, stopping)
         except SolverError as error:
             if error.iterate is not None:
@@ -126,21 +197,21 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
     """
     law = Pressing(problem, float(np.abs(problem.offsets).max()))
     before = law.evaluate(_start(problem, loads))
+    assert before is not None  # an asperity is loaded at the start
     state = newton.descend(law, before, law.direction(before, 0.0))
-    residual = problem.residual(state.forces, state.approach, state.displacement)
-    return Solution(state.forces, state.approach, 1, residual)
+    approach = float(state.at.approach)
+    residual = problem.residual(state.forces, approach, state.at.displacement)
+    return Solution(state.forces, approach, 1, residual)
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
     """(n,) initial indentations: by Hertz's law where `loads` are positive, and -1 elsewhere.
 
-    If `loads` is None, `start_indentation` estimates them.
+    They are estimated if `loads` is None, or if a load is prescribed and all `loads` are 0.
     """
-    if loads is None:
-        return start_indentation(problem)
+    if loads is None or (problem.by_load and not loads.any()):
+        few = len(problem) <= ALL_ITERATED
+        return on_hertz_pressure(problem) if few else mean_field_indentation(problem)
+    if problem.load is not None:
+        loads = loads / loads.max() * problem.load  # also if they are too small for a sum
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
-
-
-def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    loads = among_zeros(state.forces, near, len(problem))
-    return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -1,15 +1,14 @@
-"""Programs in standard form, their solution by libraries, and conversions to and from problems.
+"""Programs in standard form, their solution by libraries, and the libraries' answers.
 
-A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
-and Boyd, J. Control Decis. 5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
+`apply` of a reduction such as `conic.LiftedProgram` converts a contact problem to a program, and
+`invert` converts the answer back, as in cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control
+Decis. 5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,31 +18,6 @@ from convexrough.progress import log_step
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
-
-Data = TypeVar("Data")
-Raw = TypeVar("Raw")
-Found = TypeVar("Found")
-
-
-class Reduction(ABC, Generic[Data, Raw, Found]):
-    """A contact problem as a program; the fields contain what `invert` needs.
-
-    The class method `assemble(problem, ...)` of a subclass creates it, and raises InputError if
-    memory is too small. `invert` may raise an error that names asperities for which the program is
-    not exact.
-    """
-
-    @abstractmethod
-    def apply(self) -> Data:
-        """The data of the program."""
-
-    @abstractmethod
-    def invert(self, raw: Raw) -> Found:
-        """The answer to the problem, in its order and units, from the answer to the program."""
-
-    def through(self, run: Callable[[Data], Raw]) -> Found:
-        """The answer to the problem; the function `run` solves the program."""
-        return self.invert(run(self.apply()))
 
 
 class ConeProgram(NamedTuple):

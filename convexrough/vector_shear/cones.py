@@ -19,7 +19,7 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, SECOND_ORDER
 from convexrough.errors import SolverError
-from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
+from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
@@ -125,7 +125,7 @@ class FrictionConic:
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
+class FrictionProgram:
     """The cone program, scaled so that its numbers are about 1.
 
     The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., then those of the cones,

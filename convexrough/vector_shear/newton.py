@@ -61,23 +61,15 @@ class FrictionNewton:
         size_of = np.hypot(*state.unknown.T)
         beyond = np.maximum(size_of - problem.thresholds, 0.0)
         slips = along(beyond, state.unknown, size_of)
-        return VectorState(total, state.forces, state.displacement, slips, iterations)
+        return VectorState(total, state.forces, state.at.displacement, slips, iterations)
 
 
-class _Iterate(NamedTuple):
-    unknown: Array  # (n, 2) eta
-    forces: Array  # (n, 2) q(eta)
+class _At(NamedTuple):
+    """What the law knows at a state, besides the fields of `newton.Iterate`."""
+
     coupling: Array  # (n, 2) B q
     roots: Array  # (n, 2, 2) W
-    displacement: Array  # (2,) the best estimate of X
-    defect: Array  # (n, 2) F
-    residual: float  # max |F_i|
-    energy: float
-
-    @property
-    def scale(self) -> float:
-        """|X|, the scale of residuals."""
-        return float(np.hypot(*self.displacement))
+    displacement: Array  # (2,) the best estimate of X; its size is the scale of residuals
 
 
 @dataclass(frozen=True)
@@ -90,7 +82,7 @@ class _Friction:
     solver: ClassVar[str] = "friction (newton)"
     unit: ClassVar[str] = "the displacement"
 
-    def evaluate(self, unknown: Array) -> _Iterate | None:
+    def evaluate(self, unknown: Array) -> newton.Iterate | None:
         """The state at eta, shifted so that forces add up to T; None if no shift is found."""
         problem = self.problem
         shifted = _onto_total(problem, unknown, self.total)
@@ -107,35 +99,37 @@ class _Friction:
         defect = level - displacement
         residual = float(np.hypot(*defect.T).max())
         energy = problem.energy(q, coupling)
-        return _Iterate(shifted, q, coupling, roots, displacement, defect, residual, energy)
+        scale, at = float(np.hypot(*displacement)), _At(coupling, roots, displacement)
+        return newton.Iterate(shifted, q, defect, energy, residual, scale, at)
 
-    def direction(self, state: _Iterate, left: float) -> Array:
+    def direction(self, state: newton.Iterate, left: float) -> Array:
         """The Newton step, from a direct solution that needs no tolerance."""
         return _direction(self.problem, state)
 
-    def gradient(self, state: _Iterate) -> Array:
+    def gradient(self, state: newton.Iterate) -> Array:
         size = np.hypot(*state.unknown.T)
         bearable = np.minimum(size, self.problem.thresholds)
-        return along(bearable, state.unknown, size) + state.coupling - state.displacement
+        own = along(bearable, state.unknown, size)
+        return np.asarray(own + state.at.coupling - state.at.displacement)
 
-    def energy_rounding(self, state: _Iterate) -> float:
+    def energy_rounding(self, state: newton.Iterate) -> float:
         # Near gross sliding X is large, and so is the effect of rounding in the total.
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
-    def noise(self, state: _Iterate) -> float:
+    def noise(self, state: newton.Iterate) -> float:
         """A lower bound on the rounding error of F; on symmetric layouts it ends the iteration."""
         return ROUNDOFF * state.scale
 
-    def advice(self, state: _Iterate) -> str:
+    def advice(self, state: newton.Iterate) -> str:
         return advice(self.problem, float(np.hypot(*self.total)))
 
 
-def _direction(problem: FrictionProblem, state: _Iterate) -> Array:
+def _direction(problem: FrictionProblem, state: newton.Iterate) -> Array:
     """The step d(eta); if the matrix is not positive definite, the shift is added to the kernel."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     n = len(problem)
-    roots = state.roots
+    roots = state.at.roots
     scaled = problem.kernel
     for _ in range(2):  # B W, then W'B W
         scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)

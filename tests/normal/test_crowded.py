@@ -20,9 +20,8 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.normal.boxes import CROWDED_MARGINS
-from convexrough.normal.other_solutions import OtherSolutions
-from convexrough.normal.overlap import overlapping_margin, overlaps
+from convexrough.normal.boxes import CROWDED_MARGINS, overlapping_margin, overlaps
+from convexrough.normal.certificate import OtherSolutions
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import solution_in
 from convexrough.normal.refine import trial
@@ -93,14 +92,15 @@ def test_random_points_are_proved(seed: int) -> None:
 
 def test_a_box_that_fixes_an_asperity_open_holds_no_load_on_it() -> None:
     contact = cr.press(random_points(0, 300), approach=5e-5)
-    known = levels_of(contact).top.solution
-    assert known is not None
+    known = levels_of(contact).top
+    assert known.box is not None
+    assert known.trial is not None
     box, loads = known.box, known.trial.loads.high.copy()
-    assert solution_in(known.problem, box, known.trial).inside
+    assert solution_in(known.problem, box, known.trial)[0]
     loads[np.flatnonzero(box.fixed_open)[0]] = 1e-30 * loads.max()
     pair = Pair.exact(loads)
     spoiled = trial(known.problem, pair, known.trial.missing, known.problem.product(pair))
-    assert not solution_in(known.problem, box, spoiled).inside
+    assert not solution_in(known.problem, box, spoiled)[0]
 
 
 def all_states(scene: cr.Scene, approach: float) -> list[Any]:

@@ -32,7 +32,7 @@ def test_names_columns_and_keys(
 
     def after(*given: Any, **options: Any) -> Any:
         with monkeypatch.context() as patch:
-            for solves in ("normal.problem.NormalProblem.assemble", "normal.level.Levels.at",
+            for solves in ("normal.problem.NormalProblem.assemble", "normal.levels.Levels.at",
                            "friction.levels.FrictionLevels.rows"):  # fmt: skip
                 patch.setattr(f"convexrough.{solves}", None)  # not to be called
             return write(*given, **options)

@@ -19,8 +19,7 @@ from convexrough.solvers import (
     Solution,
     TooDenseError,
 )
-from convexrough.solvers.cone_boxes import ConeBoxes, solve_in
-from convexrough.solvers.conic import LiftedProgram
+from convexrough.solvers.conic import ConeBoxes, LiftedProgram, solve_in
 from convexrough.solvers.programs import ProgramAnswer
 from convexrough.vector_shear.cones import FrictionConic
 from convexrough.vector_shear.problem import FrictionProblem

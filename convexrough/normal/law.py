@@ -1,0 +1,115 @@
+"""The contact law in float64, for one problem or for a stack of problems (`normal.stack`).
+
+Arrays are (n,) for one problem and (m, n) for a stack, where quantities with one number per problem
+are (m, 1).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from convexrough.arrays import Array, summed
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.stack import Stack
+from convexrough.sphere import hertz
+
+#: One problem, or a stack with one problem in each row.
+Problem: TypeAlias = NormalProblem | Stack
+
+#: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
+WIDER = 1.1
+
+
+class Pressed(NamedTuple):
+    """Loads P by Hertz's law at given indentations delta, and the gaps that they leave.
+
+    own      : max(delta, 0) = k P^(2/3), scaled to a prescribed total
+    loads, displacement : P and A P
+    gap      : k P^(2/3) + A P - D, the gradient of the energy
+    defect   : the residual F of the contact law: the gap where loaded, elsewhere min(gap, 0)
+    approach : D0: the prescribed one, or the one that fits the gaps of the touching best
+    """
+
+    own: Array
+    loads: Array
+    displacement: Array
+    gap: Array
+    defect: Array
+    approach: Any
+
+    @classmethod
+    def at(cls, problem: Problem, indentation: Array) -> Pressed:
+        """The loads at indentations, of which one must be positive if a load is prescribed."""
+        own = np.maximum(indentation, 0.0)
+        ratio = own / problem.coefficients
+        root = np.sqrt(ratio)
+        loads = ratio * root
+        if problem.load is not None:
+            share = problem.load / summed(loads)
+            loads, own = loads * share, own * np.cbrt(share) ** 2
+        displacement = problem.apply(loads)
+        gap = own + displacement - problem.offsets
+        approach = problem.approach
+        if approach is None:
+            approach = summed(root * gap) / summed(root)
+        gap = gap - approach
+        defect = np.where(own > 0, gap, np.minimum(gap, 0.0))
+        return cls(own, loads, displacement, gap, defect, approach)
+
+    @property
+    def unknown(self) -> Array:
+        """The indentation; of open asperities, whose loads do not depend on it, min(-gap, 0)."""
+        return np.asarray(self.own + (self.defect - self.gap))
+
+    @property
+    def slopes(self) -> Array:
+        """The derivatives dP/d(delta); 0 where open."""
+        own = self.own
+        return np.divide(1.5 * self.loads, own, out=np.zeros(own.shape), where=own > 0)
+
+
+@np.errstate(all="ignore")
+def on_hertz_pressure(problem: Problem) -> Array:
+    """Initial indentations D - A P for loads P distributed like the pressure of a sphere.
+
+    P = x^3 s with s = (1 - r^2 / a^2)^(1/2), the distance r from the axis, and the contact radius
+    a. The number x follows from a prescribed load. At a prescribed approach it minimises the
+    energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If the smooth body would not touch there, P is
+    a load on the asperity with the largest offset only.
+    """
+    load, approach = problem.load, problem.approach
+    if approach is None:  # from the highest asperity, so that no digits of small loads are lost
+        approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
+    prescribed = problem.offsets + approach
+    inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))
+    s = np.sqrt(np.fmax(inside, 0.0)) + 0.0 * (prescribed + problem.control.value)
+    poor = ~(summed(s if load is not None else s * prescribed) > 0)
+    if np.any(poor):
+        highest = prescribed == prescribed.max(axis=-1, keepdims=True)
+        s = np.where(poor, 1.0 * highest, s)
+    displacement, own = problem.apply(s), problem.coefficients * np.cbrt(s) ** 2
+    if load is not None:
+        cubed = load / summed(s)  # x^3
+        needed = np.cbrt(cubed) ** 2 * own + cubed * displacement - prescribed
+        risen = summed(np.cbrt(s) * needed) / summed(np.cbrt(s))
+        return np.asarray(risen + prescribed - cubed * displacement)
+    work, local, coupled = (summed(s * each) for each in (prescribed, own, displacement))
+    x = np.sqrt(work / local)
+    for _ in range(8):  # Newton's method from the right of the root
+        x = x - (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
+    return np.asarray(prescribed - np.where(work > 0, x, 0.0) ** 3 * displacement)
+
+
+def smooth_reach(problem: Problem) -> Any:
+    """[length^2] squared contact radius of a smooth body; infinite if flat, (m, 1) for a stack."""
+    scene, units = problem.scene, problem.units
+    radius = scene.mean_radius
+    if radius == np.inf:
+        return np.inf
+    if problem.approach is not None:
+        return radius * np.maximum(problem.approach, 0.0) * units.length
+    assert problem.load is not None
+    modulus = scene.material.contact_modulus
+    return hertz.contact_radius(problem.load * units.force, modulus, radius) ** 2

@@ -1,0 +1,179 @@
+"""The normal solutions of one scene at many total loads, solved one by one or together.
+
+Many problems are solved together as the rows of a stack. Only the cheapest proof is then tried; the
+caller solves the rows without a proof one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arithmetic.balls import Ball
+from convexrough.arrays import Array
+from convexrough.errors import ProofError, SolverError
+from convexrough.normal.boxes import Box
+from convexrough.normal.law import Pressed, on_hertz_pressure
+from convexrough.normal.level import Level
+from convexrough.normal.load_control import approach_bound
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.proved import proved, solution_in
+from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
+from convexrough.normal.stack import Stack
+from convexrough.roundoff import ROUNDOFF, SAFETY
+
+#: Largest number of candidates for which levels are solved together: for more this saves no time.
+MOST = 512
+
+#: Largest number of Newton steps.
+STEPS = 30
+
+#: Newton's method ends if the expected residual is below this fraction of the norm of the
+#: indentations. A heuristic.
+NEGLIGIBLE = 88 * ROUNDOFF
+
+#: Largest size of an array (rows, asperities), because dozens of them are in use at once.
+NUMBERS = 2**17
+
+quietly = np.errstate(all="ignore")
+
+
+#: A function of a problem and initial loads (or None) that returns loads, all in scaled units.
+Press = Callable[[NormalProblem, Array | None], Array]
+
+
+class Levels:
+    """The normal solutions of one scene up to the load of the level `top`; `at` caches them.
+
+    top      : the level of a pressed contact
+    press    : the function that computes the loads of other levels
+    together : True if Newton's method may solve several levels at once, as rows of a stack
+    """
+
+    def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
+        self.top, self.problem, self._press, self._together = top, top.problem, press, together
+        self._known: dict[tuple[float, float, float], Level] = {}
+
+    @property
+    def presses(self) -> int:
+        """The number of levels that `at` and `prepare` have computed."""
+        return len(self._known)
+
+    def below(self, drop: Ball) -> Level:
+        """The level at the load of `top` minus `drop`, both in scaled units."""
+        return self.at(self.top.load - drop)
+
+    def at(self, load: Ball) -> Level:
+        """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
+        key = _key(load)
+        if key not in self._known:
+            self._known[key] = self._level(load)
+        return self._known[key]
+
+    def _level(self, load: Ball) -> Level:
+        if not load.positive:
+            if load.size == 0.0:
+                return Level.unloaded(self.problem)
+            raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
+        return self._solved(self.problem.at_load(load))
+
+    def prepare(self, loads: Ball) -> list[Level | None]:
+        """The levels at k positive loads, solved together; None for a level that is not found.
+
+        `at` may still find such a level.
+        """
+        box, problem = self.top.box, self.problem
+        able = self._together and problem.influence.stored and len(problem) <= MOST
+        if not able or box is None:
+            return [None] * len(loads)
+        some, levels, closed = max(1, NUMBERS // len(problem)), list[Level | None](), box.closed
+        for start in range(0, len(loads), some):
+            totals = loads[start : start + some]
+            rows = [(slice(0, len(totals)), problem)]
+            fixed = problem.exact, problem.shells, problem.squares
+            level, good = solved(Stack(rows, *fixed, totals[:, None], by_load=True), closed)
+            for k in range(len(totals)):
+                levels.append(level.row(k, problem.at_load(totals[k])) if good[k] else None)
+        self._known |= {_key(level.load): level for level in levels if level is not None}
+        return levels
+
+    def at_approach(self, approach: Ball) -> Level:
+        """The level at an approach above first touch, in scaled units. It is not cached."""
+        return self._solved(self.problem.at_approach(approach))
+
+    def _solved(self, problem: NormalProblem) -> Level:
+        """The level of `problem`, computed first without initial loads, then from those of `top`.
+
+        The second attempt is made if the first proves nothing. The level is proved in the box of
+        `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only
+        the loads of `top` are tried as initial loads.
+        """
+        box, trial = self.top.box, self.top.trial
+        from_top = None if box is None or trial is None else trial.loads.high
+        if box is not None and box.scope == "local":
+            return self._sought(problem, from_top)
+        found = self._sought(problem, None)
+        if found.obstacle and from_top is not None:
+            with suppress(SolverError):
+                found = self._sought(problem, from_top)
+        return found
+
+    def _sought(self, problem: NormalProblem, start: Array | None) -> Level:
+        """The level proved near refined loads in the box of `top`."""
+        state = refined_loads(problem, self._press(problem, start))
+        return proved(problem, state, self.top.box and iter((self.top.box.closed,)))
+
+
+def _key(load: Ball) -> tuple[float, float, float]:
+    return float(load.mid.high), float(load.mid.low), float(load.radius)
+
+
+@quietly
+def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
+    """The solutions of all rows, and (m,) True for rows that are proved; others have no meaning.
+
+    A proved row is accurate, with the status of every asperity proved.
+
+    box : default `widest`
+    """
+    loads = pressed(stack)
+    finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
+    state = refined_loads(stack, finite)
+    box = widest(stack, state) if box is None else box
+    inside, _, level = solution_in(stack, box, state)
+    good = inside & np.ravel(box.convexity_number < 1)
+    good &= np.isfinite(level.loads.radius).all(axis=1) & (level.touching | level.open).all(axis=1)
+    good &= (level.open | ~box.fixed_open).all(axis=1)
+    good &= defect_of(state) <= 4.0 * rounding_of(state)
+    return level, good
+
+
+def pressed(stack: Stack) -> Array:
+    """(m, n) loads by full steps of Newton's method; nan in rows that do not converge."""
+    state, before = Pressed.at(stack, on_hertz_pressure(stack)), np.full(len(stack), np.inf)
+    for _ in range(STEPS):
+        size = np.linalg.norm(state.defect, axis=1)
+        expected = np.where(np.isinf(before), size, (size / before) ** 2 * size)
+        todo = expected > NEGLIGIBLE * np.linalg.norm(state.own, axis=1)
+        if not todo.any():
+            break
+        step = stack.correct(state.slopes, state.defect, 0.0, todo)
+        state, before = Pressed.at(stack, state.unknown + step), size
+    return np.where(np.isfinite(size)[:, None], state.loads, np.nan)
+
+
+def widest(stack: Stack, state: Trial) -> Box:
+    """Boxes that contain every solution and these loads; the shells give their convexity."""
+    highest = stack.control.upper
+    if stack.by_load:
+        given = stack.coefficients, stack.exact.offsets.lower, highest
+        highest = approach_bound(state.loads.high, state.product.upper, *given)
+    depth = np.maximum(highest + stack.exact.offsets.upper, 0.0)
+    alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
+    corner = np.maximum(alone, state.loads.high)
+    h = stack.compliance(corner)
+    nowhere, none = np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
+    return Box("global", stack, corner, h, stack.convexity_at(h), nowhere, none)
