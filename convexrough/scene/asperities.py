@@ -78,7 +78,9 @@ class Asperities(Record):
         """These asperities with random changes of heights and tip radii.
 
         Random numbers are added to the heights, and the tip radii are multiplied by random factors
-        of mean 1. The arguments are those of `hexagonal`.
+        of mean 1. The arguments are those of `hexagonal`. The random numbers depend only on the
+        seed, so use a new seed for each change: a second change with the same seed adds the same
+        numbers again.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]

@@ -76,6 +76,12 @@ def _unclear(comment: str) -> bool:
 def _map(path: Path, table: TextTable) -> HeightGrid:
     width = len(table.rows[0].cells) if table.rows else 0
     if table.header is None and width != 3:
+        apart = np.diff([row.number for row in table.rows])
+        if len(gaps := np.flatnonzero(apart > min(apart, default=1))):
+            before, after = (table.rows[gaps[0] + i].number for i in (0, 1))
+            found = f"lines without numbers between rows {before} and {after}"
+            expected = "one map in a file: remove comments and empty lines between its rows"
+            raise InputError("rows", found=found, expected=expected, where=str(path))
         heights = matrix(path, table)
         if min(heights.shape) > 2:
             _refuse_numbers(path, "row 1", heights[0, 1:], heights[1, 1:])
@@ -87,6 +93,10 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
                     raise InputError(f"last {place}", found=found, expected="heights alone",
                                      where=str(path))  # fmt: skip
         return _said(table.comments, heights)
+    names = table.header.cells if table.header else []
+    if names and all(table.style.number(name.replace(",", ".")) is not None for name in names):
+        expected = "decimal points, not commas in quotes"
+        raise InputError("row 1", found=names[0], expected=expected, where=str(path))
     if table.header and width > 3:
         first = [table.style.number(cell) for cell in table.header.cells[1:]]
         if len(first) > 2 and None not in first:
@@ -182,13 +192,26 @@ def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
         found = "one value or none" if len(levels) < 2 else "values that are not finite"
         raise InputError(name, found=found, expected="coordinates on a grid", where=str(path))
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
-    step = float(np.median(clear))
-    count = np.rint((levels[-1] - levels[0]) / step)
-    step = float(levels[-1] - levels[0]) / count
-    lines = (values - levels[0]) / step
-    number = np.rint(lines)
-    if np.abs(lines - number).max() > OFF_GRID:
-        worst = float(values[np.argmax(np.abs(lines - number))])
-        expected = f"coordinates {step:g} apart, on a regular grid, in columns x, y and height"
-        raise InputError(name, found=f"{worst:g}", expected=expected, where=str(path))
-    return number.astype(np.intp), step
+    span = float(levels[-1] - levels[0])
+    digit = _last_digit(levels)
+    # Lines of the grid can be missing; if coordinates are rounded, their differences vary.
+    for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
+        step = span / count
+        lines = (values - levels[0]) / step
+        number = np.rint(lines)
+        off = np.abs(lines - number)
+        if off.max() <= OFF_GRID + (rounded / step if rounded < step / 4 else 0.0):
+            return number.astype(np.intp), step
+    worst = float(values[np.argmax(off)])
+    expected = f"coordinates {step:g} apart, on a regular grid, in columns x, y and height"
+    raise InputError(name, found=f"{worst:g}", expected=expected, where=str(path))
+
+
+def _last_digit(values: Array) -> float:
+    """The largest power of ten of which all values are multiples; 0 if they have many digits."""
+    first = int(np.floor(np.log10(np.abs(values).max())))
+    for power in range(first, first - 10, -1):
+        parts = values / 10.0**power
+        if np.abs(parts - np.rint(parts)).max() < 1e-5:
+            return 10.0**power
+    return 0.0

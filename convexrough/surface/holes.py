@@ -86,7 +86,8 @@ def filled(heights: Array) -> Array:
     No filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
-    count = np.count_nonzero(holes)
+    if (count := np.count_nonzero(holes)) == 0:
+        return heights
     number = np.full(heights.shape, KNOWN)
     number[holes] = np.arange(count)
     around = (np.argwhere(holes)[:, None] + 1 + SIDES).T  # in the padded maps

@@ -10,6 +10,7 @@ import numpy as np
 
 from convexrough.errors import FileError, InputError
 from convexrough.surface.grid import HeightGrid
+from convexrough.surface.surface import checked_pixel
 
 
 def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
@@ -24,8 +25,9 @@ def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> He
             from SurfaceTopography import open_topography
             from SurfaceTopography.Exceptions import ReadFileError
     except ImportError as error:
-        advice = "needs SurfaceTopography: pip install SurfaceTopography"
-        raise FileError(f"{path}: {advice}") from error
+        expected = "a map in .npy, .npz, .mat, text (.csv, .txt, .dat, .asc, .tsv, .xyz) or .xlsx; "
+        expected += "an instrument's file needs SurfaceTopography: pip install SurfaceTopography"
+        raise FileError(f"{path}: found {path.suffix}, expected {expected}") from error
     path.open("rb").close()  # raises the usual error for a missing file
     try:
         with open_topography(str(path)) as reader:
@@ -35,8 +37,7 @@ def read_instrument(path: Path, pixel: float | tuple[float, float] | None) -> He
             channel = reader.default_channel
             given: dict[str, Any] = {}
             if channel.physical_sizes is None and pixel is not None:
-                both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
-                counts = zip(channel.nb_grid_pts, both, strict=True)
+                counts = zip(channel.nb_grid_pts, checked_pixel(pixel), strict=True)
                 given["physical_sizes"] = tuple(count * size for count, size in counts)
             topography = reader.topography(**given)
     except ReadFileError as error:

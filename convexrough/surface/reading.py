@@ -26,8 +26,8 @@ TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 #: Names that the array of heights may have in an .npz file with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
-#: Names that say in an .npz or .mat file what its heights and pixels are, and parts of other names
-#: that probably do, which `read` refuses.
+#: Names that say in an .npz or .mat file what its heights and pixels are, and parts of names that
+#: probably do, also if they are those of texts or of vectors.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
@@ -67,9 +67,10 @@ def read(
         masked, BAD in text, and marks such as -9999 or 1e38 far from all heights
 
     An .npz or .mat file contains `heights`, and may contain `unit`, `height_unit`, and `pixel` or x
-    and y, of columns and rows or of each height. Text contains a matrix, possibly with Gwyddion's
-    comments on its size. A matrix with three columns is a list of x, y and height on a grid.
-    Formats of instruments need the extra `surface`.
+    and y, of columns and rows or of each height; other numbers that could change the meaning of the
+    heights are refused. Text contains a matrix, possibly with Gwyddion's comments on its size. A
+    matrix with three columns is a list of x, y and height on a grid. Formats of instruments need
+    the extra `surface`.
 
     Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
     InputError if the file contains no usable map.
@@ -163,30 +164,42 @@ def _arrays(path: Path) -> HeightGrid:
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
     named = {name.lower(): values for name, values in found.items()} | found
     chosen = "" if "" in found else _chosen(path, found)
-    masks = [name for name in found if name.lower() in ("mask", "valid")]
-    if masks and found[masks[0]].shape == named[chosen].shape:
-        expected = "none: nan in the heights where they are not valid"
-        raise InputError("arrays", found=masks[0], expected=expected, where=str(path))
-    size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
-    both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
-    others = [name for name in found if name.lower() not in STATED and SCALES.search(name)]
+    others = [
+        name
+        for name, values in found.items()
+        if name != chosen
+        and name.lower() not in (*STATED, "x", "y")
+        and (SCALES.search(name) or _may_change(values, named[chosen]))
+    ]
     if others:
-        expected = f"{', '.join(STATED)} for what the heights and pixels are, or none of these"
+        expected = f"{', '.join(STATED)}, x, y and no other numbers beside heights, in which nan "
+        expected += "marks holes"
         raise InputError("arrays", found=", ".join(others), expected=expected, where=str(path))
+    both = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
     units = [str(named[name]) if name in named else "" for name in STATED[1:]]
     heights = np.squeeze(_numbers(named[chosen]))
     columns = {name: named[name] for name in "xy" if name in named}
+    if len(columns) == 1:
+        only = f"only {next(iter(columns))}"
+        raise InputError("arrays", found=only, expected="x and y, or neither", where=str(path))
     if not columns and heights.ndim == 2 and heights.shape[1] == 3:  # as in a text file
         *both_axes, heights = heights.T
         columns = dict(zip("xy", both_axes, strict=True))
-    if len(columns) == 2:
-        heights, apart = _placed(path, heights, *(_numbers(np.squeeze(columns[it])) for it in "xy"))
+    if columns:
+        axes = (np.atleast_1d(np.squeeze(_numbers(columns[it]))) for it in "xy")
+        heights, apart = _placed(path, heights, *axes)
         if both is not None and not np.allclose(both, apart, rtol=ROUNDED, atol=0.0):
             expected = f"{apart[0]:g} by {apart[1]:g}, the steps of x and y"
             said = f"{both[0]:g} by {both[1]:g}"
             raise InputError("pixel", found=said, expected=expected, where=str(path))
         both = both or apart
     return HeightGrid(heights, both, *units)
+
+
+def _may_change(values: NDArray[Any], heights: NDArray[Any]) -> bool:
+    """True for numbers that could change the meaning of heights: a factor, a mask, coordinates."""
+    alike = values.size in (1, heights.size, *heights.shape)
+    return values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
 
 
 def _chosen(path: Path, found: dict[str, NDArray[Any]]) -> str:

@@ -153,6 +153,11 @@ class Summits(Table, Asperities, Plottable):
             height_std=float(self.heights.std()),
         )
 
+    def _attributes(self) -> dict[str, Any]:
+        """The unit of lengths, and the other fields of `origin` that are one number or text."""
+        about = self.origin.__getstate__()
+        return {name: it for name, it in about.items() if isinstance(it, (str, int, float))}
+
     def pruned(self, prune: float) -> Summits:
         """The summits that are left at a stronger pruning.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,8 +60,8 @@ class Surface(Record, Plottable):
         default determined from `heights`
     source  : the file, or a description
 
-    Raises InputError for maps that are constant or have holes, and for pixels with one side more
-    than ten times the other.
+    Raises InputError for maps that are constant or have holes, for pixels with one side more than
+    ten times the other, and for unknown units.
 
     >>> surface = cr.surface.Surface(np.random.default_rng(1).normal(size=(64, 64)), pixel=0.5)
     >>> surface.size
@@ -91,7 +92,9 @@ class Surface(Record, Plottable):
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
-        for name, value in (("unit", unit), ("removed", removed), ("source", source)):
+        named = known_unit("unit", unit)
+        object.__setattr__(self, "unit", named.name if named else "")
+        for name, value in (("removed", removed), ("source", source)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "filled_pixels", filled_pixels)
         there = holes.clipped(self.heights) if clipped is None else clipped
@@ -105,6 +108,13 @@ class Surface(Record, Plottable):
     def filled(self) -> int:
         """The number of pixels that were holes."""
         return 0 if self.filled_pixels is None else int(np.count_nonzero(self.filled_pixels))
+
+    @property
+    def _measured(self) -> Array:
+        """(ny, nx) the heights, nan where they were not measured."""
+        if self.filled_pixels is None:
+            return self.heights
+        return np.where(self.filled_pixels, np.nan, self.heights)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -150,25 +160,28 @@ class Surface(Record, Plottable):
         a sphere of radius 49.9828
         """
         down, across = (-(-length // FITTED) for length in self.heights.shape)
-        few = self.heights[::down, ::across]
+        few = self._measured[::down, ::across]
         pixel = (self.pixel[0] * across, self.pixel[1] * down)
-        left, found = float(np.var(few)), ""
+        known = few[~np.isnan(few)]
+        left, found = float(np.var(known)) if len(known) else 0.0, ""
         for kind in TRENDS if min(few.shape) >= 3 else ():
             try:
                 trend, there = fitted(few, pixel, kind)
-            except InputError:  # no sphere spans the map
+            except InputError:  # no sphere spans the map, or too few pixels are measured
                 continue
             if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
                 continue  # a sphere, which is simpler, was tried already
-            if (least := float(np.var(few - there))) < (1.0 - MOST) * left:
+            if (least := float(np.nanvar(few - there))) < (1.0 - MOST) * left:
                 name = f"a {trend!r}".partition(" in the")[0]
-                part = f"{100 * (1.0 - least / np.var(few)):.3g} %"
+                part = f"{100 * (1.0 - least / np.var(known)):.3g} %"
                 found = f"{name}, explains {part} of the variance of the heights: "
                 found += f'detrend="{kind}", or --detrend {kind}, removes it'
             left = least
         return (*([found] if found else []), *self._wrong_pixels())
 
     def _wrong_pixels(self) -> Iterator[str]:
+        if (part := self.filled / self.heights.size) > 0.5:
+            yield f"{part:.0%} of the pixels were holes: most of this map is not measured"
         if self.clipped:
             yield (
                 f"the highest {self.clipped:,} pixels have exactly the same height: the map seems "
@@ -204,7 +217,9 @@ class Surface(Record, Plottable):
     def detrend(self, kind: Trend = "plane") -> Surface:
         """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes it.
 
-        Raises InputError if nothing is left.
+        The form is fitted to measured pixels. Pixels that were holes are filled again.
+
+        Raises InputError if nothing is left, or if the measured pixels do not determine the form.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
@@ -213,8 +228,8 @@ class Surface(Record, Plottable):
         if kind not in TRENDS:
             expected = '"plane", "sphere" or "paraboloid"'
             raise InputError("detrend", found=repr(kind), expected=expected)
-        trend, there = fitted(self.heights, self.pixel, kind)
-        left = self.heights - there
+        trend, there = fitted(self._measured, self.pixel, kind)
+        left = holes.filled(self.heights - there)
         if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):
             raise InputError("heights", found=f"nothing but a {kind}", expected="a rough surface")
         return replace(self, heights=left, removed=(*self.removed, trend))
@@ -275,9 +290,9 @@ class Surface(Record, Plottable):
             raise InputError("summits", found=error.found, expected=expected) from error
 
 
-def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
+def checked_pixel(pixel: ArrayLike) -> tuple[float, float]:
     """The sizes (dx, dy) of a pixel. Raises InputError if they are not valid."""
-    both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
+    both: Any = pixel if np.ndim(pixel) else (pixel, pixel)
     if len(both) != 2:
         raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")
     dx, dy = (checks.positive("pixel", each) for each in both)
