@@ -260,7 +260,7 @@ def test_other_comments_are_ignored(tmp_path: Path) -> None:
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    said = r"a\.png: found \.png, expected a map in \.npy, .* needs SurfaceTopography: pip install Surf"
+    said = r"a\.png: found \.png, expected a map in \.npy, .* needs SurfaceTopography: pip"
     with pytest.raises(cr.FileError, match=said):
         raw(tmp_path / "a.png", b"PNG")
 
