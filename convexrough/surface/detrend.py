@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,32 +77,44 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     x, y = (np.broadcast_to(each / size, heights.shape)[known] for each in (x, y))
     level = float(heights[known].mean()) if known.any() else 0.0
     wanted = (heights[known] - level) / size
-    z, shape, there = np.zeros_like(wanted), np.zeros(4), np.full(heights.shape, np.nan)
     terms = [np.ones_like(wanted), x, y]
-    if kind == "paraboloid":
-        terms += [x * x / 2, x * y, y * y / 2]
-        a, b, c, kx, kxy, ky = _least_squares(terms, wanted).tolist()
-        bent = -np.linalg.eigvalsh([[kx, kxy], [kxy, ky]]) / size
-        for k, each in zip((a, b, c, kx, kxy, ky), terms, strict=True):
-            z += k * each
-        there[known] = level + size * z
-        both = (float(bent[0]), float(bent[1]))
-        return Removed(kind, level + size * a, (b, c), float(bent.mean()), both), there
-    for _ in range(1 if kind == "plane" else STEPS):
-        factors = terms if kind == "plane" else [*terms, (x * x + y * y + z * z) / 2]
+    if kind == "sphere":
+        (a, slopes, curvature), z = _sphere(terms, wanted)
+        removed = Removed(kind, level + size * a, slopes, curvature / size)
+    else:
+        terms += [x * x / 2, x * y, y * y / 2] if kind == "paraboloid" else []
+        found = _least_squares(terms, wanted)
+        z = np.asarray(sum(k * term for k, term in zip(found, terms, strict=True)))
+        a, b, c, kx, kxy, ky = np.append(found, np.zeros(6 - len(found))).tolist()
+        first, second = ((0.0 - np.linalg.eigvalsh([[kx, kxy], [kxy, ky]])) / size).tolist()
+        mean = (first + second) / 2
+        removed = Removed(kind, level + size * a, (b, c), mean, (first, second))
+    there = np.full(heights.shape, np.nan)
+    there[known] = level + size * z
+    return removed, there
+
+
+def _sphere(
+    terms: list[Array], wanted: Array
+) -> tuple[tuple[float, tuple[float, float], float], Array]:
+    """The best sphere: its height, slopes and curvature in the middle, and its heights.
+
+    Gauss-Newton steps for z = q + k z^2 / 2, with q = a + b x + c y + k (x^2 + y^2) / 2.
+    """
+    z, shape, (_, x, y) = np.zeros_like(wanted), np.zeros(4), terms
+    for _ in range(STEPS):
+        factors = [*terms, (x * x + y * y + z * z) / 2]
         step = _least_squares([each / (1 - shape[3] * z) for each in factors], wanted - z)
-        shape[: len(step)] += step
-        a, b, c, k = shape
+        shape += step
+        a, b, c, k = shape.tolist()
         q = a + b * x + c * y + k * (x * x + y * y) / 2
-        if (under := 1 - 2 * k * q).min() <= 0:
+        if min((under := 1 - 2 * k * q).min(), 1 - 2 * k * a) <= 0:
             break
         z = 2 * q / (1 + np.sqrt(under))
-        if kind == "plane" or np.abs(step).max() <= ENOUGH * np.abs(shape).max():
-            q0 = 2 * a / (1 + np.sqrt(1 - 2 * k * a))
-            slopes = (float(b / (1 - k * q0)), float(c / (1 - k * q0)))
-            curvature = float(0 - k / np.sqrt(b * b + c * c + 1 - 2 * a * k)) / size
-            there[known] = level + size * z
-            return Removed(kind, level + size * float(q0), slopes, curvature), there
+        if np.abs(step).max() <= ENOUGH * np.abs(shape).max():
+            q0 = 2 * a / (1 + math.sqrt(1 - 2 * k * a))
+            slopes = b / (1 - k * q0), c / (1 - k * q0)
+            return (q0, slopes, 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k)), z
     expected = 'one that covers the map, or "plane"'
     raise InputError("detrend", found="no sphere that fits", expected=expected)
 

@@ -15,9 +15,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.surface.detrend import Removed
-from convexrough.surface.hills import Hills
 from convexrough.surface.moments import Moments
-from convexrough.surface.tips import elliptic_load, fit_tips
+from convexrough.surface.tips import elliptic_load
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,12 +47,12 @@ class Origin(Record):
     level: float
     max_height: float
     moments: Moments
-    prune: float = 0.0
-    fit: int = 3
-    maxima: int = 0
-    pruned: int = 0
-    at_edge: int = 0
-    without_top: int = 0
+    prune: float
+    fit: int
+    maxima: int
+    pruned: int
+    at_edge: int
+    without_top: int
 
     @property
     def threshold(self) -> float:
@@ -175,53 +174,3 @@ class Summits(Table, Asperities, Plottable):
         columns: dict[str, Any] = self.__getstate__() | {"origin": None}
         chosen = {name: values[keep] for name, values in columns.items() if values is not None}
         return Summits(**chosen, origin=origin)
-
-
-def find_summits(heights: Array, found: Hills, origin: Origin, prune: float, fit: int) -> Summits:
-    """The result of `Surface.summits`, from the hills of a map that `origin` describes."""
-    prune = checks.between("prune", prune, 0.0, 1.0)
-    fit = _checked_fit(fit, origin.shape)
-    prominent = found.prominences >= prune * origin.max_height
-    reach = fit // 2
-    (rows, columns), pixels = origin.shape, found.pixels
-    inside = (pixels >= reach).all(axis=1) & (pixels < (rows - reach, columns - reach)).all(axis=1)
-    tried = pixels[prominent & inside]
-    tips = fit_tips(heights, tried, origin.pixel, fit)
-    origin = replace(
-        origin,
-        prune=prune,
-        fit=fit,
-        maxima=len(pixels),
-        pruned=int(np.count_nonzero(~prominent)),
-        at_edge=int(np.count_nonzero(prominent & ~inside)),
-        without_top=int(np.count_nonzero(~tips.whole)),
-    )
-    if not tips.whole.any():
-        found_text = (
-            f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} at "
-            f"the edge, {origin.without_top:,} without a fitted maximum"
-        )
-        raise InputError("summits", found=found_text, expected="at least one")
-    whole, (dx, dy) = tips.whole, origin.pixel
-    middle = np.column_stack((tried[:, 1] - (columns - 1) / 2, tried[:, 0] - (rows - 1) / 2))
-    k1, k2 = tips.curvatures[whole].T
-    return Summits(
-        positions=(middle * (dx, dy) + tips.offsets)[whole],
-        tip_radii=1 / np.sqrt(k1 * k2),
-        heights=tips.heights[whole],
-        prominences=found.prominences[prominent & inside][whole],
-        largest_curvatures=k1,
-        smallest_curvatures=k2,
-        deviations=tips.deviations[whole],
-        pixels=tried[whole],
-        origin=origin,
-    )
-
-
-def _checked_fit(fit: int, shape: tuple[int, int]) -> int:
-    if not isinstance(fit, (int, np.integer)) or isinstance(fit, bool) or fit < 3 or fit % 2 == 0:
-        raise InputError("fit", found=repr(fit), expected="an odd number of pixels, at least 3")
-    if min(shape) < fit:
-        found = f"{shape[1]} by {shape[0]} pixels"
-        raise InputError("map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}")
-    return int(fit)

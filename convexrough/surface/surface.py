@@ -19,7 +19,8 @@ from convexrough.surface import holes
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
 from convexrough.surface.moments import Moments, moments_of
-from convexrough.surface.summits import Origin, Summits, find_summits
+from convexrough.surface.summits import Origin, Summits
+from convexrough.surface.tips import fit_tips
 from convexrough.tabular.units import known_unit
 
 #: Largest ratio of the sides of a pixel; longer ones do not resolve summits.
@@ -94,15 +95,12 @@ class Surface(Record, Plottable):
         object.__setattr__(self, "pixel", checked_pixel(pixel))
         named = known_unit("unit", unit)
         object.__setattr__(self, "unit", named.name if named else "")
-        for name, value in (("removed", removed), ("source", source)):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "removed", removed)
         object.__setattr__(self, "filled_pixels", filled_pixels)
-        there = holes.clipped(self.heights) if clipped is None else clipped
-        object.__setattr__(self, "clipped", there)
-        alike = holes.repeated(self.heights) if repeated is None else repeated
-        object.__setattr__(self, "repeated", alike)
-        same = holes.copied(self.heights) if copied is None else copied
-        object.__setattr__(self, "copied", same)
+        object.__setattr__(self, "source", source)
+        for name, value in (("clipped", clipped), ("repeated", repeated), ("copied", copied)):
+            found = getattr(holes, name)(self.heights) if value is None else value
+            object.__setattr__(self, name, found)
 
     @property
     def filled(self) -> int:
@@ -270,9 +268,25 @@ class Surface(Record, Plottable):
         >>> len(summits), summits.origin.pruned
         (129, 191)
         """
+        prune = checks.between("prune", prune, 0.0, 1.0)
+        checks.whole("fit", fit, 3)
+        rows, columns = shape = self.heights.shape[0], self.heights.shape[1]
+        if fit % 2 == 0:
+            raise InputError("fit", found=fit, expected="an odd number of pixels, at least 3")
+        if min(shape) < fit:
+            found = f"{columns} by {rows} pixels"
+            raise InputError(
+                "map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}"
+            )
+        pixels, reach = self.hills.pixels, fit // 2
+        prominent = self.hills.prominences >= prune * self.max_height
+        inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
+        tried = pixels[prominent & inside]
+        tips = fit_tips(self.heights, tried, self.pixel, fit)
+        whole = tips.whole
         origin = Origin(
             source=self.source,
-            shape=(self.heights.shape[0], self.heights.shape[1]),
+            shape=shape,
             pixel=self.pixel,
             unit=self.unit,
             removed=self.removed,
@@ -280,14 +294,33 @@ class Surface(Record, Plottable):
             level=float(self.heights.mean()),
             max_height=self.max_height,
             moments=self.moments,
+            prune=prune,
+            fit=int(fit),
+            maxima=len(pixels),
+            pruned=int(np.count_nonzero(~prominent)),
+            at_edge=int(np.count_nonzero(prominent & ~inside)),
+            without_top=int(np.count_nonzero(~whole)),
         )
-        try:
-            return find_summits(self.heights, self.hills, origin, prune, fit)
-        except InputError as error:
-            if error.what != "summits" or not self.warnings:
-                raise
-            expected = f"{error.expected}; {self.warnings[0]}"
-            raise InputError("summits", found=error.found, expected=expected) from error
+        if not whole.any():
+            none = (
+                f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} "
+                f"at the edge, {origin.without_top:,} without a fitted maximum"
+            )
+            expected = "; ".join(("at least one", *self.warnings[:1]))
+            raise InputError("summits", found=none, expected=expected)
+        middle = (tried - np.array([rows - 1, columns - 1]) / 2)[:, ::-1]
+        k1, k2 = tips.curvatures[whole].T
+        return Summits(
+            positions=(middle * self.pixel + tips.offsets)[whole],
+            tip_radii=1 / np.sqrt(k1 * k2),
+            heights=tips.heights[whole],
+            prominences=self.hills.prominences[prominent & inside][whole],
+            largest_curvatures=k1,
+            smallest_curvatures=k2,
+            deviations=tips.deviations[whole],
+            pixels=tried[whole],
+            origin=origin,
+        )
 
 
 def checked_pixel(pixel: ArrayLike) -> tuple[float, float]:
