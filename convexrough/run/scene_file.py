@@ -169,7 +169,7 @@ def _one_unit(path: Path, own: str, named: str) -> None:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
         if not own:
-            expected = f'a map with a unit, as {path} is in {named}: give `surface.read` unit="..."'
+            expected = f'a map with a unit, as {path} is in {named}: unit="...", or --unit'
         if not named:
             expected = f"a unit of length in {path} ([units] length), or a map without a unit"
         raise InputError("asperities", found=found, expected=expected)

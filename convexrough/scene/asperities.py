@@ -47,8 +47,7 @@ class Asperities(Record):
     def __init__(
         self, positions: ArrayLike, tip_radii: ArrayLike, heights: ArrayLike = 0.0
     ) -> None:
-        points = _points(positions)
-        object.__setattr__(self, "positions", points)
+        object.__setattr__(self, "positions", _points(positions))
         checks.same_index(positions=positions, tip_radii=tip_radii, heights=heights)
         self._wear(tip_radii, heights)
         self.layout  # noqa: B018, refuses two asperities at one place
@@ -150,8 +149,8 @@ class Asperities(Record):
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities; the others keep their positions, random heights and random tip radii.
         """
-        rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)
+        regular = cls._lattice(HEXAGONAL, spacing, tip_radius, within)
+        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 
     @classmethod
     def square(
@@ -165,30 +164,23 @@ class Asperities(Record):
         seed: int | None = None,
     ) -> Asperities:
         """Asperities on a square lattice, with one on the axis; arguments as for `hexagonal`."""
-        rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(SQUARE, spacing, tip_radius, within, *rough)
+        regular = cls._lattice(SQUARE, spacing, tip_radius, within)
+        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 
     @classmethod
     def _lattice(
-        cls,
-        pattern: Pattern,
-        spacing: float,
-        tip_radius: ArrayLike,
-        within: float,
-        height_std: float,
-        tip_radius_cv: float,
-        seed: int | None,
+        cls, pattern: Pattern, spacing: float, tip_radius: ArrayLike, within: float
     ) -> Asperities:
         spacing = checks.positive("spacing", spacing)
         within = checks.non_negative("within", within)
         ratio = within / spacing
         count = np.pi * pattern.density * ratio**2 + 1
         checks.fits_in_memory(f"within / spacing = {ratio:.3g}", count, 300)
-        layout = Layout.of(pattern, spacing, (within / spacing) ** 2 * (1 + 1e-12))
+        layout = Layout.of(pattern, spacing, ratio**2 * (1 + 1e-12))
         n = len(layout.points)
-        radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
-        regular = cls._on(layout, radii, 0.0)
-        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
+        return cls._on(
+            layout, checks.array("tip_radius", tip_radius, length=n, sign="positive"), 0.0
+        )
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
