@@ -19,10 +19,9 @@ from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
 from convexrough.run.tables import read_summits, read_text
-from convexrough.scene.asperities import Asperities, largest_tip_radius
+from convexrough.scene.asperities import CUT_DEVIATIONS, Asperities, largest_tip_radius
 from convexrough.scene.base import checked
 from convexrough.scene.material import Material
-from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.table import Reading, few, named_columns

@@ -14,15 +14,11 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.layout import Layout
-from convexrough.scene.patterns import (
-    CUT_DEVIATIONS,
-    HEXAGONAL,
-    SQUARE,
-    Pattern,
-    checked_seed,
-    cut_normal,
-)
+from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout, Pattern
+
+#: Random heights and logarithms of radii are normally distributed. They are clipped at this many
+#: standard deviations, so that only finitely many asperities can touch.
+CUT_DEVIATIONS = 6.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,6 +183,19 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
     """[length] the largest random tip radius that `hexagonal` and `square` can produce."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
     return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
+
+
+def checked_seed(seed: int | None) -> int:
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
+        expected = "a whole number that is not negative, as heights or tip radii are random"
+        raise InputError("seed", found=seed, expected=expected)
+    return int(seed)
+
+
+def cut_normal(count: int, seed: int, *, stream: int) -> Array:
+    """(count,) clipped standard normal numbers. A `stream` is independent of all others."""
+    numbers = np.random.default_rng([seed, stream]).standard_normal(count)
+    return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)
 
 
 def _points(positions: ArrayLike) -> Array:

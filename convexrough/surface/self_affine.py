@@ -7,7 +7,7 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.scene.patterns import checked_seed
+from convexrough.scene.asperities import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
