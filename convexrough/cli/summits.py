@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from convexrough.cli.options import PATH, figure_options, output_options
-from convexrough.cli.speech import (
-    DONE,
-    NOT_CERTIFIED,
-    echo,
-    progress,
-    say_aside,
-    written,
-)
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, echo, progress, say_aside, written
 from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:

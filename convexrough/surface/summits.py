@@ -152,10 +152,13 @@ class Summits(Table, Asperities, Plottable):
             height_std=float(self.heights.std()),
         )
 
+    @property
+    def unit(self) -> str:
+        """The unit of all lengths; "" if unknown."""
+        return self.origin.unit
+
     def _attributes(self) -> dict[str, Any]:
-        """The unit of lengths, and the other fields of `origin` that are one number or text."""
-        about = self.origin.__getstate__()
-        return {name: it for name, it in about.items() if isinstance(it, (str, int, float))}
+        return {"unit": self.unit}
 
     def pruned(self, prune: float) -> Summits:
         """The summits that are left at a stronger pruning.

@@ -46,20 +46,8 @@ COLUMNS = {
 }
 
 #: Names of columns with row numbers.
-INDEX = (
-    "index",
-    "id",
-    "no",
-    "nr",
-    "#",
-    "i",
-    "number",
-    "node",
-    "label",
-    "node label",
-    "asperity",
-    "",
-)
+INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
+         "")  # fmt: skip
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
