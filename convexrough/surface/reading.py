@@ -102,7 +102,7 @@ def read(
     unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
         different unit in the file is an error. Heights in another known unit are converted
     detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None: none
-    fill   : True to fill holes with a harmonic function, after a form is fitted to the other pixels;
+    fill   : True to fill holes with a harmonic function, after the form is fitted to other pixels;
         else holes are an error. Holes are nan, masked, BAD in text, and marks such as -9999 or 1e38
         far from all heights
 
