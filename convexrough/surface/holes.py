@@ -26,9 +26,10 @@ SAMPLE = 2**17
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
 
-    A similar neighbour differs by at most half of the outlier's distance from the median.
+    A similar neighbour differs by at most half of the outlier's distance from the median. Holes
+    (nan) are neither outlying nor similar.
     """
-    low, middle, high = np.quantile(heights, (0.25, 0.5, 0.75))
+    low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
     found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
     padded = np.pad(heights, 1, mode="reflect")

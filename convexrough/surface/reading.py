@@ -367,8 +367,8 @@ def _placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, flo
     vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
     shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
     if heights.shape != shape or not (vectors or y.shape == shape):
-        found = " by ".join(map(str, heights.shape))
-        expected = f"{' by '.join(map(str, shape))}, as y and x are long"
+        found, expected = (" by ".join(map(str, it)) for it in (heights.shape, shape))
+        expected += ", as y and x are long" if vectors or x.shape == y.shape else ", y as well"
         expected += "; transpose it" if heights.T.shape == shape else ""
         raise InputError("heights", found=found, expected=expected)
     return _on_grid(x, y, heights)

@@ -201,7 +201,7 @@ class Surface(Record, Plottable):
                 f"rms slope {self.rms_slope:.3g}: surfaces {rare} are rare; check the units of the "
                 "heights and of the pixel"
             )
-        if len(places := holes.spikes(self.heights)):
+        if len(places := holes.spikes(self._measured)):
             row, column = places[0]
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "

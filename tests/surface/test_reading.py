@@ -62,6 +62,8 @@ def test_arrays(tmp_path: Path) -> None:
             raw(several, sides | {name: entry})
     with pytest.raises(cr.InputError, match="arrays: found only x, expected x and y, or neither"):
         raw(several, sides | {"x": X[0]})
+    with pytest.raises(cr.InputError, match="found 7 by 9, expected 7 by 9, y as well"):
+        raw(several, sides | {"x": X, "y": Y[:, 0]})
     with pytest.raises(cr.InputError, match="expected 1 by 9, as y and x are long"):
         raw(several, sides | {"x": X[0], "y": [0.0]})
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
