@@ -3,9 +3,7 @@
 The smooth sphere is the scene's sphere, pressed with the same load on a plane without asperities.
 Under the normal load this is Hertz's contact; under shear the theory of Cattaneo, Mindlin and
 Deresiewicz holds. Results are for both bodies. Source: Johnson, Contact Mechanics (1985), chapters
-4 and 7; Dini and Hills (2009), equations 12 to 16, in which results are for one body; and for
-ellipsoids Johnson, sections 3.5 and 4.2 (docs/theory/bodies.md). Carlson's integrals R_D and R_F:
-DLMF 19.16.
+4 and 7; and Dini and Hills (2009), equations 12 to 16, in which results are for one body.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene import base
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz, mindlin, surface_shear
+from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
@@ -203,7 +201,7 @@ class SmoothEllipsoid(SmoothSphere):
     @cached_property
     def semi_axes(self) -> tuple[float, float]:
         """[length] semi-axes of the contact ellipse along x and y."""
-        return ellipse_axes(self.load, self._modulus, base.along(self.scene.sphere_radius))
+        return ellipse.semi_axes(self.load, self._modulus, base.along(self.scene.sphere_radius))
 
     @cached_property
     def contact_radius(self) -> float:
@@ -213,7 +211,7 @@ class SmoothEllipsoid(SmoothSphere):
     @cached_property
     def approach(self) -> float:
         """[length] approach of distant points of the two bodies."""
-        return ellipse_approach(self.load, self._modulus, self.semi_axes)
+        return ellipse.approach(self.load, self._modulus, self.semi_axes)
 
     @cached_property
     def peak_pressure(self) -> float:
@@ -223,36 +221,3 @@ class SmoothEllipsoid(SmoothSphere):
     def normal_displacement(self, distance: ArrayLike) -> Any:
         """Raises InputError: not available for an ellipsoid."""
         base.sphere_radius(self.scene.sphere_radius, "normal_displacement")
-
-
-def slenderness(ratio: float) -> float:
-    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1."""
-    from scipy.optimize import brentq
-    from scipy.special import elliprd
-
-    def excess(log: float) -> float:
-        q = math.exp(2.0 * log)
-        return math.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0) / ratio)
-
-    # The ratio is 1 at b = a, and above Rx / Ry at b / a = Ry / Rx.
-    return 1.0 if ratio == 1.0 else math.exp(brentq(excess, -math.log(ratio), 0.0, xtol=1e-15))
-
-
-def ellipse_axes(
-    load: float, contact_modulus: float, radii: tuple[float, float]
-) -> tuple[float, float]:
-    """[length] the semi-axes of the contact ellipse, a along x and b along y."""
-    from scipy.special import elliprd
-
-    largest = max(radii)
-    q = slenderness(largest / min(radii))
-    a = math.cbrt(load * largest / (math.pi * contact_modulus) * float(elliprd(0.0, q * q, 1.0)))
-    return (a, q * a) if radii[0] == largest else (q * a, a)
-
-
-def ellipse_approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> float:
-    """[length] the approach delta of distant points of the two bodies."""
-    from scipy.special import elliprf
-
-    a, b = axes
-    return 1.5 * load / (math.pi * contact_modulus) * float(elliprf(0.0, a * a, b * b))

@@ -14,9 +14,9 @@ from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
+from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
 from convexrough.surface.moments import Moments
-from convexrough.surface.tips import elliptic_load
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,7 +140,7 @@ class Summits(Table, Asperities, Plottable):
     @property
     def elliptic_loads(self) -> Array:
         """(n,) load of the elliptic tip over the load of its sphere at the same indentation."""
-        return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
+        return frozen(ellipse.load_ratio(self.largest_curvatures / self.smallest_curvatures))
 
     @property
     def statistics(self) -> Statistics:

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import elementwise
-from scipy.special import ellipe, ellipkm1
 
 from convexrough.arrays import Array, Indices
 
@@ -61,29 +59,3 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     return Tips(
         np.stack((top[0] * dx, top[1] * dy), axis=1), summits, curvatures, deviations, whole
     )
-
-
-def elliptic_load(ratio: Array) -> Array:
-    """(n,) load of an elliptic tip over the load of the sphere of radius 1 / sqrt(k1 k2).
-
-    The two are Hertz contacts on a flat with the same indentation: docs/theory/surfaces.md, "Tips",
-    and Johnson (1985), eqs 4.26 to 4.28.
-
-    ratio : (n,) k1 / k2, at least 1
-    """
-    flattened = np.array(np.maximum(ratio, 1.0), dtype=np.float64)
-    round_enough = flattened < 1 + 1e-7  # the error is below the square of 1e-7
-    wanted = np.where(round_enough, 2.0, flattened)
-
-    def excess(log_axes: Array, wanted: Array) -> Array:
-        squared = np.exp(2 * log_axes)
-        K, E = ellipkm1(squared), ellipe(1 - squared)
-        return np.log((E / squared - K) / (K - E)) - np.log(wanted)
-
-    low, high = np.log(1 / wanted) - 1.0, np.full_like(wanted, -1e-9)
-    axes = np.exp(elementwise.find_root(excess, (low, high), args=(wanted,)).x)
-    K, E = ellipkm1(axes**2), ellipe(1 - axes**2)
-    product = (E / axes**2 - K) * (K - E)
-    F1 = np.cbrt(4 / (np.pi * (1 - axes**2)) * axes**1.5 * np.sqrt(product))
-    F2 = 2 / np.pi * np.sqrt(axes) * K / F1
-    return np.where(round_enough, 1.0, F2**-1.5)
