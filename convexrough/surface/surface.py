@@ -19,8 +19,7 @@ from convexrough.surface import holes
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
 from convexrough.surface.moments import Moments, moments_of
-from convexrough.surface.summits import Origin, Summits
-from convexrough.surface.tips import fit_tips
+from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
 
 #: Largest ratio of the sides of a pixel; longer ones do not resolve summits.

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from convexrough.sphere.ellipse import load_ratio
-from convexrough.surface.tips import fit_tips
+from convexrough.surface.summits import fit_tips
 
 PIXEL = (0.5, 0.3)
 
