@@ -98,5 +98,6 @@ def filled(heights: Array) -> Array:
     between = coo_array((np.ones(len(row)), (row, neighbours[row, side])), shape=(count, count))
     own = diags_array((neighbours != OUTSIDE).sum(axis=1, dtype=np.float64))
     mended = heights.copy()
-    mended[holes] = spsolve((own - between).tocsc(), sums)
+    symmetric = (own - between).tocsc()
+    mended[holes] = spsolve(symmetric, sums, permc_spec="MMD_AT_PLUS_A")  # twice as fast
     return mended

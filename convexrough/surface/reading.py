@@ -130,12 +130,17 @@ def read(
         if upwards and not length:
             expected = f"the unit of the pixel, as heights are in {upwards.name}"
             raise InputError("unit", found="none", expected=expected)
-        heights, holes = _mended(grid.heights, fill)
+        heights, holes = _unfilled(grid.heights, fill)
         if upwards and length:
             heights = heights * upwards.into(length)
+        if holes is not None and detrend is None:
+            heights = filled(heights)
+        elif holes is not None:  # `detrend` fills them
+            heights = np.where(holes, heights[~holes][0], heights)
         size = _pixel(grid.pixel, pixel)
         name = length.name if length else ""
         surface = Surface(heights, size, name, filled_pixels=holes, source=str(path))
+        surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
             likely = f"{SLOPES[0]:g} to {SLOPES[1]:g}"
@@ -143,7 +148,7 @@ def read(
             more = f"check height_unit, {upwards.name}, and unit" if upwards else more
             expected = f"{likely}; {more}"
             raise InputError("heights", found=f"rms slope {slope:.3g}", expected=expected)
-        return surface if detrend is None else surface.detrend(detrend)
+        return surface
 
 
 def _pixel(
@@ -167,8 +172,8 @@ def _refuse_other(
         raise InputError("pixel", found=f"{said[0]:g} by {said[1]:g}", expected=expected)
 
 
-def _mended(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
-    """The heights with holes filled, and a map of the pixels that were holes, or None."""
+def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
+    """The heights with nan in holes, and a map of the holes, or None if there are none."""
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
     if (rest := heights[~marks & ~np.isnan(heights)]).size:
@@ -189,7 +194,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None
         raise InputError("heights", found=found, expected="some heights")
     if not fill:
         raise InputError("heights", found=found, expected="none, or fill=True, --fill to fill them")
-    return filled(heights), empty
+    return heights, empty
 
 
 def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:

@@ -97,9 +97,13 @@ class Surface(Record, Plottable):
         object.__setattr__(self, "removed", removed)
         object.__setattr__(self, "filled_pixels", filled_pixels)
         object.__setattr__(self, "source", source)
-        for name, value in (("clipped", clipped), ("repeated", repeated), ("copied", copied)):
-            found = getattr(holes, name)(self.heights) if value is None else value
-            object.__setattr__(self, name, found)
+        known = self.heights if filled_pixels is None else self.heights[~filled_pixels]
+        there = holes.clipped(known) if clipped is None else clipped
+        object.__setattr__(self, "clipped", there)
+        alike = holes.repeated(known) if repeated is None else repeated
+        object.__setattr__(self, "repeated", alike)
+        same = holes.copied(self._measured) if copied is None else copied
+        object.__setattr__(self, "copied", same)
 
     @property
     def filled(self) -> int:
