@@ -33,8 +33,8 @@ def slenderness(ratio: Number) -> Number:
     value_before = radii(before)
     for _ in range(STEPS):
         value = radii(log)
-        rise = np.where(value == value_before, 1.0, value - value_before)
-        step = (wanted - value) * (log - before) / rise
+        difference = np.where(value == value_before, 1.0, value - value_before)
+        step = (wanted - value) * (log - before) / difference
         before, value_before, log = log, value, log + step
     return np.minimum(np.exp(log), 1.0)
 
