@@ -418,13 +418,14 @@ def steps(name: str, values: Array) -> tuple[Indices, float]:
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     span = float(levels[-1] - levels[0])
     digit = _last_digit(levels)
-    # Lines of the grid can be missing; if coordinates are rounded, their differences vary.
+    # Lines of the grid can be missing. If coordinates are rounded, their differences vary, and each
+    # is off by less than a last digit: half of one, and the rounding of both ends.
     for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
         step = span / count
         lines = (values - levels[0]) / step
         number = np.rint(lines)
         off = np.abs(lines - number)
-        if off.max() <= OFF_GRID + (rounded / step if rounded < step / 4 else 0.0):
+        if off.max() <= max(OFF_GRID, rounded / step if rounded < step / 4 else 0.0):
             return number.astype(np.intp), step
     worst = float(values[np.argmax(off)])
     expected = f"coordinates {step:g} apart, on a regular grid, in columns x, y and height"
