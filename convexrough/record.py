@@ -89,8 +89,9 @@ class Table(Record):
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays with these names, in a mapping whose keys are the names in the singular."""
-        return {singular(name): getattr(self, name) for name in names}
+        """The arrays with these names, or of all columns, by their names in the singular."""
+        wanted = names or next(iter(self._along.values()))
+        return {singular(name): getattr(self, name) for name in wanted}
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas data frame with a row for each asperity, step, point or solver.

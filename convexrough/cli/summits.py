@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from convexrough.cli.options import PATH, figure_options, output_options
-from convexrough.cli.speech import (
-    DONE,
-    NOT_CERTIFIED,
-    echo,
-    progress,
-    say_aside,
-    written,
-)
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, echo, progress, say_aside, written
 from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
@@ -50,11 +43,19 @@ class Pressing(NamedTuple):
                 raise click.UsageError("--load and --modulus go together.")
 
     def of(
-        self, surface: Surface, summits: Callable[[Surface], Asperities]
+        self, surface: Surface, prune: float, fit: int
     ) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
-        """The surface in the scene's unit, and the function that presses it, or None."""
+        """The surface in the scene's unit, and the function that presses its summits, or None."""
         if self.scene is not None:
-            return _as_in_scene(self.scene, surface, summits)
+            from convexrough.run.scene_file import read_scene, read_study
+
+            unit = read_study(self.scene).units.names.length
+            if unit and surface.unit:
+                surface = surface.to_unit(unit)
+            file = read_scene(self.scene, asperities=surface.summits(prune, fit))
+            return surface, lambda it: replace(
+                file, scene=replace(file.scene, asperities=it)
+            ).press()
         if self.radius is None:
             return surface, None
         from convexrough.contact import press
@@ -66,22 +67,6 @@ class Pressing(NamedTuple):
         base = partial(Scene, self.radius, material=stuff, geometry="closest")
         pressed = partial(press, approach=self.approach, load=self.load)
         return surface, lambda it: pressed(base(asperities=it))
-
-
-def _as_in_scene(
-    scene: Path, surface: Surface, summits: Callable[[Surface], Asperities]
-) -> tuple[Surface, Callable[[Asperities], Contact]]:
-    from convexrough.run.scene_file import read_scene, read_study
-
-    unit = read_study(scene).units.names.length
-    if unit and not surface.unit:
-        raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
-    if surface.unit and not unit:
-        expected = f"[units] length in {scene}, as the map is in {surface.unit}"
-        raise InputError("unit", found="none of the scene", expected=expected)
-    surface = surface.to_unit(unit) if unit != surface.unit else surface
-    file = read_scene(scene, asperities=summits(surface))
-    return surface, lambda it: replace(file, scene=replace(file.scene, asperities=it)).press()
 
 
 def _pixel(given: str | None) -> float | tuple[float, ...] | None:
@@ -164,7 +149,7 @@ def summits(
         with progress(f"reading {surface}"):
             scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
             with blamed_on(surface):
-                scan, press = how.of(scan, lambda it: it.summits(prune, fit))
+                scan, press = how.of(scan, prune, fit)
                 scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
         with progress("writing"):
             files = _written(new, scanned, figures=not no_figures, formats=formats, dpi=dpi)
@@ -191,11 +176,11 @@ def _other_table(scene: Path, table: Path) -> str:
 def _written(folder: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
     """Write the table of summits, the results against pruning, summary and figures; the paths."""
     from convexrough.run.results import write_figures, write_json, write_tables
-    from convexrough.surface.report import curve_columns, summit_columns, surface_summary
+    from convexrough.surface.report import summit_columns, surface_summary
 
     tables = {"summits": summit_columns(scanned.summits)}
     if scanned.curve is not None:
-        tables["provability"] = curve_columns(scanned.curve)
+        tables["provability"] = scanned.curve.columns()
     files = write_tables(folder, tables)
     files.append(write_json(folder / "summary.json", surface_summary(scanned)))
     if figures:

@@ -11,8 +11,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.gallery.cases import FRICTION, MATERIAL
 from convexrough.influence.choice import couple
 from convexrough.record import Record
-from convexrough.scene.asperities import Asperities
-from convexrough.scene.patterns import checked_seed
+from convexrough.scene.asperities import Asperities, checked_seed
 from convexrough.scene.scene import Scene
 
 

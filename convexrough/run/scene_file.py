@@ -19,10 +19,9 @@ from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
 from convexrough.run.tables import read_summits, read_text
-from convexrough.scene.asperities import Asperities, largest_tip_radius
+from convexrough.scene.asperities import CUT_DEVIATIONS, Asperities, largest_tip_radius
 from convexrough.scene.base import checked
 from convexrough.scene.material import Material
-from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.table import Reading, few, named_columns
@@ -170,7 +169,7 @@ def _one_unit(path: Path, own: str, named: str) -> None:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
         if not own:
-            expected = f'a map with a unit, as {path} is in {named}: give `surface.read` unit="..."'
+            expected = f'a map with a unit, as {path} is in {named}: unit="...", or --unit'
         if not named:
             expected = f"a unit of length in {path} ([units] length), or a map without a unit"
         raise InputError("asperities", found=found, expected=expected)

@@ -14,15 +14,11 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.layout import Layout
-from convexrough.scene.patterns import (
-    CUT_DEVIATIONS,
-    HEXAGONAL,
-    SQUARE,
-    Pattern,
-    checked_seed,
-    cut_normal,
-)
+from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout, Pattern
+
+#: Random heights and logarithms of radii are normally distributed. They are clipped at this many
+#: standard deviations, so that only finitely many asperities can touch.
+CUT_DEVIATIONS = 6.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,8 +43,7 @@ class Asperities(Record):
     def __init__(
         self, positions: ArrayLike, tip_radii: ArrayLike, heights: ArrayLike = 0.0
     ) -> None:
-        points = _points(positions)
-        object.__setattr__(self, "positions", points)
+        object.__setattr__(self, "positions", _points(positions))
         checks.same_index(positions=positions, tip_radii=tip_radii, heights=heights)
         self._wear(tip_radii, heights)
         self.layout  # noqa: B018, refuses two asperities at one place
@@ -78,7 +73,9 @@ class Asperities(Record):
         """These asperities with random changes of heights and tip radii.
 
         Random numbers are added to the heights, and the tip radii are multiplied by random factors
-        of mean 1. The arguments are those of `hexagonal`.
+        of mean 1. The arguments are those of `hexagonal`. The random numbers depend only on the
+        seed, so use a new seed for each change: a second change with the same seed adds the same
+        numbers again.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -148,8 +145,8 @@ class Asperities(Record):
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities; the others keep their positions, random heights and random tip radii.
         """
-        rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)
+        regular = cls._lattice(HEXAGONAL, spacing, tip_radius, within)
+        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 
     @classmethod
     def square(
@@ -163,36 +160,42 @@ class Asperities(Record):
         seed: int | None = None,
     ) -> Asperities:
         """Asperities on a square lattice, with one on the axis; arguments as for `hexagonal`."""
-        rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(SQUARE, spacing, tip_radius, within, *rough)
+        regular = cls._lattice(SQUARE, spacing, tip_radius, within)
+        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 
     @classmethod
     def _lattice(
-        cls,
-        pattern: Pattern,
-        spacing: float,
-        tip_radius: ArrayLike,
-        within: float,
-        height_std: float,
-        tip_radius_cv: float,
-        seed: int | None,
+        cls, pattern: Pattern, spacing: float, tip_radius: ArrayLike, within: float
     ) -> Asperities:
         spacing = checks.positive("spacing", spacing)
         within = checks.non_negative("within", within)
         ratio = within / spacing
         count = np.pi * pattern.density * ratio**2 + 1
         checks.fits_in_memory(f"within / spacing = {ratio:.3g}", count, 300)
-        layout = Layout.of(pattern, spacing, (within / spacing) ** 2 * (1 + 1e-12))
+        layout = Layout.of(pattern, spacing, ratio**2 * (1 + 1e-12))
         n = len(layout.points)
-        radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
-        regular = cls._on(layout, radii, 0.0)
-        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
+        return cls._on(
+            layout, checks.array("tip_radius", tip_radius, length=n, sign="positive"), 0.0
+        )
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
     """[length] the largest random tip radius that `hexagonal` and `square` can produce."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
     return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
+
+
+def checked_seed(seed: int | None) -> int:
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
+        expected = "a whole number that is not negative, as heights or tip radii are random"
+        raise InputError("seed", found=seed, expected=expected)
+    return int(seed)
+
+
+def cut_normal(count: int, seed: int, *, stream: int) -> Array:
+    """(count,) clipped standard normal numbers. A `stream` is independent of all others."""
+    numbers = np.random.default_rng([seed, stream]).standard_normal(count)
+    return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)
 
 
 def _points(positions: ArrayLike) -> Array:

@@ -1,9 +1,10 @@
-"""Positions of asperities, and data that depend only on them."""
+"""Positions of asperities, on regular patterns or anywhere, and data that depend only on them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,6 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import refuse_coincident
-from convexrough.scene.patterns import Pattern
 
 #: For more asperities than this, a lattice is looked for before nearest neighbours are computed.
 MANY = 5000
@@ -20,6 +20,55 @@ MANY = 5000
 
 #: Bound on the distance from their sites of points made on a lattice, over the largest coordinate.
 MADE_SITE_ERROR = 16 * 2.0**-53
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """The sites i b1 + j b2 of a lattice with the spacing 1.
+
+    skew   : coefficient in the norm of a site, |i b1 + j b2|^2 = i^2 + skew i j + j^2
+    second : b2; b1 is (1, 0)
+    """
+
+    skew: int
+    second: tuple[float, float]
+
+    @property
+    def basis(self) -> Array:
+        return np.array([[1.0, 0.0], self.second])
+
+    @property
+    def density(self) -> float:
+        """The number of sites per unit area."""
+        return 1.0 / self.second[1]
+
+    def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
+        """(n, 2) the sites (i, j) with norms of at most `limit`, and (n,) indices that sort them.
+
+        The sites are ordered by norm and then by angle; the indices sort them by i and then by j.
+        """
+        top = int(np.sqrt(limit / (1.0 - self.skew**2 / 4.0))) + 1
+        steps = np.arange(-top, top + 1)
+        norms = np.add.outer(steps * steps, steps * steps)
+        if self.skew:
+            norms += np.multiply.outer(self.skew * steps, steps)
+        taken = norms <= limit
+        i, j = (each - top for each in np.nonzero(taken))
+        x, y = self.coordinates(i, j)
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of norms
+        order = np.argsort(norms[taken] + turns)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
+
+    def coordinates(self, i: NDArray[Any], j: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The coordinates x and y of the sites i b1 + j b2."""
+        return i + self.second[0] * j, self.second[1] * j
+
+
+#: The lattice in which each site has six nearest neighbours, and the one in which it has four.
+HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
+SQUARE = Pattern(0, (0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

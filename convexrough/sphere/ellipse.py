@@ -7,18 +7,36 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 
-def slenderness(ratio: float) -> float:
-    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1."""
-    from scipy.optimize import brentq
+from convexrough.arrays import Number
+
+#: Number of steps of the secant method.
+STEPS = 5
+
+
+def slenderness(ratio: Number) -> Number:
+    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1.
+
+    The secant method. The logarithm of Rx / Ry is nearly linear in that of b / a, so that `STEPS`
+    steps reach rounding errors.
+    """
     from scipy.special import elliprd
 
-    def excess(log: float) -> float:
-        q = math.exp(2.0 * log)
-        return math.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0) / ratio)
+    def radii(log: Number) -> Number:
+        """The logarithm of Rx / Ry for that of b / a."""
+        q = np.exp(2.0 * log)
+        return np.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0))
 
-    # The ratio is 1 at b = a, and above Rx / Ry at b / a = Ry / Rx.
-    return 1.0 if ratio == 1.0 else math.exp(brentq(excess, -math.log(ratio), 0.0, xtol=1e-15))
+    wanted = np.log(ratio)
+    before, log = -0.5 * wanted, -2.0 / 3.0 * wanted  # the latter if Rx is nearly Ry
+    value_before = radii(before)
+    for _ in range(STEPS):
+        value = radii(log)
+        difference = np.where(value == value_before, 1.0, value - value_before)
+        step = (wanted - value) * (log - before) / difference
+        before, value_before, log = log, value, log + step
+    return np.minimum(np.exp(log), 1.0)
 
 
 def semi_axes(
@@ -28,7 +46,7 @@ def semi_axes(
     from scipy.special import elliprd
 
     largest = max(radii)
-    q = slenderness(largest / min(radii))
+    q = float(slenderness(largest / min(radii)))
     a = math.cbrt(load * largest / (math.pi * contact_modulus) * float(elliprd(0.0, q * q, 1.0)))
     return (a, q * a) if radii[0] == largest else (q * a, a)
 
@@ -39,3 +57,18 @@ def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> 
 
     a, b = axes
     return 1.5 * load / (math.pi * contact_modulus) * float(elliprf(0.0, a * a, b * b))
+
+
+def load_ratio(ratio: Number) -> Number:
+    """The load of an ellipsoid over that of the sphere of radius sqrt(Rx Ry) at the same approach.
+
+    From `semi_axes` and `approach` P = pi E* sqrt(Rx R_D) (delta / (1.5 R_F))^(3/2), and from Hertz
+    P = (4/3) E* (Rx Ry)^(1/4) delta^(3/2) for the sphere.
+
+    ratio : Rx / Ry >= 1
+    """
+    from scipy.special import elliprd, elliprf
+
+    square = slenderness(ratio) ** 2
+    shape = np.sqrt(np.sqrt(ratio) * elliprd(0.0, square, 1.0))
+    return 0.75 * np.pi * shape / (1.5 * elliprf(0.0, 1.0, square)) ** 1.5

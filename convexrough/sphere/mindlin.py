@@ -25,11 +25,6 @@ def deflection(t: Number) -> Number:
     return np.copysign(annulus.deflection(annulus.width_under(t)), t)
 
 
-def force(deflection: Number) -> Number:
-    """The force t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; +-1 for |phi| >= 1."""
-    return np.copysign(annulus.force(annulus.width_at(deflection)), deflection)
-
-
 def potential(t: Number) -> Number:
     """The integral of phi from 0 to t:  t - (3/5) [1 - (1 - t)^(5/3)]."""
     return annulus.potential(annulus.width_under(t))

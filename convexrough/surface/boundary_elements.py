@@ -144,7 +144,8 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
 
     contact : contact of the map's summits, which gives the approach and the (centred) sphere
 
-    Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
+    Raises InputError if the asperities are not `Summits` of this map, if no pixel touches, or if
+    the contact reaches the edge of the map.
 
     >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
     >>> on_summits = cr.press(cr.Scene(1e4, scan.summits(), cr.Material(1.0, 0.3)), load=10.0)
@@ -155,16 +156,20 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     checks.instance("surface", surface, Surface)
     checks.instance("contact", contact, Contact)
     origin = getattr(contact.scene.asperities, "origin", None)
-    if origin and (origin.unit, origin.level) != (surface.unit, float(surface.heights.mean())):
-        found = f"summits of another map (in {origin.unit or 'no unit'})"
-        expected = f"those of this map (in {surface.unit or 'no unit'})"
+    there = (surface.unit, surface.pixel, float(surface.heights.mean()))
+    if origin is None or (origin.unit, origin.pixel, origin.level) != there:
+        found = "asperities that are no summits of a map"
+        if origin is not None:
+            found = f"summits of another map (in {origin.unit or 'no unit'})"
+        expected = f"those of this map (in {surface.unit or 'no unit'}), as surface.summits() finds"
         raise InputError("contact", found=found, expected=expected)
     pressures, load = _pressed(surface, contact, 1)
     touching = pressures > 0
     edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])
     if any(edge.any() for edge in edges):
         found = "contact at the edge of the map"
-        raise InputError("map", found=found, expected="a larger map, or a smaller approach or load")
+        expected = "a larger map, or a smaller approach or load; all else works without --whole"
+        raise InputError("map", found=found, expected=expected)
     row, column = np.nonzero(touching)
     x, y = _places(surface, 1)
     area = surface.pixel[0] * surface.pixel[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +16,10 @@ TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
 #: Largest number of Gauss-Newton steps to the best sphere, and relative size of a last step.
 STEPS, ENOUGH = 50, 1e-12
+
+#: Terms of a form are too alike on the measured pixels if the least eigenvalue of the matrix of
+#: their correlations is below this.
+ALIKE = 1e-10
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,47 +64,65 @@ class Removed:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The form of this kind that fits best by least squares, and (ny, nx) its heights.
 
-    docs/theory/surfaces.md, "Removing the form". The code divides lengths by half the map's size.
+    Holes (nan) do not count; the form is nan there. docs/theory/surfaces.md, "Removing the form".
+    The code divides lengths by half the map's size.
 
-    Raises InputError if no sphere fits.
+    Raises InputError if no sphere fits, or if the heights do not determine the form.
     """
+    known = ~np.isnan(heights)
     rows, columns = heights.shape
     x = (np.arange(columns) - (columns - 1) / 2) * pixel[0]
     y = ((np.arange(rows) - (rows - 1) / 2) * pixel[1])[:, None]
     size = max(float(x[-1]), float(y[-1, 0]))
-    x, y = x / size, y / size
-    level = float(heights.mean())
-    wanted = (heights - level) / size
-    z, shape = np.zeros_like(wanted), np.zeros(4)
-    terms = [np.ones_like(wanted), x + 0 * y, y + 0 * x]
-    if kind == "paraboloid":
-        terms += [each + 0 * z for each in (x * x / 2, x * y, y * y / 2)]
-        a, b, c, kx, kxy, ky = _least_squares(terms, wanted).tolist()
-        bent = -np.linalg.eigvalsh([[kx, kxy], [kxy, ky]]) / size
-        for k, each in zip((a, b, c, kx, kxy, ky), terms, strict=True):
-            z += k * each
-        both = (float(bent[0]), float(bent[1]))
-        removed = Removed(kind, level + size * a, (b, c), float(bent.mean()), both)
-        return removed, level + size * z
-    for _ in range(1 if kind == "plane" else STEPS):
-        factors = terms if kind == "plane" else [*terms, (x * x + y * y + z * z) / 2]
+    x, y = (np.broadcast_to(each / size, heights.shape)[known] for each in (x, y))
+    level = float(heights[known].mean()) if known.any() else 0.0
+    wanted = (heights[known] - level) / size
+    terms = [np.ones_like(wanted), x, y]
+    if kind == "sphere":
+        (a, slopes, curvature), z = _sphere(terms, wanted)
+        removed = Removed(kind, level + size * a, slopes, curvature / size)
+    else:
+        terms += [x * x / 2, x * y, y * y / 2] if kind == "paraboloid" else []
+        found = _least_squares(terms, wanted)
+        z = np.asarray(sum(k * term for k, term in zip(found, terms, strict=True)))
+        a, b, c, kx, kxy, ky = np.append(found, np.zeros(6 - len(found))).tolist()
+        first, second = ((0.0 - np.linalg.eigvalsh([[kx, kxy], [kxy, ky]])) / size).tolist()
+        mean = (first + second) / 2
+        removed = Removed(kind, level + size * a, (b, c), mean, (first, second))
+    there = np.full(heights.shape, np.nan)
+    there[known] = level + size * z
+    return removed, there
+
+
+def _sphere(
+    terms: list[Array], wanted: Array
+) -> tuple[tuple[float, tuple[float, float], float], Array]:
+    """The best sphere: its height, slopes and curvature in the middle, and its heights.
+
+    Gauss-Newton steps for z = q + k z^2 / 2, with q = a + b x + c y + k (x^2 + y^2) / 2.
+    """
+    z, shape, (_, x, y) = np.zeros_like(wanted), np.zeros(4), terms
+    for _ in range(STEPS):
+        factors = [*terms, (x * x + y * y + z * z) / 2]
         step = _least_squares([each / (1 - shape[3] * z) for each in factors], wanted - z)
-        shape[: len(step)] += step
-        a, b, c, k = shape
+        shape += step
+        a, b, c, k = shape.tolist()
         q = a + b * x + c * y + k * (x * x + y * y) / 2
-        if (under := 1 - 2 * k * q).min() <= 0:
+        if min((under := 1 - 2 * k * q).min(), 1 - 2 * k * a) <= 0:
             break
         z = 2 * q / (1 + np.sqrt(under))
-        if kind == "plane" or np.abs(step).max() <= ENOUGH * np.abs(shape).max():
-            q0 = 2 * a / (1 + np.sqrt(1 - 2 * k * a))
-            slopes = (float(b / (1 - k * q0)), float(c / (1 - k * q0)))
-            curvature = float(0 - k / np.sqrt(b * b + c * c + 1 - 2 * a * k)) / size
-            removed = Removed(kind, level + size * float(q0), slopes, curvature)
-            return removed, level + size * z
+        if np.abs(step).max() <= ENOUGH * np.abs(shape).max():
+            q0 = 2 * a / (1 + math.sqrt(1 - 2 * k * a))
+            slopes = b / (1 - k * q0), c / (1 - k * q0)
+            return (q0, slopes, 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k)), z
     expected = 'one that covers the map, or "plane"'
     raise InputError("detrend", found="no sphere that fits", expected=expected)
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:
-    normal = [[float(np.vdot(one, other)) for other in factors] for one in factors]
+    normal = np.array([[float(np.vdot(one, other)) for other in factors] for one in factors])
+    scale = np.sqrt(np.diag(normal))
+    if not scale.all() or np.linalg.eigvalsh(normal / scale / scale[:, None])[0] < ALIKE:
+        expected = "more measured pixels, in rows and columns, or detrend=None"
+        raise InputError("detrend", found="too few heights for this form", expected=expected)
     return np.asarray(np.linalg.solve(normal, [float(np.vdot(each, misfit)) for each in factors]))

@@ -26,9 +26,10 @@ SAMPLE = 2**17
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
 
-    A similar neighbour differs by at most half of the outlier's distance from the median.
+    A similar neighbour differs by at most half of the outlier's distance from the median. Holes
+    (nan) are neither outlying nor similar.
     """
-    low, middle, high = np.quantile(heights, (0.25, 0.5, 0.75))
+    low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
     found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
     padded = np.pad(heights, 1, mode="reflect")
@@ -86,7 +87,8 @@ def filled(heights: Array) -> Array:
     No filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
-    count = np.count_nonzero(holes)
+    if (count := np.count_nonzero(holes)) == 0:
+        return heights
     number = np.full(heights.shape, KNOWN)
     number[holes] = np.arange(count)
     around = (np.argwhere(holes)[:, None] + 1 + SIDES).T  # in the padded maps
@@ -96,5 +98,6 @@ def filled(heights: Array) -> Array:
     between = coo_array((np.ones(len(row)), (row, neighbours[row, side])), shape=(count, count))
     own = diags_array((neighbours != OUTSIDE).sum(axis=1, dtype=np.float64))
     mended = heights.copy()
-    mended[holes] = spsolve((own - between).tocsc(), sums)
+    symmetric = (own - between).tocsc()
+    mended[holes] = spsolve(symmetric, sums, permc_spec="MMD_AT_PLUS_A")  # twice as fast
     return mended

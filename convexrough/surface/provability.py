@@ -44,13 +44,6 @@ class Provability(Table, Plottable):
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found
     approaches, loads : [length] approach and [force] load of each contact
-
-    >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
-    >>> def press(asperities):
-    ...     return cr.press(cr.Scene(1e4, asperities, cr.Material(1.0, 0.3)), load=10.0)
-    >>> curve = cr.surface.provability(summits, press, levels=[0.0, 0.1])
-    >>> curve.trusted.tolist()
-    [True, True]
     """
 
     _shown = ("trusted_from",)
@@ -86,12 +79,7 @@ class Provability(Table, Plottable):
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
 
 
-def provability(
-    summits: Summits,
-    press: Press,
-    *,
-    levels: Sequence[float] = LEVELS,
-) -> Provability:
+def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEVELS) -> Provability:
     """The contact of the remaining summits at each pruning, with its scope and model error.
 
     summits : summits found with a pruning of at most the smallest level, such as 0
@@ -102,8 +90,9 @@ def provability(
     >>> material = cr.Material(1.0, 0.3)
     >>> def press(asperities):
     ...     return cr.press(cr.Scene(1e4, asperities, material), load=10.0)
-    >>> cr.surface.provability(summits, press).trusted_from
-    0.0
+    >>> curve = cr.surface.provability(summits, press)
+    >>> print(curve.trusted_from, curve.trusted.all())
+    0.0 True
     """
     checks.instance("summits", summits, Summits)
     rows = []

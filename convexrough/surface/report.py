@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
@@ -110,7 +109,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
         },
     }
     if scanned.curve is not None:
-        summary["provability"] = rows_of(curve_columns(scanned.curve))
+        summary["provability"] = rows_of(scanned.curve.columns())
         summary["trusted_from"] = scanned.curve.trusted_from
     if scanned.contact is not None:
         pairs, values = crowded(scanned.contact)
@@ -130,17 +129,12 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
     """The columns of summits.csv, named with their units, which a scene file can read."""
-    unit, columns = summits.origin.unit, summits.columns(*Summits._along["asperity",])
+    unit, columns = summits.origin.unit, summits.columns()
     named = {
         f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
         for name, values in columns.items()
     }
     return named | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
-
-
-def curve_columns(curve: Provability) -> dict[str, NDArray[Any]]:
-    """The columns of `Provability`, with a row for each pruning."""
-    return curve.columns(*Provability._along["level",])
 
 
 def describe_surface(scanned: Scanned) -> list[str]:
@@ -217,7 +211,7 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
               "model error", "assumptions"]]  # fmt: skip
-    for row in rows_of(curve_columns(curve)):
+    for row in rows_of(curve.columns()):
         table.append([
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],

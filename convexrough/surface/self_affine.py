@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.scene.patterns import checked_seed
+from convexrough.scene.asperities import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
 #: Default length of the shortest wave, in pixels; at this length pixels resolve tips.
 RESOLVED = 8.0
-
-
-class Waves(NamedTuple):
-    """The waves of a periodic map, one for each pair of opposite wave vectors.
-
-    numbers   : (n, 2) numbers of wavelengths across the map, along x and y
-    vectors   : (n, 2) [1/length] wave vectors, 2 pi times the numbers over the map's size
-    variances : (n,) [length^2] variance of each wave
-    """
-
-    numbers: Array
-    vectors: Array
-    variances: Array
 
 
 def self_affine(
@@ -59,11 +44,11 @@ def self_affine(
     >>> surface.heights.shape
     (256, 256)
     """
-    waves = _waves(hurst, rms_slope, rolloff, pixels, pixel, cutoff)
-    phases = np.random.default_rng(checked_seed(seed)).uniform(0.0, 2 * np.pi, len(waves.variances))
+    numbers, variances = _waves(hurst, rms_slope, rolloff, pixels, pixel, cutoff)
+    phases = np.random.default_rng(checked_seed(seed)).uniform(0.0, 2 * np.pi, len(variances))
     spectrum = np.zeros((pixels, pixels), dtype=np.complex128)
-    column, row = waves.numbers.T
-    amplitudes = np.sqrt(2 * waves.variances)  # a cosine of amplitude a has the variance a^2 / 2
+    column, row = numbers.T
+    amplitudes = np.sqrt(2 * variances)  # a cosine of amplitude a has the variance a^2 / 2
     spectrum[row, column] = amplitudes * np.exp(1j * phases)
     heights = np.fft.ifft2(spectrum).real * pixels**2
     made = f"self-affine: hurst {hurst:g}, rms slope {rms_slope:g}, roll-off {rolloff:g}"
@@ -85,9 +70,10 @@ def self_affine_moments(
     >>> print(f"{exact.m2:.4f}")
     0.0050
     """
-    waves = _waves(hurst, rms_slope, rolloff, pixels, pixel, cutoff)
-    along = [float((waves.vectors**power @ [0.5, 0.5] * waves.variances).sum()) for power in (2, 4)]
-    return Moments(float(waves.variances.sum()), *along)
+    numbers, variances = _waves(hurst, rms_slope, rolloff, pixels, pixel, cutoff)
+    vectors = 2 * np.pi / (pixels * pixel) * numbers
+    along = [float((vectors**power @ [0.5, 0.5] * variances).sum()) for power in (2, 4)]
+    return Moments(float(variances.sum()), *along)
 
 
 def _waves(
@@ -97,8 +83,12 @@ def _waves(
     pixels: int,
     pixel: float,
     cutoff: float | None,
-) -> Waves:
-    """The waves of a map, in an order that does not depend on the number of pixels."""
+) -> tuple[Indices, Array]:
+    """The waves of a map, one for each pair of opposite wave vectors.
+
+    Their numbers of wavelengths across the map (n, 2), along x and y, and their variances (n,)
+    [length^2], in an order that does not depend on the number of pixels.
+    """
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)
     rolloff, pixel = checks.positive("rolloff", rolloff), checks.positive("pixel", pixel)
@@ -116,8 +106,7 @@ def _waves(
     numbers = np.column_stack((i[half], j[half]))
     if len(numbers) == 0:
         raise InputError("cutoff", found=f"{shortest:g}", expected=f"at most the size, {size:g}")
-    vectors = 2 * np.pi / size * numbers
-    lengths = np.hypot(*vectors.T)
+    lengths = np.hypot(*(2 * np.pi / size * numbers).T)
     spectrum = np.maximum(lengths, 2 * np.pi / rolloff) ** (-2 * (1 + hurst))
     slopes = float((lengths**2 * spectrum).sum())
-    return Waves(numbers, vectors, rms_slope**2 / slopes * spectrum)
+    return numbers, rms_slope**2 / slopes * spectrum

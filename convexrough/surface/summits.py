@@ -1,4 +1,4 @@
-"""Summits of a map as asperities, with data on the map and the fits."""
+"""Summits of a map as asperities: paraboloids fitted about maxima, with data on map and fits."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
+from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
-from convexrough.surface.hills import Hills
 from convexrough.surface.moments import Moments
-from convexrough.surface.tips import elliptic_load, fit_tips
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,12 +47,12 @@ class Origin(Record):
     level: float
     max_height: float
     moments: Moments
-    prune: float = 0.0
-    fit: int = 3
-    maxima: int = 0
-    pruned: int = 0
-    at_edge: int = 0
-    without_top: int = 0
+    prune: float
+    fit: int
+    maxima: int
+    pruned: int
+    at_edge: int
+    without_top: int
 
     @property
     def threshold(self) -> float:
@@ -141,7 +140,7 @@ class Summits(Table, Asperities, Plottable):
     @property
     def elliptic_loads(self) -> Array:
         """(n,) load of the elliptic tip over the load of its sphere at the same indentation."""
-        return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
+        return frozen(ellipse.load_ratio(self.largest_curvatures / self.smallest_curvatures))
 
     @property
     def statistics(self) -> Statistics:
@@ -152,6 +151,14 @@ class Summits(Table, Asperities, Plottable):
             mean_height=float(self.heights.mean()) - self.origin.level,
             height_std=float(self.heights.std()),
         )
+
+    @property
+    def unit(self) -> str:
+        """The unit of all lengths; "" if unknown."""
+        return self.origin.unit
+
+    def _attributes(self) -> dict[str, Any]:
+        return {"unit": self.unit}
 
     def pruned(self, prune: float) -> Summits:
         """The summits that are left at a stronger pruning.
@@ -172,51 +179,52 @@ class Summits(Table, Asperities, Plottable):
         return Summits(**chosen, origin=origin)
 
 
-def find_summits(heights: Array, found: Hills, origin: Origin, prune: float, fit: int) -> Summits:
-    """The result of `Surface.summits`, from the hills of a map that `origin` describes."""
-    prune = checks.between("prune", prune, 0.0, 1.0)
-    fit = _checked_fit(fit, origin.shape)
-    prominent = found.prominences >= prune * origin.max_height
-    reach = fit // 2
-    (rows, columns), pixels = origin.shape, found.pixels
-    inside = (pixels >= reach).all(axis=1) & (pixels < (rows - reach, columns - reach)).all(axis=1)
-    tried = pixels[prominent & inside]
-    tips = fit_tips(heights, tried, origin.pixel, fit)
-    origin = replace(
-        origin,
-        prune=prune,
-        fit=fit,
-        maxima=len(pixels),
-        pruned=int(np.count_nonzero(~prominent)),
-        at_edge=int(np.count_nonzero(prominent & ~inside)),
-        without_top=int(np.count_nonzero(~tips.whole)),
-    )
-    if not tips.whole.any():
-        found_text = (
-            f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} at "
-            f"the edge, {origin.without_top:,} without a fitted maximum"
-        )
-        raise InputError("summits", found=found_text, expected="at least one")
-    whole, (dx, dy) = tips.whole, origin.pixel
-    middle = np.column_stack((tried[:, 1] - (columns - 1) / 2, tried[:, 0] - (rows - 1) / 2))
-    k1, k2 = tips.curvatures[whole].T
-    return Summits(
-        positions=(middle * (dx, dy) + tips.offsets)[whole],
-        tip_radii=1 / np.sqrt(k1 * k2),
-        heights=tips.heights[whole],
-        prominences=found.prominences[prominent & inside][whole],
-        largest_curvatures=k1,
-        smallest_curvatures=k2,
-        deviations=tips.deviations[whole],
-        pixels=tried[whole],
-        origin=origin,
-    )
+class Tips(NamedTuple):
+    """Paraboloids fitted about maxima. Only entries with `whole` True have a meaning.
+
+    offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
+    heights    : (n,) [length] heights of the tops
+    curvatures : (n, 2) [1/length] principal curvatures, the larger first
+    deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
+    whole      : (n,) True if the paraboloid curves downwards in every direction and its top is
+        within the fitted pixels
+    """
+
+    offsets: Array
+    heights: Array
+    curvatures: Array
+    deviations: Array
+    whole: NDArray[np.bool_]
 
 
-def _checked_fit(fit: int, shape: tuple[int, int]) -> int:
-    if not isinstance(fit, (int, np.integer)) or isinstance(fit, bool) or fit < 3 or fit % 2 == 0:
-        raise InputError("fit", found=repr(fit), expected="an odd number of pixels, at least 3")
-    if min(shape) < fit:
-        found = f"{shape[1]} by {shape[0]} pixels"
-        raise InputError("map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}")
-    return int(fit)
+def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
+    """Least-squares paraboloids over `across` by `across` pixels about each maximum.
+
+    pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
+    pixel  : [length] sizes along x and y
+    """
+    reach = across // 2
+    down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
+    terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
+    around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
+    z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
+    determinant = huu * hvv - huv**2
+    whole = (determinant > 0) & (huu < 0)
+    solid = np.where(whole, determinant, 1.0)
+    top = np.stack(((huv * gv - hvv * gu) / solid, (huv * gu - huu * gv) / solid))
+    whole &= (np.abs(top) <= reach).all(axis=0)
+
+    dx, dy = pixel
+    hxx, hxy, hyy = huu / dx**2, huv / (dx * dy), hvv / dy**2
+    middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
+    product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
+    larger = np.where(whole, middle + half, 1.0)
+    curvatures = np.stack((larger, product / larger), axis=1)  # avoids cancellation
+    summits = z0 + (gu * top[0] + gv * top[1]) / 2
+    x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
+    sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
+    deviations = np.sqrt(np.mean((around - sphere) ** 2, axis=1))
+    return Tips(
+        np.stack((top[0] * dx, top[1] * dy), axis=1), summits, curvatures, deviations, whole
+    )

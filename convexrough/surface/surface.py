@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,7 @@ from convexrough.surface import holes
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
 from convexrough.surface.moments import Moments, moments_of
-from convexrough.surface.summits import Origin, Summits, find_summits
+from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
 
 #: Largest ratio of the sides of a pixel; longer ones do not resolve summits.
@@ -59,8 +60,8 @@ class Surface(Record, Plottable):
         default determined from `heights`
     source  : the file, or a description
 
-    Raises InputError for maps that are constant or have holes, and for pixels with one side more
-    than ten times the other.
+    Raises InputError for maps that are constant or have holes, for pixels with one side more than
+    ten times the other, and for unknown units.
 
     >>> surface = cr.surface.Surface(np.random.default_rng(1).normal(size=(64, 64)), pixel=0.5)
     >>> surface.size
@@ -91,20 +92,30 @@ class Surface(Record, Plottable):
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
-        for name, value in (("unit", unit), ("removed", removed), ("source", source)):
-            object.__setattr__(self, name, value)
+        named = known_unit("unit", unit)
+        object.__setattr__(self, "unit", named.name if named else "")
+        object.__setattr__(self, "removed", removed)
         object.__setattr__(self, "filled_pixels", filled_pixels)
-        there = holes.clipped(self.heights) if clipped is None else clipped
+        object.__setattr__(self, "source", source)
+        known = self.heights if filled_pixels is None else self.heights[~filled_pixels]
+        there = holes.clipped(known) if clipped is None else clipped
         object.__setattr__(self, "clipped", there)
-        alike = holes.repeated(self.heights) if repeated is None else repeated
+        alike = holes.repeated(known) if repeated is None else repeated
         object.__setattr__(self, "repeated", alike)
-        same = holes.copied(self.heights) if copied is None else copied
+        same = holes.copied(self._measured) if copied is None else copied
         object.__setattr__(self, "copied", same)
 
     @property
     def filled(self) -> int:
         """The number of pixels that were holes."""
         return 0 if self.filled_pixels is None else int(np.count_nonzero(self.filled_pixels))
+
+    @property
+    def _measured(self) -> Array:
+        """(ny, nx) the heights, nan where they were not measured."""
+        if self.filled_pixels is None:
+            return self.heights
+        return np.where(self.filled_pixels, np.nan, self.heights)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -150,25 +161,28 @@ class Surface(Record, Plottable):
         a sphere of radius 49.9828
         """
         down, across = (-(-length // FITTED) for length in self.heights.shape)
-        few = self.heights[::down, ::across]
+        few = self._measured[::down, ::across]
         pixel = (self.pixel[0] * across, self.pixel[1] * down)
-        left, found = float(np.var(few)), ""
+        known = few[~np.isnan(few)]
+        left, found = float(np.var(known)) if len(known) else 0.0, ""
         for kind in TRENDS if min(few.shape) >= 3 else ():
             try:
                 trend, there = fitted(few, pixel, kind)
-            except InputError:  # no sphere spans the map
+            except InputError:  # no sphere spans the map, or too few pixels are measured
                 continue
             if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
                 continue  # a sphere, which is simpler, was tried already
-            if (least := float(np.var(few - there))) < (1.0 - MOST) * left:
+            if (least := float(np.nanvar(few - there))) < (1.0 - MOST) * left:
                 name = f"a {trend!r}".partition(" in the")[0]
-                part = f"{100 * (1.0 - least / np.var(few)):.3g} %"
+                part = f"{100 * (1.0 - least / np.var(known)):.3g} %"
                 found = f"{name}, explains {part} of the variance of the heights: "
                 found += f'detrend="{kind}", or --detrend {kind}, removes it'
             left = least
         return (*([found] if found else []), *self._wrong_pixels())
 
     def _wrong_pixels(self) -> Iterator[str]:
+        if (part := self.filled / self.heights.size) > 0.5:
+            yield f"{part:.0%} of the pixels were holes: most of this map is not measured"
         if self.clipped:
             yield (
                 f"the highest {self.clipped:,} pixels have exactly the same height: the map seems "
@@ -190,7 +204,7 @@ class Surface(Record, Plottable):
                 f"rms slope {self.rms_slope:.3g}: surfaces {rare} are rare; check the units of the "
                 "heights and of the pixel"
             )
-        if len(places := holes.spikes(self.heights)):
+        if len(places := holes.spikes(self._measured)):
             row, column = places[0]
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "
@@ -204,7 +218,9 @@ class Surface(Record, Plottable):
     def detrend(self, kind: Trend = "plane") -> Surface:
         """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes it.
 
-        Raises InputError if nothing is left.
+        The form is fitted to measured pixels. Pixels that were holes are filled again.
+
+        Raises InputError if nothing is left, or if the measured pixels do not determine the form.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
@@ -213,8 +229,8 @@ class Surface(Record, Plottable):
         if kind not in TRENDS:
             expected = '"plane", "sphere" or "paraboloid"'
             raise InputError("detrend", found=repr(kind), expected=expected)
-        trend, there = fitted(self.heights, self.pixel, kind)
-        left = self.heights - there
+        trend, there = fitted(self._measured, self.pixel, kind)
+        left = holes.filled(self.heights - there)
         if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):
             raise InputError("heights", found=f"nothing but a {kind}", expected="a rough surface")
         return replace(self, heights=left, removed=(*self.removed, trend))
@@ -255,9 +271,25 @@ class Surface(Record, Plottable):
         >>> len(summits), summits.origin.pruned
         (129, 191)
         """
+        prune = checks.between("prune", prune, 0.0, 1.0)
+        checks.whole("fit", fit, 3)
+        rows, columns = shape = self.heights.shape[0], self.heights.shape[1]
+        if fit % 2 == 0:
+            raise InputError("fit", found=fit, expected="an odd number of pixels, at least 3")
+        if min(shape) < fit:
+            found = f"{columns} by {rows} pixels"
+            raise InputError(
+                "map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}"
+            )
+        pixels, reach = self.hills.pixels, fit // 2
+        prominent = self.hills.prominences >= prune * self.max_height
+        inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
+        tried = pixels[prominent & inside]
+        tips = fit_tips(self.heights, tried, self.pixel, fit)
+        whole = tips.whole
         origin = Origin(
             source=self.source,
-            shape=(self.heights.shape[0], self.heights.shape[1]),
+            shape=shape,
             pixel=self.pixel,
             unit=self.unit,
             removed=self.removed,
@@ -265,19 +297,38 @@ class Surface(Record, Plottable):
             level=float(self.heights.mean()),
             max_height=self.max_height,
             moments=self.moments,
+            prune=prune,
+            fit=int(fit),
+            maxima=len(pixels),
+            pruned=int(np.count_nonzero(~prominent)),
+            at_edge=int(np.count_nonzero(prominent & ~inside)),
+            without_top=int(np.count_nonzero(~whole)),
         )
-        try:
-            return find_summits(self.heights, self.hills, origin, prune, fit)
-        except InputError as error:
-            if error.what != "summits" or not self.warnings:
-                raise
-            expected = f"{error.expected}; {self.warnings[0]}"
-            raise InputError("summits", found=error.found, expected=expected) from error
+        if not whole.any():
+            none = (
+                f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} "
+                f"at the edge, {origin.without_top:,} without a fitted maximum"
+            )
+            expected = "; ".join(("at least one", *self.warnings[:1]))
+            raise InputError("summits", found=none, expected=expected)
+        middle = (tried - np.array([rows - 1, columns - 1]) / 2)[:, ::-1]
+        k1, k2 = tips.curvatures[whole].T
+        return Summits(
+            positions=(middle * self.pixel + tips.offsets)[whole],
+            tip_radii=1 / np.sqrt(k1 * k2),
+            heights=tips.heights[whole],
+            prominences=self.hills.prominences[prominent & inside][whole],
+            largest_curvatures=k1,
+            smallest_curvatures=k2,
+            deviations=tips.deviations[whole],
+            pixels=tried[whole],
+            origin=origin,
+        )
 
 
-def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
+def checked_pixel(pixel: ArrayLike) -> tuple[float, float]:
     """The sizes (dx, dy) of a pixel. Raises InputError if they are not valid."""
-    both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
+    both: Any = pixel if np.ndim(pixel) else (pixel, pixel)
     if len(both) != 2:
         raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")
     dx, dy = (checks.positive("pixel", each) for each in both)

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from convexrough.scene.patterns import CUT_DEVIATIONS
+from convexrough.scene.asperities import CUT_DEVIATIONS
 
 #: A key of a scene file, "table.key" or "table.table.key", and its values.
 Axis = tuple[str, tuple[Any, ...]]

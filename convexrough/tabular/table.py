@@ -46,20 +46,8 @@ COLUMNS = {
 }
 
 #: Names of columns with row numbers.
-INDEX = (
-    "index",
-    "id",
-    "no",
-    "nr",
-    "#",
-    "i",
-    "number",
-    "node",
-    "label",
-    "node label",
-    "asperity",
-    "",
-)
+INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
+         "")  # fmt: skip
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
@@ -447,7 +435,9 @@ def _numbers(
         place = f"{source.rows[i]}, column {name}"
         try:
             if number is None:
-                raise InputError(place, found=_cut(repr(cell)), expected="a finite number")
+                comma = source.number(str(cell).replace(",", ".", 1)) is not None
+                expected = "a decimal point, not a comma" if comma else "a finite number"
+                raise InputError(place, found=_cut(repr(cell)), expected=expected)
             numbers[i] = check(place, number)
         except InputError as error:
             mistakes.append(_shown(str(error), source.lines[i]))

@@ -54,7 +54,9 @@ _GROUPED = re.compile(
 )
 _PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
-_WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
+_WITH_UNIT = re.compile(
+    r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
+)
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
 #: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.
 _RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
@@ -153,11 +155,12 @@ def bare(name: str) -> str:
 def unit(name: str) -> str:
     """The unit in the name of a column, in brackets or after a slash; else ""."""
     found = _with_unit(name)
-    return (found["unit"] or found["per"] or "").strip() if found else ""
+    return (found["unit"] or found["per"] or found["tight"] or "").strip() if found else ""
 
 
 def _with_unit(name: str) -> re.Match[str] | None:
-    return _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
+    found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
+    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as in p/p0
 
 
 def read_text_table(

@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError, TableError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.surface.grid import steps
+from convexrough.surface.reading import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare, unit
 from convexrough.verdict.placing import Placing, unused
@@ -233,7 +233,7 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
             raise TableError(str(path), few(mistakes))
         return areas
     try:
-        (i, dx), (j, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
+        (i, dx), (j, dy) = (steps(name, columns[name]) for name in ("x", "y"))
         _check_one_size(i, j, count)
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"

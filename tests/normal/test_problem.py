@@ -29,8 +29,7 @@ from convexrough.normal.load_control import all_that_could_touch, highest_approa
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
-from convexrough.scene.asperities import largest_tip_radius
-from convexrough.scene.patterns import CUT_DEVIATIONS
+from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
 from convexrough.scene.scene import reach
 from convexrough.solvers import Newton
 from convexrough.solvers.newton import Pressing

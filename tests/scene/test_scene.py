@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, paper
 
 import convexrough as cr
-from convexrough.scene.asperities import largest_tip_radius
-from convexrough.scene.patterns import CUT_DEVIATIONS
+from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
 from convexrough.sphere import mindlin
 from convexrough.vector_shear.problem import FrictionProblem
 

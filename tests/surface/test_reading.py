@@ -35,6 +35,7 @@ def test_arrays(tmp_path: Path) -> None:
     assert_array_equal(surface.heights, HEIGHTS)
     assert (surface.pixel, surface.unit, surface.filled) == ((2.0, 2.0), "µm", 0)
     assert surface.source == str(alone)
+    assert raw(alone, HEIGHTS, pixel=np.array([1.0, 2.0])).pixel == (1.0, 2.0)
     sides = {"heights": HEIGHTS, "pixel": [2.0, 3.0]}
     surface = raw(several, sides | {"unit": "mm", "height_unit": "µm"})
     assert (surface.pixel, surface.unit) == ((2.0, 3.0), "mm")
@@ -53,9 +54,18 @@ def test_arrays(tmp_path: Path) -> None:
         surface = raw(path, made)
         assert_allclose(surface.heights, HEIGHTS)
         assert_allclose(surface.pixel, (2.0, 3.0))
-    for name in ("scale", "z_unit", "dx"):
+    assert_array_equal(raw(several, sides | {"title": "a", "log": np.zeros(3)}).heights, HEIGHTS)
+    more = {"scale": 0.5, "z_unit": "nm", "step": [1, 1, 1], "inverted": True, "sign": -1.0}
+    more |= {"ok": HEIGHTS > 0, "state": (HEIGHTS > 0).astype(int), "z": 2 * HEIGHTS, "t": X[0]}
+    for name, entry in more.items():
         with pytest.raises(cr.InputError, match=f"arrays: found {name}, expected pixel, unit, hei"):
-            raw(several, sides | {name: 0.5})
+            raw(several, sides | {name: entry})
+    with pytest.raises(cr.InputError, match="arrays: found only x, expected x and y, or neither"):
+        raw(several, sides | {"x": X[0]})
+    with pytest.raises(cr.InputError, match="found 7 by 9, expected 7 by 9, y as well"):
+        raw(several, sides | {"x": X, "y": Y[:, 0]})
+    with pytest.raises(cr.InputError, match="expected 1 by 9, as y and x are long"):
+        raw(several, sides | {"x": X[0], "y": [0.0]})
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
         raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
 
@@ -75,7 +85,9 @@ def test_what_gwyddion_writes(tmp_path: Path) -> None:
     assert_allclose(surface.heights, 0.1 * HEIGHTS, rtol=1e-14)
 
 
-@pytest.mark.parametrize("header", ["x [mm], y [mm], z [µm]\n", "x,y,height\n", ""])
+@pytest.mark.parametrize(
+    "header", ["x [mm], y [mm], z [µm]\n", "X/mm,Y/mm,Z/µm\n", "x,y,height\n", ""]
+)
 def test_lists(tmp_path: Path, header: str) -> None:
     rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
     rows = np.random.default_rng(0).permutation(rows)
@@ -84,6 +96,16 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
+
+
+def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
+    heights = np.random.default_rng(4).normal(size=(40, 40)) * 1e-3
+    rows = [f"{0.65e-3 * i:.4f} {0.65e-3 * j:.4f} {heights[j, i]!r}" for j, i in np.ndindex(40, 40)]
+    surface = raw(tmp_path / "a.xyz", "\n".join(rows).replace("np.float64(", "").replace(")", ""))
+    assert_array_equal(surface.heights, heights)
+    assert_allclose(surface.pixel, 0.65e-3, rtol=5e-3)
+    spaced = raw(tmp_path / "a.txt", "# a\n\n" + matrix(ending="\n\n") + "# end\n\n", pixel=1.0)
+    assert_array_equal(spaced.heights, HEIGHTS)
 
 
 @pytest.mark.parametrize("form", ["vectors", "matrices", "matrices along x"])
@@ -171,10 +193,18 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         ("# Pixel = 0.5\n" + matrix(), ONE, "comments: found # Pixel = 0.5"),
         ("# Value units: V\n" + matrix(), ONE | {"unit": "m"}, "height_unit: found 'V'"),
         (matrix().replace("\n", "\nx", 1), ONE, "row 2, column 1: found 'x"),
+        (2 * ("# Width: 9 m\n# Height: 7 m\n" + matrix()), {}, "rows: found lines without numbers"),
+        (matrix() + "\n" + matrix(), ONE, "without numbers between rows 7 and 9, expected one map"),
+        (
+            '"-0,1","0,2","0,1","0,4"\n' * 4,
+            ONE,
+            "row 1: found -0,1, expected decimal points, not commas",
+        ),
         (matrix() + "1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
         ("a b c\n" + matrix(), ONE, "columns: found a, b, c, expected a column 'x'"),
         ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
         ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
+        ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
         ("", {}, "empty"),
@@ -232,9 +262,9 @@ def test_other_comments_are_ignored(tmp_path: Path) -> None:
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    said = r"a\.gwy: needs SurfaceTopography: pip install SurfaceTopography"
+    said = r"a\.png: found \.png, expected a map in \.npy, .* needs SurfaceTopography: pip"
     with pytest.raises(cr.FileError, match=said):
-        raw(tmp_path / "a.gwy", b"GWYP")
+        raw(tmp_path / "a.png", b"PNG")
 
 
 @pytest.mark.skipif(

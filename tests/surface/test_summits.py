@@ -30,6 +30,7 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert np.abs(summits.heights - heights).max() < 0.05 * MAP.rms_height
     frame = summits.to_dataframe()
     np.testing.assert_array_equal(frame["tip_radius"], summits.tip_radii)
+    assert frame.attrs == {"unit": ""}
     again = pickle.loads(pickle.dumps(summits))
     np.testing.assert_array_equal(again.positions, summits.positions)
     assert again.origin.moments == origin.moments

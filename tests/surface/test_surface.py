@@ -70,6 +70,8 @@ def test_another_unit_is_the_same_surface() -> None:
 def test_no_map(heights: object, message: str) -> None:
     with pytest.raises(cr.InputError, match=message):
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
+    with pytest.raises(cr.InputError, match="unit: found 'parsec', expected a unit of length"):
+        cr.surface.Surface(NOISE, 1.0, "parsec")
 
 
 def test_a_paraboloid_of_a_turned_cylinder() -> None:
@@ -106,21 +108,29 @@ def test_a_trend_that_explains_most_is_named() -> None:
 def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
     """Oblong pixels; load and area, and the half axes on an ellipsoid."""
     flat = cr.surface.Surface(1e-9 * RNG.standard_normal((201, 161)), (1.0, 1.2))
-    single = cr.Asperities([[0.0, 0.0]], 1e9)
-    contact = cr.press(cr.Scene(1e4, single, cr.Material(2.0, 0.3)), approach=0.1)
+
+    def scene(surface: cr.surface.Surface, radius: float | tuple[float, float] = 1e4) -> cr.Scene:
+        origin = surface.summits().origin
+        single = cr.surface.Summits([[0.0, 0.0]], 1e9, 0.0, origin=origin)
+        return cr.Scene(radius, single, cr.Material(2.0, 0.3))
+
+    contact = cr.press(scene(flat), approach=0.1)
     whole = cr.surface.press_whole(flat, contact)
     assert_allclose(whole.load, contact.load, rtol=5e-4)
     assert_allclose(whole.area, np.pi * 1e3, rtol=0.02)
     assert (whole.pieces, whole.resolution < 2e-3) == (1, True)
     assert_allclose(whole.loads.sum(), whole.load, rtol=1e-12)
     assert "of the asperities" in repr(whole)
-    ellipsoid = cr.press(cr.Scene((1e4, 1.2e4), single, cr.Material(2.0, 0.3)), approach=0.1)
+    ellipsoid = cr.press(scene(flat, (1e4, 1.2e4)), approach=0.1)
     across = np.argwhere(cr.surface.press_whole(flat, ellipsoid).pressures > 0)
     height, width = np.ptp(across, axis=0) + 1
     assert_allclose(1.2 * height / width, 1.2 ** (2 / 3), rtol=0.04)  # Johnson 1985, eq. 4.28
-    for approach, said in ((3.0, "contact at the edge of the map"), (1e-12, "no pixel that")):
-        deep = cr.press(contact.scene, approach=approach)
+    for approach, said in (
+        (3.0, "contact at the edge of the map.*without --whole"),
+        (1e-12, "no pixel that"),
+    ):
         low = cr.surface.Surface(flat.heights - 1e-6, (1.0, 1.2))
+        deep = cr.press(scene(low), approach=approach)
         with pytest.raises(cr.InputError, match=said):
             cr.surface.press_whole(low, deep)
 
@@ -177,3 +187,26 @@ def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
     levels = np.round(heights * 20)  # as of a byte for each pixel
     for whole in (heights, levels):
         assert cr.surface.Surface(whole, 1.0).clipped == 0
+
+
+def test_a_form_is_fitted_to_measured_pixels() -> None:
+    """A ball measured near its top, a tilt of which columns are missing, and almost no map."""
+    y, x = np.mgrid[-40:41, -40:41] * 2.0
+    ball = np.sqrt(500.0**2 - x**2 - y**2)
+    for form, missing, kind in ((ball, np.hypot(x, y) > 60, "sphere"), (0.05 * x, x > 26, "plane")):
+        heights = np.where(missing, np.nan, form + np.resize(NOISE, x.shape))
+        made = cr.surface.Surface(filled(heights), 2.0, filled_pixels=missing)
+        left = made.detrend(kind)  # type: ignore[arg-type]
+        (removed,) = left.removed
+        if kind == "sphere":
+            assert_allclose(removed.radius, 500.0, rtol=1e-2)
+            assert any("57% of the pixels were holes" in each for each in made.warnings)
+        else:
+            assert_allclose(removed.slopes, (0.05, 0.0), atol=1e-4)
+        assert f'detrend="{kind}"' in made.warnings[0]
+        assert left.max_height < 0.02  # also on filled pixels
+        assert not any("spikes" in each for each in left.warnings)
+    one = np.where(x == 0, ball, np.nan)
+    column = cr.surface.Surface(filled(one), 2.0, filled_pixels=np.isnan(one))
+    with pytest.raises(cr.InputError, match="detrend: found too few heights for this form"):
+        column.detrend("plane")

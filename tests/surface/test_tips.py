@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from convexrough.surface.tips import elliptic_load, fit_tips
+from convexrough.sphere.ellipse import load_ratio
+from convexrough.surface.summits import fit_tips
 
 PIXEL = (0.5, 0.3)
 
@@ -52,4 +53,4 @@ def test_the_elliptic_contact_by_quadrature(axes: float) -> None:
     k1, k2 = 2 * k1, 2 * k2
     load = 2 / 3 * np.pi * b
     sphere = 4 / 3 * np.sqrt(1 / np.sqrt(k1 * k2)) * indentation**1.5
-    assert_allclose(elliptic_load(np.array([k1 / k2])), load / sphere, rtol=1e-8)
+    assert_allclose(load_ratio(k1 / k2), load / sphere, rtol=1e-8)
