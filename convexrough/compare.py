@@ -22,7 +22,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from convexrough import solvers
+from convexrough import checks, solvers
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
@@ -100,7 +100,11 @@ class Comparison(Table, Plottable):
         return any(contact.certificate.holds for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
-        """Each `disagreement` above `within`, by the name of the solver."""
+        """Each `disagreement` above `within`, by the name of the solver.
+
+        Raises InputError unless `within` is positive.
+        """
+        within = checks.positive("within", within)
         return {it.solver: it.disagreement for it in self.entries if it.disagreement > within}
 
     def _rows(self) -> Iterator[tuple[str, str]]:

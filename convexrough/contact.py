@@ -56,8 +56,9 @@ class Contact(Cached, Table, Plottable):
     certificate   : what is proved about the loads, independent of the solver
     model_error   : estimate of the relative error of displacements at loaded asperities that arises
         because point forces replace pressures: the largest of `surface.model_errors`
-    crowding      : largest (a_i + a_j) / r_ij, with contact radii a and distances r; if it exceeds
-        1, contact discs overlap and the model fails
+    crowding      : largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii
+        a and distances r; 0 if fewer than two touch. If it exceeds 1, contact discs overlap and the
+        model fails. `covered` counts open summits under a disc
     candidates    : number of asperities that may touch; the solver leaves out the others
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`

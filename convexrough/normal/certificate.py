@@ -64,8 +64,9 @@ class Certificate(Table):
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
         of these asperities touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
-        the largest (a_i + a_j) / r_ij, with contact radii a and distances r. This bound is infinite
-        if there is no other solution, and 0 if nothing is known
+        here the largest (a_i + a_j) / r_ij over pairs of asperities that can touch, with contact
+        radii a (0 where open) and distances r. This bound is infinite if there is no other
+        solution, and 0 if nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
     in_the_way : (m,) indices of asperities that prevent a proof; empty where there is one
