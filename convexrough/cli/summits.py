@@ -73,7 +73,7 @@ def _as_in_scene(
 ) -> tuple[Surface, Callable[[Asperities], Contact]]:
     from convexrough.run.scene_file import read_scene, read_study
 
-    unit = read_study(scene).units.names.length
+    unit = read_study(scene)[0].units.names.length
     if unit and not surface.unit:
         raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
     if surface.unit and not unit:
@@ -182,7 +182,7 @@ def _other_table(scene: Path, table: Path) -> str:
     """The table of asperities that a scene file names, if it is not `table`; else ""."""
     from convexrough.run.scene_file import read_study
 
-    layout = read_study(scene).asperities
+    layout = read_study(scene)[0].asperities
     if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
         return ""
     return layout.path

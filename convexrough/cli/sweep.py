@@ -86,7 +86,7 @@ def sweep(
     if resume and force:
         raise click.UsageError("--resume and --force exclude each other.")
     from convexrough.errors import WorkerError
-    from convexrough.sweeps.file import read_sweep
+    from convexrough.sweeps.plan import read_sweep
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
     from convexrough.sweeps.sweep import run
 
@@ -96,15 +96,15 @@ def sweep(
         plan = read_sweep(sweep)
     try:
         with progress(str(sweep)), _executor(workers, scheduler) as executor:
-            done = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
+            table, did = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
     except KeyboardInterrupt:
         say_aside("interrupted", progress_kept(folder, plan))
         return INTERRUPTED
     except WorkerError as error:
         say_aside("error", str(error), progress_kept(folder, plan))
         return SOLVER_FAILED
-    said = summarise(done.table, done)
-    echo(said, describe(said), as_json, (*failures(done.table), *cautions(done.table)))
+    said = summarise(table, **did)
+    echo(said, describe(said), as_json, (*failures(table), *cautions(table)))
     return _status(said)
 
 

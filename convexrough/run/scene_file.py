@@ -9,8 +9,9 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from convexrough.contact import Contact, solve
 from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
@@ -18,13 +19,13 @@ from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
-from convexrough.run.tables import read_summits, read_text
+from convexrough.run.tables import read_summits
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.base import checked
-from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
+from convexrough.tabular.arrays import reading
 from convexrough.tabular.table import Reading, few, named_columns
 from convexrough.tabular.toml_slips import explained
 
@@ -125,8 +126,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     if not isinstance(path, (str, os.PathLike)):
         raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
     path = Path(path)
-    text = read_text(path, MOST_BYTES)
-    study = _study(path, text)
+    study, text = read_study(path)
     if asperities is not None:
         from convexrough.surface.summits import Summits  # only for maps
 
@@ -149,18 +149,15 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     )
 
 
-def read_study(path: Path) -> Study:
-    """The checked tables of a scene file. Raises FileError and SceneFileError."""
-    return _study(path, read_text(path, MOST_BYTES))
-
-
-def _study(path: Path, text: str) -> Study:
+def read_study(path: Path) -> tuple[Study, str]:
+    """The checked tables of a scene file, and its text. Raises FileError and SceneFileError."""
     from convexrough.run.study import validate
 
+    text = read_text(path)
     study, mistakes = validate(parsed(path, text))
     if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
-    return study
+    return study, text
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
@@ -181,6 +178,15 @@ def digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, with or without a byte-order mark. Raises FileError."""
+    with reading(path), path.open("rb") as file:
+        contents = file.read(MOST_BYTES + 1)
+        if len(contents) > MOST_BYTES:
+            raise FileError(f"{path}: more than {MOST_BYTES / 2**20:g} MiB")
+        return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
+
+
 def parsed(path: Path, text: str) -> dict[str, Any]:
     """The tables of a file with this text. Raises FileError if it is not TOML, or empty."""
     if key := _DOTTED.search(text):
@@ -197,43 +203,36 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
 
 def has_sweep(path: Path) -> bool:
     """True if a scene file has a table [sweep]."""
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path)
     return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in parsed(path, text)
 
 
-class Layouts(NamedTuple):
-    """Functions that make asperities.
-
-    summits : reads asperities from a file;  regular : makes a pattern, without random parts
-    """
-
-    summits: Callable[..., Asperities]
-    regular: Callable[[str, float, float | tuple[float, ...], float], Asperities]
-
-
-def _regular(
+def regular(
     pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
 ) -> Asperities:
+    """Asperities in a pattern, without random parts."""
     make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
 
 
-READ = Layouts(read_summits, _regular)
-
-
 def task_of(
-    path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
+    path: Path,
+    study: Study,
+    *,
+    asperities: Asperities | None = None,
+    summits: Callable[..., Asperities] = read_summits,
+    lattice: Callable[..., Asperities] = regular,
 ) -> Task:
     """The scene and the stages described by tables that have been checked.
 
     path    : the scene file, for messages; paths in the tables are relative to its folder
-    layouts : functions that make the asperities
     asperities : asperities that replace those of the tables
+    summits, lattice : functions like `read_summits` and `regular`, which make the asperities
 
     Raises InputError for mistakes that the tables alone do not show.
     """
     with _blamed_on(path, "material"):
-        stuff = _material(study)
+        stuff = study.material.made()
 
     def press_on(asperities: Asperities) -> Scene:
         return Scene(
@@ -256,9 +255,9 @@ def task_of(
                 convert=study.units.convert,
             )
             place = path.parent / layout.path
-            scene = press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how))
+            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=how))
         else:
-            scene, highest = _lattice(layout, study, press_on, layouts)
+            scene, highest = _lattice(layout, study, press_on, lattice)
     return Task(
         scene=scene,
         approach=study.normal.approach,
@@ -270,22 +269,11 @@ def task_of(
     )
 
 
-def _material(study: Study) -> Material:
-    from convexrough.run.study import BodiesTable
-
-    def of(body: Any) -> Material:
-        return Material.from_youngs(body.youngs_modulus, body.poisson_ratio, body.hardness)
-
-    table = study.material
-    if isinstance(table, BodiesTable):
-        return Material.pair(of(table.sphere), of(table.base))
-    if table.youngs_modulus is not None:
-        return of(table)
-    return Material(table.contact_modulus, table.poisson_ratio, table.hardness)
-
-
 def _lattice(
-    layout: LatticeTable, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
+    layout: LatticeTable,
+    study: Study,
+    press_on: Callable[[Asperities], Scene],
+    lattice: Callable[..., Asperities],
 ) -> tuple[Scene, float | None]:
     """The scene with asperities up to the distance `within`, or with all that could touch.
 
@@ -296,7 +284,7 @@ def _lattice(
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:
-        asperities = layouts.regular(layout.pattern, layout.spacing, tip_radius, within)
+        asperities = lattice(layout.pattern, layout.spacing, tip_radius, within)
         rough = asperities.roughened(
             height_std=layout.height_std, tip_radius_cv=layout.tip_radius_cv, seed=layout.seed
         )

@@ -1,8 +1,7 @@
-"""Reading of text files, and of the file of asperities that a scene file names."""
+"""Reading of the file of asperities that a scene file names."""
 
 from __future__ import annotations
 
-from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough.arrays import Array
-from convexrough.errors import FileError, InputError, blamed_on
+from convexrough.errors import InputError, blamed_on
 from convexrough.scene.asperities import Asperities
-from convexrough.tabular.arrays import reading
 from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
 from convexrough.tabular.text import bare
 from convexrough.tabular.units import parsed
@@ -22,15 +20,6 @@ RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "
 
 #: Relative rounding error that is allowed for means and sums in the last row of a table.
 ROUNDED = 1e-3
-
-
-def read_text(path: Path, most: int) -> str:
-    """The text of a UTF-8 file of at most `most` bytes, with or without a byte-order mark."""
-    with reading(path), path.open("rb") as file:
-        contents = file.read(most + 1)
-        if len(contents) > most:
-            raise FileError(f"{path}: more than {most / 2**20:g} MiB")
-        return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
 
 
 def unknown(column: str) -> bool:
@@ -45,12 +34,7 @@ def read_summits(
 
     tip_radius : [length] one number or (n,), if the file has no column tip_radius; else None
     """
-    table = read_table(
-        path,
-        required=("x", "y"),
-        optional=("height", "tip_radius"),
-        how=how,
-    )
+    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
     columns = table.columns
     unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
     if "height" not in columns and unread:
@@ -84,11 +68,8 @@ def read_summits(
 
 def _summary_in_last_row(columns: list[Array]) -> str:
     """ "means" or "sums" if the last row has those of the rows above in all columns; else ""."""
-    if (
-        len(columns[0]) < 4
-        or any(np.ptp(each[:-1]) == 0 for each in columns[2:])
-        or not columns[2:]
-    ):
+    own = columns[2:]
+    if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
         return ""  # the middle of a regular array is its mean
     for what, of in (("means", np.mean), ("sums", np.sum)):
         if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):

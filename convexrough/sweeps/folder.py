@@ -22,6 +22,11 @@ from convexrough.sweeps.batch import Columns, different
 MANIFEST, PARTS = "manifest.json", "parts"
 
 
+def part_from(manifest: Mapping[str, Any], first: int) -> range:
+    """The scenes of the part of a sweep's table that begins with scene `first`."""
+    return range(first, min(first + manifest["batch"], manifest["scenes"]))
+
+
 @dataclass(frozen=True)
 class Folder:
     """The folder of a sweep on disk."""
@@ -29,25 +34,23 @@ class Folder:
     path: Path
     manifest: Mapping[str, Any]
 
-    def scenes(self, first: int) -> range:
-        """The scenes of the part that begins with scene `first`."""
-        return range(first, min(first + self.manifest["batch"], self.manifest["scenes"]))
-
     def parts(self) -> list[range]:
         """The range of scenes of each part in the folder, in order; other files are ignored."""
         with file_errors(self.path / PARTS, "be read"):
             names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
-        return [self.scenes(int(name)) for name in sorted(names, key=int) if name.isdecimal()]
+        firsts = sorted(int(name) for name in names if name.isdecimal())
+        return [part_from(self.manifest, first) for first in firsts]
 
-    def file(self, part: range) -> Path:
-        return self.path / PARTS / f"{part.start:012d}.parquet"
+    def file(self, first: int) -> Path:
+        """The file of the part that begins with scene `first`."""
+        return self.path / PARTS / f"{first:012d}.parquet"
 
     def write(self, columns: Columns) -> None:
         """Write the columns of a part. An interruption leaves no incomplete part."""
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
-        write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
+        write_text(self.file(int(columns["scene"][0])), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, by default all.
@@ -55,7 +58,7 @@ class Folder:
         Raises FileError if the part is damaged, or has other scenes than its name says.
         """
         pyarrow, parquet = arrow()
-        path = self.file(part)
+        path = self.file(part.start)
         wanted = list(self.manifest["columns"] if names is None else names)
         try:
             # Threads of pyarrow could outlive the interpreter and abort the process.
@@ -81,33 +84,33 @@ class Folder:
 
         Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
         """
-        known, damaged = {part.start for part in self.parts()}, 0
+        known = {part.start for part in self.parts()}
         there = [part for part in wanted if part.start in known]
+        count = sum(map(len, wanted))
         if there and not resume:
             raise FileError(
-                f"{self.path}: holds {sum(map(len, there)):,} of these {sum(map(len, wanted)):,} "
-                "scenes already; --resume computes the rest, --force overwrites them, --out takes "
-                "another folder"
+                f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
+                "--resume computes the rest, --force overwrites them, --out takes another folder"
             )
-        for part in there:
-            try:
-                self.read(part)
-            except FileError:
-                self.file(part).unlink()
-                known.remove(part.start)
-                damaged += 1
-        todo = [part for part in wanted if part.start not in known]
-        mine = {self.file(part).name for part in todo}
-        left = [
-            path
-            for path in (self.path / PARTS).glob(".*.unfinished")
-            if path.name[1:].rsplit(".", 2)[0] in mine
-        ]
-        for path in left:
-            path.unlink(missing_ok=True)
-        said = f"found {sum(map(len, wanted)) - sum(map(len, todo)):,} scenes of an earlier run"
+        todo, damaged = [], 0
+        for part in wanted:
+            if part.start in known:
+                try:
+                    self.read(part)
+                    continue
+                except FileError:
+                    self.file(part.start).unlink()
+                    damaged += 1
+            todo.append(part)
+        mine = {self.file(part.start).name for part in todo}
+        left = 0
+        for path in (self.path / PARTS).glob(".*.unfinished"):
+            if path.name[1:].rsplit(".", 2)[0] in mine:
+                path.unlink(missing_ok=True)
+                left += 1
+        said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
         said += f", {damaged:,} damaged parts removed" if damaged else ""
-        return todo, said + (f", {len(left):,} unfinished files removed" if left else "")
+        return todo, said + (f", {left:,} unfinished files removed" if left else "")
 
 
 def open_folder(path: Path) -> Folder:

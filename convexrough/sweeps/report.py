@@ -16,7 +16,6 @@ from convexrough.run.summary import headed
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
-from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
@@ -25,18 +24,17 @@ from convexrough.tabular.columns import aligned, labelled
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
-def summarise(table: SweepTable, done: Done | None = None) -> Summary:
-    """The contents of the output of `--json`: the state of the table, and what this call did."""
-    said: Summary = {
+def summarise(table: SweepTable, **did: Any) -> Summary:
+    """The contents of the output of `--json`: the state of the table, and what `run` did."""
+    said = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
         "scenes": table.scenes,
         "rows": len(table),
         **table.counts(),
         "not_measured": table.manifest["not_measured"],
+        **did,
     }
-    if done is not None:
-        said |= {"found": done.found, "computed": done.computed, "seconds": done.seconds}
     return headed(sweep=said)
 
 

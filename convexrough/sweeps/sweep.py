@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,18 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError, MistakesError
+from convexrough.errors import InputError
 from convexrough.progress import LOGGER
-from convexrough.run.stage import Stage
 from convexrough.scene.scene import Scene
-from convexrough.sweeps.batch import Columns, table
-from convexrough.sweeps.folder import make_folder
-from convexrough.sweeps.measures import Stages
-from convexrough.sweeps.plan import Plan, planned
+from convexrough.sweeps.batch import Batch, Columns
+from convexrough.sweeps.folder import make_folder, part_from
+from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes, read_sweep
 from convexrough.sweeps.pool import Processes, computed
-from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
-from convexrough.tabular.units import UnitNames
 
 #: What `sweep` computes: a sweep file, the tables of one, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
@@ -82,36 +76,20 @@ def sweep(
         for name, value in given.items():
             if value is not None:
                 raise InputError(name, found="given", expected="none: the sweep tables state it")
-        from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
-
         if isinstance(what, Mapping):
             plan = plan_of(what, Path("sweep"), measure)
         else:
             plan = read_sweep(what, measure)
     else:
-        plan = _of_scenes(what, measure, approach, load, _stages(cycle, shear))
+        plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
     asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part)
     if executor is not None:
         checks.instance("executor", executor, Executor)
-        return run(plan, executor, **asked).table
+        return run(plan, executor, **asked)[0]
     if workers is not None:
         checks.whole("workers", workers)
     with Processes(workers) as mine:
-        return run(plan, mine, **asked).table
-
-
-@dataclass(frozen=True)
-class Done:
-    """The result of `run`: a table, and how it was computed.
-
-    found    : a message about rows that existed already, or ""
-    computed : number of scenes that this call computed;  seconds : the time it took
-    """
-
-    table: SweepTable
-    found: str
-    computed: int
-    seconds: float
+        return run(plan, mine, **asked)[0]
 
 
 def run(
@@ -122,8 +100,12 @@ def run(
     resume: bool = False,
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
-) -> Done:
-    """Compute what is missing in the table of a plan; arguments as for `sweep`."""
+) -> tuple[SweepTable, dict[str, Any]]:
+    """Compute what is missing in the table of a plan; arguments as for `sweep`.
+
+    Returns the table; and `found`, a message about rows that existed already, `computed`, the
+    number of scenes that this call computed, and the `seconds` it took.
+    """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:
@@ -131,19 +113,19 @@ def run(
         todo, found = folder.missing(todo, resume)
         LOGGER.info(found)
     count = sum(map(len, todo))
-    parts = [table(plan.batch(range(0)), [])]  # no rows, all columns
+    parts = [Batch(plan.source, plan.columns, range(0)).table([])]  # no rows, all columns
     for columns in _report_progress(computed(map(plan.batch, todo), executor), count):
         if folder is None:
             parts.append(columns)
         else:
             folder.write(columns)
-    seconds = time.monotonic() - began
+    did = {"found": found, "computed": count, "seconds": time.monotonic() - began}
     if folder is not None:
-        return Done(SweepTable(folder.manifest, folder), found, count, seconds)
+        return SweepTable(folder.manifest, folder), did
     joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     order = np.argsort(joined["scene"])
     rows = {name: values[order] for name, values in joined.items()}
-    return Done(SweepTable(plan.manifest, None, rows), found, count, seconds)
+    return SweepTable(plan.manifest, None, rows), did
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
@@ -154,12 +136,14 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     k, n = given
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
-    first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
-    if (count := (stop - first) * plan.size) > MOST:
+    size = plan.manifest["batch"]
+    parts = -(-plan.manifest["scenes"] // size)
+    first, stop = parts * (k - 1) // n, parts * k // n
+    if (count := (stop - first) * size) > MOST:
         expected = f"at most {MOST:,} at once: compute the sweep in parts (K/N)"
         where = str(plan.manifest["source"])
         raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
-    return [plan.part(number) for number in range(first, stop)]
+    return [part_from(plan.manifest, number * size) for number in range(first, stop)]
 
 
 def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
@@ -173,56 +157,3 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
         left = timedelta(seconds=round((count - done) / rate))
         said = f"{done:,} of {count:,} scenes, {rate:,.3g} per second, {left} left"
         LOGGER.info(said + (f", {failed:,} failed" if failed else ""))
-
-
-def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    from convexrough.run.stages import CycleStage, NormalStage, ShearStage
-    from convexrough.run.study import validate_table
-
-    found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
-    mistakes: list[str] = []
-    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
-    for model, key, values in models:
-        checks.sequence(model.name, values, "a list of fractions of f P")
-        if len(values):
-            table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)
-            mistakes += wrong
-            if table is not None:
-                found[model.name] = table
-    if mistakes:
-        raise MistakesError("sweep", mistakes)
-    return found
-
-
-def _of_scenes(
-    what: Iterable[Scene],
-    measure: Sequence[str] | None,
-    approach: ArrayLike | None,
-    load: ArrayLike | None,
-    stages: Stages,
-) -> Plan:
-    checks.sequence("scenes", what, "a list of scenes, or a sweep file")
-    scenes = tuple(what)
-    for i, scene in enumerate(scenes):
-        checks.instance(f"scenes[{i}]", scene, Scene)
-    if not scenes:
-        raise InputError("scenes", found="none", expected="at least one")
-    checks.exactly_one("approach", approach, "load", load)
-    name, control = ("approach", approach) if load is None else ("load", load)
-    assert control is not None  # exactly_one
-    controls = checks.array(name, control, length=len(scenes), one="scene")
-    expected = 'a list of numbers of a summary, such as ["load"]'
-    checks.sequence("measure", measure, expected)
-    if not measure:
-        raise InputError("measure", found=measure, expected=expected)
-    content = hashlib.sha256()
-    for scene in scenes:
-        layout, material = scene.asperities, scene.material
-        for values in (layout.positions, layout.tip_radii, layout.heights):
-            content.update(values.tobytes())
-        content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
-        content.update(f"{scene.geometry} {len(scene)}".encode())
-    given = {"scenes": content.hexdigest(), name: controls.tolist(), "stages": repr(stages)}
-    source = Objects(scenes, controls, load is not None, stages)
-    return planned(source, measure, {"source": "scenes made in Python"}, UnitNames(), **given)

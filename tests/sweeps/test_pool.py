@@ -15,10 +15,9 @@ from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
 
 import convexrough as cr
 from convexrough.sweeps import plan
-from convexrough.sweeps.file import plan_of
-from convexrough.sweeps.plan import Plan
+from convexrough.sweeps.batch import Tables
+from convexrough.sweeps.plan import Plan, plan_of
 from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.scenes import Tables
 from convexrough.sweeps.sweep import run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
@@ -38,7 +37,7 @@ class Shuffled(Executor):
     def submit(self, function: Any, /, *arguments: Any, **keys: Any) -> Future[Any]:
         future: Future[Any] = Future()
         self._given.append((future, function, arguments))
-        if len(self._given) == PLAN.parts:
+        if len(self._given) == -(-PLAN.source.count // PLAN.manifest["batch"]):
             for future, function, arguments in reversed(self._given):
                 future.set_result(function(*arguments))
         return self._given[-1][0]
@@ -65,7 +64,7 @@ def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def deadly(whole: Plan, worst: int) -> Plan:
     assert isinstance(whole.source, Tables)
-    return replace(whole, source=Deadly(whole.source.grid, whole.source.path, worst=worst))
+    return replace(whole, source=Deadly(**vars(whole.source), worst=worst))
 
 
 @pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
@@ -77,7 +76,7 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
         run(deadly(whole, 17), mine, out=tmp_path / "a")
     assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
     with ThreadPoolExecutor(1) as here:
-        table = run(whole, here, out=tmp_path / "a", resume=True).table
+        table = run(whole, here, out=tmp_path / "a", resume=True)[0]
     assert same(table, swept(contents))
 
 
@@ -119,7 +118,7 @@ def cluster() -> Iterator[Any]:
 
 def test_dask(cluster: Any) -> None:
     with dask(cluster.scheduler_address) as engine:
-        assert same(run(PLAN, engine).table, WHOLE)
+        assert same(run(PLAN, engine)[0], WHOLE)
 
 
 def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
@@ -134,7 +133,7 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
 
     workers = [each.pid for each in cluster.workers.values()]
     with dask(cluster.scheduler_address) as engine, reported_to(kill):
-        table = run(plan, engine, out=tmp_path / "a").table
+        table = run(plan, engine, out=tmp_path / "a")[0]
     assert killed
     assert same(table, swept(contents))
     assert set(table.read(["status"])["status"]) == {"certified"}
