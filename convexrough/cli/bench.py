@@ -6,17 +6,14 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, output_options
-from convexrough.cli.speech import DONE, echo, progress, written
+from convexrough.cli.output import DONE, PATH, Output, output_options, progress, written
 
 
 @click.command()
-@output_options
+@output_options("out", "no_figures", "force", "as_json")
 @click.option("--quick", is_flag=True, help="Use fewer and smaller scenes.")
 @click.option("--page", metavar="FILE", type=PATH, help="Also update this Markdown page.")
-def bench(
-    out: Path | None, no_figures: bool, force: bool, as_json: bool, quick: bool, page: Path | None
-) -> int:
+def bench(output: Output, quick: bool, page: Path | None) -> int:
     """Measure time and error of solvers for many scene sizes.
 
     Results go to the folder bench-results unless --out names another. With --page, the command also
@@ -25,13 +22,11 @@ def bench(
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite
-    from convexrough.run.results import results_folder
 
     if page is not None:
         pages.split_page(page)  # a page without markers is refused before anything is computed
-    folder = out or Path("bench-results")
-    with results_folder(folder, force=force) as new, progress("measuring"):
+    with output.folder(Path("bench-results")) as new, progress("measuring"):
         found = suite.run(quick=quick)
-        files = pages.write_bench(new, found, figures=not no_figures, page=page)
-    echo(found.summary(), [*pages.describe(found), *written(folder, files)], as_json)
+        pages.write_bench(new, found, figures=not output.no_figures, page=page)
+    output.say(found.summary(), [*pages.describe(found), *written(new)])
     return DONE

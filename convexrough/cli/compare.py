@@ -6,13 +6,15 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, json_option, solver_option
-from convexrough.cli.speech import (
+from convexrough.cli.output import (
     DONE,
     NOT_CERTIFIED,
+    PATH,
     SOLVER_FAILED,
-    echo,
+    Output,
+    output_options,
     progress,
+    solver_option,
 )
 from convexrough.errors import FileError, blamed_on
 
@@ -34,9 +36,9 @@ from convexrough.errors import FileError, blamed_on
     type=PATH,
     help="Write the iterations of Newton's method and Clarabel to a CSV file.",
 )
-@json_option
+@output_options("as_json")
 def compare(
-    scene: Path, solvers: tuple[str, ...], within: float, log: Path | None, as_json: bool
+    output: Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
@@ -72,7 +74,7 @@ def compare(
         write_rows(log, report.steps(comparison))
     summary = report.comparison_summary(comparison, within)
     lines = report.describe_comparison(summary, file.scene.units)
-    echo(summary, lines, as_json, report.comparison_warnings(summary))
+    output.say(summary, lines, report.comparison_warnings(summary))
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:
         return SOLVER_FAILED

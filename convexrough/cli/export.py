@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
-from convexrough.cli.options import PATH, force_option, json_option, out_option
-from convexrough.cli.speech import DONE, echo, progress, written
+from convexrough.cli.output import DONE, PATH, Output, output_options, progress, written
 from convexrough.errors import blamed_on
 
 
@@ -19,13 +17,8 @@ from convexrough.errors import blamed_on
 @click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
               help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
               )  # fmt: skip
-@out_option
-@force_option
-@json_option
-def export(
-    scene: Path, formats: tuple[str, ...], bristles: int, out: Path | None, force: bool,
-    as_json: bool,
-) -> int:  # fmt: skip
+@output_options("out", "force", "as_json")
+def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
     """Write a scene as cone and quadratic programs for other solvers.
 
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
@@ -36,21 +29,20 @@ def export(
     Programs go to the folder SCENE-programs unless --out names another.
     """
     from convexrough.programs.folder import FORMATS, write_programs
-    from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
 
     file = read_scene(scene)
-    folder = out or Path(f"{scene.stem}-programs")
-    control: dict[str, Any] = {"approach": file.approach, "load": file.load}
     stating = progress(f"stating {len(file.scene):,} asperities")
-    with results_folder(folder, force=force, reads=file.inputs) as new, blamed_on(scene), stating:
-        files, index = write_programs(
-            new,
+    folder = output.folder(Path(f"{scene.stem}-programs"), reads=file.inputs)
+    with folder as new, blamed_on(scene), stating:
+        new.files, index = write_programs(
+            new.path,
             scene.stem,
             file.scene,
+            approach=file.approach,
+            load=file.load,
             formats=formats or tuple(FORMATS),
             bristles=bristles,
-            **control,
         )
     lines = [
         f"{name}: {about['form']}, {about['variables']:,} variables, least objective "
@@ -58,5 +50,5 @@ def export(
         for name, about in index["programs"].items()
     ]
     left_out = (f"{name}: left out: {reason}" for name, reason in index["left_out"].items())
-    echo(index, [*lines, *written(folder, files)], as_json, left_out)
+    output.say(index, [*lines, *written(new)], left_out)
     return DONE

@@ -6,26 +6,23 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, force_option, json_option, solver_option
-from convexrough.cli.speech import DONE, echo, progress
+from convexrough.cli.output import DONE, PATH, Output, output_options, progress, solver_option
 
 
 @click.command()
 @click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@force_option
 @click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
 @solver_option
 @click.argument("names", nargs=-1)
-@json_option
+@output_options("force", "as_json")
 def gallery(
+    output: Output,
     show_list: bool,
     export: Path | None,
-    force: bool,
     profile: bool,
     solvers: tuple[str, ...],
     names: tuple[str, ...],
-    as_json: bool,
 ) -> int:
     """List, export or time hard scenes with 50-digit answers.
 
@@ -37,10 +34,8 @@ def gallery(
     contact set is right if exactly the asperities that touch have a load.
     """
     from convexrough import gallery as wing
-    from convexrough.atomic import write_text
     from convexrough.compare import solver_named
     from convexrough.gallery.export import exported
-    from convexrough.run.results import results_folder
     from convexrough.tabular.columns import aligned
 
     if export is not None and (profile or solvers):
@@ -57,7 +52,7 @@ def gallery(
         for row, each in zip(rows, found.outcomes, strict=True):
             cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
             reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
-        echo({"profile": reported}, aligned(cells, left=1), as_json)
+        output.say({"profile": reported}, aligned(cells, left=1))
         return DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
@@ -70,8 +65,9 @@ def gallery(
         lines = aligned([heading, *lines_of_cases], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
-        with results_folder(export, force=force) as new, progress("writing"):
-            files = [write_text(new / name, text) for name, text in exported(wanted)]
-        lines += [f"{len(wanted)} cases, {len(files)} files, written to {export}"]
-    echo({"cases": summary}, lines, as_json)
+        with output.folder(export) as new, progress("writing"):
+            for name, text in exported(wanted):
+                new.text(name, text)
+        lines += [f"{len(wanted)} cases, {len(new.files)} files, written to {export}"]
+    output.say({"cases": summary}, lines)
     return DONE

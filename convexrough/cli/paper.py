@@ -6,56 +6,36 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import figure_options, html_option, output_options
-from convexrough.cli.speech import progress, say, written
+from convexrough.cli.output import Output, html_option, output_options, progress, written
 
 
 @click.command()
 @html_option
-@figure_options
-@output_options
-def paper(
-    out: Path | None,
-    no_figures: bool,
-    force: bool,
-    as_json: bool,
-    html: bool,
-    formats: tuple[str, ...],
-    dpi: int,
-) -> int:
+@output_options()
+def paper(output: Output, html: bool) -> int:
     """Reproduce the example of Dini and Hills (2009).
 
     Tables and figures go to the folder paper-results unless --out names another.
     """
-    from convexrough.atomic import write_text
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
     from convexrough.paper.states import PaperStates
-    from convexrough.run.results import (
-        results_folder,
-        slider_page,
-        write_figures,
-        write_results,
-        write_tables,
-    )
+    from convexrough.run.results import slider_page
 
-    folder = out or Path("paper-results")
-    with results_folder(folder, force=force) as new, progress("reproducing the paper"):
+    with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
         found = example.results()
         for result in found:
             result.prepare(figures=False)
         contact = found[0].contact
         comparison = example.compare(found)
         states = PaperStates.of(contact)
-        files = write_tables(new, figure_data(states))
-        if not no_figures:
+        new.tables(figure_data(states))
+        if not output.no_figures:
             from convexrough.paper.figures import paper_figures
 
-            files += write_figures(new, paper_figures(contact, states), formats=formats, dpi=dpi)
+            new.figures(paper_figures(contact, states))
         if html:
-            page = slider_page(found[0])
-            files.append(write_text(new / "slider.html", page))
+            new.text("slider.html", slider_page(found[0]))
         more = {"paper": comparison}
-        files += write_results(new, found, figures=False, more=more)
-    lines = ["", *example.table(comparison), *written(folder, files)]
-    return say(found, as_json, lines, more=more)
+        new.results(found, figures=False, more=more)
+    return output.say_results(found, ["", *example.table(comparison), *written(new)], more)

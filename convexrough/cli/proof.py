@@ -1,19 +1,12 @@
-"""`check`, and how `run` and `verify` prove what it checks."""
+"""`check`: the checker of proof files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from convexrough.cli.options import PATH
-from convexrough.cli.speech import progress, say_aside
-from convexrough.errors import ProofError
-
-if TYPE_CHECKING:
-    from convexrough.proof import Proof
+from convexrough.cli.output import PATH
 
 
 @click.command()
@@ -29,13 +22,3 @@ def check(proof: Path) -> int:
     from convexrough import checker
 
     return checker.main([str(proof)])
-
-
-def proved(work: Callable[[], Proof]) -> Proof | None:
-    """The proof, or None after a warning with the reason."""
-    try:
-        with progress("proving"):
-            return work()
-    except ProofError as error:
-        say_aside("warning", f"proof.json is not written: {error}")
-        return None

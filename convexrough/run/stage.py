@@ -182,6 +182,14 @@ class Result(Table, Plottable):
             why = "it is proved for one step only that indentations increase with the load"
             yield f"not proved: the losses of [{self.name}], as {why}"
 
+    def cautions(self) -> Iterator[str]:
+        """Warnings about limits of the model."""
+        yield from ()
+
+    def proved_forces(self) -> Iterator[float]:
+        """[force] the shear forces at which `run --proof` proves the friction state."""
+        yield from ()
+
     @property
     def orders(self) -> set[str]:
         """The set of the attributes `order` (docs/theory/states.md) of the objects in `found`."""

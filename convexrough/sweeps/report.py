@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from convexrough.record import rows_of
-from convexrough.run.results import results_folder, write_figures, write_tables
+from convexrough.run.results import Writer, headed
 from convexrough.run.stage import Summary
-from convexrough.run.summary import headed
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
@@ -88,14 +87,12 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
             yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
-def write_summary(
-    folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
-) -> list[Path]:
-    """Write quantiles.csv, and figures of measured numbers over swept keys; return the paths."""
+def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
+    """Write quantiles.csv, and figures of measured numbers over swept keys."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
-    with results_folder(folder, force=overwrite) as new:
-        figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
-        return write_tables(new, {"quantiles": found}) + write_figures(new, figures)
+    new.tables({"quantiles": found})
+    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+    new.figures(figures)
 
 
 def figures_left_out(table: SweepTable) -> list[str]:

@@ -67,7 +67,7 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
 
     def write(error: BaseException | None, text: str, *, force: bool = False) -> None:
         with results_folder(folder, force=force) as new:
-            (new / "one.csv").write_text(text)
+            new.text("one.csv", text)
             assert not folder.exists() or (folder / "one.csv").read_text() == "1"
             if error is not None:
                 raise error

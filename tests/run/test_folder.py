@@ -28,7 +28,7 @@ def test_names_columns_and_keys(
 
     After a deliberate change the folder of the test holds what to pin, as found.json.
     """
-    write = results.write_results
+    write = results.Writer.results
 
     def after(*given: Any, **options: Any) -> Any:
         with monkeypatch.context() as patch:
@@ -37,7 +37,7 @@ def test_names_columns_and_keys(
                 patch.setattr(f"convexrough.{solves}", None)  # not to be called
             return write(*given, **options)
 
-    monkeypatch.setattr(results, "write_results", after)
+    monkeypatch.setattr(results.Writer, "results", after)
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
     ran = command("run", "a.toml", "--out", "out", "--html")

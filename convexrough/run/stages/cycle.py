@@ -121,6 +121,9 @@ class CycleResult(Result):
             for high, low, row, cycle in zip(highs, lows, super().rows(), self.found, strict=True)
         ]
 
+    def proved_forces(self) -> Iterator[float]:
+        return ((cycle.maximum - cycle.minimum) / 2 for cycle in self.found)
+
     @cached_property
     def loops(self) -> list[Loop]:
         """The loops of each cycle, of the whole contact and of some asperities."""

@@ -76,6 +76,9 @@ class NormalResult(Single):
     def doubts(self) -> Iterator[str]:
         yield from doubts_of(self.known[0])
 
+    def cautions(self) -> Iterator[str]:
+        return plausibility.cautions(self.known[0], self.units)
+
     def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import press_figures  # matplotlib: only when it draws
 

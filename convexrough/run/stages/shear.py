@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -50,6 +50,9 @@ class ShearResult(Result):
                 self.stage.fractions, super().rows(), self.found, strict=True
             )
         ]
+
+    def proved_forces(self) -> Iterator[float]:
+        return (abs(state.force) for state in self.found)
 
     def tables(self) -> dict[str, Columns]:
         """The tables, with a row for each fraction and asperity."""
