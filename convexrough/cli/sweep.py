@@ -83,9 +83,8 @@ def sweep(
     if resume and output.force:
         raise click.UsageError("--resume and --force exclude each other.")
     from convexrough.errors import WorkerError
-    from convexrough.sweeps.plan import read_sweep
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
-    from convexrough.sweeps.sweep import run
+    from convexrough.sweeps.sweep import read_sweep, run
 
     assert sweep is not None  # one of the two
     folder = output.out or Path(f"{sweep.stem}-sweep")

@@ -16,8 +16,7 @@ from convexrough.errors import SceneFileError
 from convexrough.run.scene_file import Task, read_summits, regular, task_of
 from convexrough.run.study import LatticeTable, Study, validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
-from convexrough.sweeps.measures import FAILURES, Column, Measured, measured
-from convexrough.sweeps.together import measured_together
+from convexrough.sweeps.measures import FAILURES, Column, Measured, measured, measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 

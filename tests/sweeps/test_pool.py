@@ -14,11 +14,10 @@ import pytest
 from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
 
 import convexrough as cr
-from convexrough.sweeps import plan
+from convexrough.sweeps import sweep
 from convexrough.sweeps.batch import Tables
-from convexrough.sweeps.plan import Plan, plan_of
 from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.sweep import run
+from convexrough.sweeps.sweep import Plan, plan_of, run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
@@ -58,7 +57,7 @@ def test_executors(executor: Any) -> None:
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("most", [1, 3, 7, 1000])
 def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "MOST_SCENES", most)
+    monkeypatch.setattr(sweep, "MOST_SCENES", most)
     assert same(swept(MANY), WHOLE)
 
 
@@ -162,5 +161,5 @@ def test_sharing_changes_no_bit(influence: str, monkeypatch: pytest.MonkeyPatch)
     over = {"over": {"asperities.height_std": [1e-7]}}
     contents = tables(solver={"influence": influence}, sweep=measured | over)
     shared = swept(contents)
-    monkeypatch.setattr(plan, "MOST_SCENES", 1)
+    monkeypatch.setattr(sweep, "MOST_SCENES", 1)
     assert same(shared, swept(contents))

@@ -1,4 +1,4 @@
-"""[cycle]: steady cycles between two shear forces, with their losses and loops."""
+"""[shear], [cycle] and [history]: shear forces at constant load."""
 
 from __future__ import annotations
 
@@ -15,9 +15,65 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Loop, cycles, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
-from convexrough.run.stage import Columns, Result, Stage, Summary, limit
-from convexrough.run.values import Fractions, Mistake, Whole, expected
+from convexrough.friction.path import history
+from convexrough.friction.shear import shear
+from convexrough.run.stage import Columns, Result, Stage, Steps, Summary, limit, repeated
+from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
+
+
+class ShearStage(Stage):
+    """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
+
+    name = "shear"
+    numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),)
+    labels = ("fraction",)
+
+    fractions: Shares
+
+    def compute(self, contact: Contact) -> ShearResult:
+        f_p = limit(contact)
+        states = (shear(contact, force=part * f_p) for part in self.fractions)
+        return ShearResult(self, contact, tuple(states))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearResult(Result):
+    """The result of [shear]: a friction state for each fraction."""
+
+    stage: ShearStage
+    printed: ClassVar[Mapping[str, str]] = {
+        "fraction": "Q/(fP)",
+        "force": "force",
+        "displacement": "displacement",
+        "sliding": "sliding",
+        "partial": "partial",
+        "undecided": "undecided",
+    }
+
+    def rows(self) -> list[Summary]:
+        return [
+            {"fraction": part, **row, "scope": state.certificate.scope}
+            for part, row, state in zip(
+                self.stage.fractions, super().rows(), self.found, strict=True
+            )
+        ]
+
+    def proved_forces(self) -> Iterator[float]:
+        return (abs(state.force) for state in self.found)
+
+    def tables(self) -> dict[str, Columns]:
+        """The tables, with a row for each fraction and asperity."""
+        x, y = self.contact.scene.asperities.positions.T
+        names = ("forces", "stick_radii", "slips", "displacements", "status")
+        each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
+        return {"shear": repeated({"fraction": np.array(self.stage.fractions)}, each)}
+
+    def figures(self) -> Mapping[str, Any]:
+        from convexrough.plots import shear_figures  # matplotlib: only when it draws
+
+        return shear_figures(self.found)
+
 
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
 MOST_LOOPS = 12
@@ -186,3 +242,31 @@ class CycleResult(Result):
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
         figures = cycle_figures(self.found, loops=self.loops)
         return {**figures, **fretting_figures(widest)}
+
+
+class HistoryStage(Stage):
+    """A sequence of shear forces that starts at 0, as fractions of the friction limit f P."""
+
+    name = "history"
+    numbers = ("force", "displacement", "loss", "loss_error")
+
+    fractions: Fractions
+
+    def compute(self, contact: Contact) -> HistoryResult:
+        past = history(contact, forces=limit(contact) * np.array(self.fractions))
+        return HistoryResult(self, contact, (past,))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HistoryResult(Steps):
+    """The result of [history]: the state after each force."""
+
+    stage: HistoryStage
+    printed: ClassVar[Mapping[str, str]] = {
+        "fraction": "Q/(fP)",
+        "displacement": "displacement",
+        "loss": "loss",
+    }
+
+    def columns_of_steps(self) -> Columns:
+        return {"fraction": np.array(self.stage.fractions), **super().columns_of_steps()}
