@@ -24,8 +24,6 @@ def paper(output: Output, html: bool) -> int:
 
     with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
         found = example.results()
-        for result in found:
-            result.prepare(figures=False)
         contact = found[0].contact
         comparison = example.compare(found)
         states = PaperStates.of(contact)

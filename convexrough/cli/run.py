@@ -50,25 +50,21 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
             from convexrough.proof import refuse_many
 
             refuse_many(file.scene)
-    figures, folder = not output.no_figures, Path(f"{scene.stem}-results")
-    with output.folder(folder, reads=file.inputs, **origin(file)) as new:
+    folder = output.folder(Path(f"{scene.stem}-results"), reads=file.inputs, **origin(file))
+    with folder as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
         for caution in file.cautions(contact):  # before work that may be long, or fail
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
-            for result in results:
-                result.prepare(figures=figures)
-            page = slider_page(results[0]) if html else ""
-        evidence = proved(partial(prove_results, results)) if proof else None
-        with progress("writing results"):
-            new.results(results, figures=figures)
+            new.results(results, figures=not output.no_figures)
             new.text("scene.toml", file.text)
             if html:
-                new.text("slider.html", page)
-            if evidence is not None:
-                evidence.save(new.path / "proof.json")
+                new.text("slider.html", slider_page(results[0]))
+        evidence = proved(partial(prove_results, results)) if proof else None
+        if evidence is not None:
+            evidence.save(new.path / "proof.json")
     status = output.say_results(results, written(new))
     if evidence is not None:
         output.say_proof(evidence, new.folder)

@@ -18,7 +18,6 @@ from convexrough.plots.path import path_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shakedown import shakedown_figures
 from convexrough.plots.shear import shear_figures
-from convexrough.plots.surface import provability_figure, surface_figures
 from convexrough.plots.verdict import verdict_figures
 
 __all__ = [
@@ -30,12 +29,10 @@ __all__ = [
     "phase_figures",
     "plot",
     "press_figures",
-    "provability_figure",
     "save",
     "shakedown_figures",
     "shear_figures",
     "steady_figures",
-    "surface_figures",
     "thumbnail",
     "verdict_figures",
 ]

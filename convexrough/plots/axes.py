@@ -21,10 +21,7 @@ from convexrough.friction.side_by_side import PathComparison, PathEntry
 from convexrough.gradients.gradient import Gradient
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots.asperity_map import (
-    Layer,
     draw_contact,
-    draw_map,
-    even_radii,
     status_handles,
     status_layers,
 )
@@ -33,7 +30,7 @@ from convexrough.plots.cycle import draw_loop, smooth_loop
 from convexrough.plots.fretting import draw_slip
 from convexrough.plots.gradient import draw_gradient
 from convexrough.plots.load_plane import draw_closed, draw_curve, draw_losses, draw_path
-from convexrough.plots.measure import Scale, measure
+from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, image_tag, new_axes
 from convexrough.plots.path import draw_loop as draw_path_loop
 from convexrough.plots.press import draw_pressure
@@ -49,11 +46,7 @@ from convexrough.plots.style import (
     legend_below,
     say_nothing,
 )
-from convexrough.plots.surface import SUMMIT, draw_provability, draw_surface
 from convexrough.plots.verdict import draw_claim
-from convexrough.surface.provability import Provability
-from convexrough.surface.summits import Summits
-from convexrough.surface.surface import Surface
 from convexrough.vector_shear.state import VectorShearState
 from convexrough.verdict import Verdict
 
@@ -72,7 +65,12 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
     Raises InputError for anything else.
     """
-    draw = next((draw for kind, draw in PICTURES.items() if isinstance(result, kind)), None)
+    kinds = PICTURES
+    if type(result).__module__.startswith("convexrough.surface."):
+        from convexrough.plots import surface  # parts of SciPy: only for measured surfaces
+
+        kinds = surface.PICTURES
+    draw = next((draw for kind, draw in kinds.items() if isinstance(result, kind)), None)
     if draw is None:
         expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
@@ -146,12 +144,6 @@ def _took(entry: Any) -> tuple[str, float | None, str]:
     return entry.solver, entry.contact.seconds if entry.contact else None, entry.outcome
 
 
-def _draw_summits(summits: Summits, axes: Axes) -> None:
-    every = np.ones(len(summits), dtype=bool)
-    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
-
-
 #: The function that draws each kind of result.
 PICTURES: dict[type, Callable[..., Any]] = {
     Contact: lambda it, axes: draw_pressure(axes, Scale(it)),
@@ -167,7 +159,4 @@ PICTURES: dict[type, Callable[..., Any]] = {
     Verdict: lambda it, axes: draw_claim(axes, it, it.scene),
     Comparison: _draw_times,
     PathComparison: _draw_times,
-    Surface: lambda it, axes: draw_surface(axes, it),
-    Summits: _draw_summits,
-    Provability: lambda it, axes: draw_provability(axes, it),
 }

@@ -208,10 +208,6 @@ class Result(Table, Plottable):
         """The figures to write, by the file name without its ending."""
         return {}
 
-    def prepare(self, *, figures: bool) -> None:
-        """Compute all that tables and figures need, so that writing them solves nothing."""
-        self.tables()
-
     def lines(self) -> list[str]:
         """The lines of the printed table and of what is proved about its order."""
         most = MOST_PRINTED if self.steps else len(self.known)
@@ -266,22 +262,11 @@ class Steps(Result):
             for name in self.stage.numbers
         }
 
-    @cached_property
-    def fine(self) -> Any:
-        """The path of this result with intermediate points, for figures."""
-        from convexrough.plots.between import between  # matplotlib: only when it draws
-
-        return between(self.found[0])
-
-    def prepare(self, *, figures: bool) -> None:
-        super().prepare(figures=figures)
-        if figures:
-            _ = self.fine
-
     def figures(self) -> Mapping[str, Figure]:
-        from convexrough.plots import path_figures  # matplotlib: only when it draws
+        from convexrough.plots import between, path_figures  # matplotlib: only when it draws
 
-        return path_figures(self.found[0], fine=self.fine)
+        (found,) = self.found
+        return path_figures(found, fine=between(found))
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""

@@ -9,7 +9,6 @@ import pytest
 from scene_files import EVERYTHING, WITHIN, scene_text
 
 from convexrough import plots
-from convexrough.run import results
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
@@ -24,20 +23,7 @@ def keys(value: Any) -> Any:
 def test_names_columns_and_keys(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All is solved before the first file is written.
-
-    After a deliberate change the folder of the test holds what to pin, as found.json.
-    """
-    write = results.Writer.results
-
-    def after(*given: Any, **options: Any) -> Any:
-        with monkeypatch.context() as patch:
-            for solves in ("normal.problem.NormalProblem.assemble", "normal.level.Levels.at",
-                           "friction.levels.FrictionLevels.rows"):  # fmt: skip
-                patch.setattr(f"convexrough.{solves}", None)  # not to be called
-            return write(*given, **options)
-
-    monkeypatch.setattr(results.Writer, "results", after)
+    """After a deliberate change the folder of the test holds what to pin, as found.json."""
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
     ran = command("run", "a.toml", "--out", "out", "--html")
