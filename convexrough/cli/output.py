@@ -107,8 +107,8 @@ class Output:
         """The folder --out, or else `default`; further arguments as for `results_folder`."""
         from convexrough.run.results import results_folder
 
-        figures = {"formats": self.formats, "dpi": self.dpi}
-        with results_folder(self.out or default, force=self.force, **figures, **given) as new:
+        given |= {"force": self.force, "formats": self.formats, "dpi": self.dpi}
+        with results_folder(self.out or default, **given) as new:
             yield new
 
     def say(

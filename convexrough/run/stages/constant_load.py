@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -17,7 +16,7 @@ from convexrough.friction.cycle import Loop, cycles, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
-from convexrough.run.stage import Columns, Result, Stage, Steps, Summary, limit, repeated
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -26,10 +25,14 @@ class ShearStage(Stage):
     """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
 
     name = "shear"
-    numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),)
-    labels = ("fraction",)
+    numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),
+               "scope")  # fmt: skip
 
     fractions: Shares
+
+    @property
+    def labels(self) -> Labels:
+        return {"fraction": self.fractions}
 
     def compute(self, contact: Contact) -> ShearResult:
         f_p = limit(contact)
@@ -37,7 +40,6 @@ class ShearStage(Stage):
         return ShearResult(self, contact, tuple(states))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class ShearResult(Result):
     """The result of [shear]: a friction state for each fraction."""
 
@@ -51,14 +53,6 @@ class ShearResult(Result):
         "undecided": "undecided",
     }
 
-    def rows(self) -> list[Summary]:
-        return [
-            {"fraction": part, **row, "scope": state.certificate.scope}
-            for part, row, state in zip(
-                self.stage.fractions, super().rows(), self.found, strict=True
-            )
-        ]
-
     def proved_forces(self) -> Iterator[float]:
         return (abs(state.force) for state in self.found)
 
@@ -67,7 +61,7 @@ class ShearResult(Result):
         x, y = self.contact.scene.asperities.positions.T
         names = ("forces", "stick_radii", "slips", "displacements", "status")
         each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
-        return {"shear": repeated({"fraction": np.array(self.stage.fractions)}, each)}
+        return {"shear": self.stacked(each)}
 
     def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import shear_figures  # matplotlib: only when it draws
@@ -102,7 +96,6 @@ class CycleStage(Stage):
                "secant_stiffness", "loss_factor", "loss", "loss_error", "loss_normalised",
                "smooth_normalised", "balance_defect", "sliding", "partial",
                "undecided")  # fmt: skip
-    labels = ("maximum_fraction", "minimum_fraction")
 
     maximum_fraction: Fractions
     minimum_fraction: Fractions | None = None
@@ -115,6 +108,10 @@ class CycleStage(Stage):
         if self.minimum_fraction is not None:
             return self.minimum_fraction
         return [-value for value in self.maximum_fraction]
+
+    @property
+    def labels(self) -> Labels:
+        return {"maximum_fraction": self.maximum_fraction, "minimum_fraction": self.lowest}
 
     def mistakes_within(self) -> Iterator[Mistake]:
         if (n := len(self.lowest)) != len(self.maximum_fraction):
@@ -140,7 +137,6 @@ class CycleStage(Stage):
         return CycleResult(self, contact, tuple(found))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class CycleResult(Result):
     """The result of [cycle]: the steady cycles."""
 
@@ -164,17 +160,14 @@ class CycleResult(Result):
     }
 
     def rows(self) -> list[Summary]:
-        highs, lows = self.stage.maximum_fraction, self.stage.lowest
         return [
             {
-                "maximum_fraction": high,
-                "minimum_fraction": low,
                 **row,
                 "loss_over_smooth": cycle.loss_normalised / (cycle.smooth_normalised or math.nan),
                 "partial_slip_loss": float(cycle.partial_slip_losses.sum()),
                 "sliding_loss": float(cycle.sliding_losses.sum()),
             }
-            for high, low, row, cycle in zip(highs, lows, super().rows(), self.found, strict=True)
+            for row, cycle in zip(super().rows(), self.found, strict=True)
         ]
 
     def proved_forces(self) -> Iterator[float]:
@@ -203,25 +196,10 @@ class CycleResult(Result):
 
     def tables(self) -> dict[str, Columns]:
         """The tables of cycles, of fretting by asperity, and of loops, in total and by asperity."""
-        touching = int(np.count_nonzero(self.contact.loads))
-        worn = {  # fractions replace forces, as in the other tables
-            name: np.repeat([row[name] for row in self.known], touching)
-            for name in self.stage.labels
-        }
-        given = fretting_columns(self.worn)
-        worn |= {name: it for name, it in given.items() if name not in ("maximum", "minimum")}
-        parts: list[list[NDArray[Any]]] = []
-        for row, loop in zip(self.known, self.loops, strict=True):
-            forces, moved = loop.asperity_forces.T, loop.asperity_displacements.T
-            curves = [("total", loop.forces, loop.displacements)]
-            curves += zip(loop.asperities.astype(str), forces, moved, strict=True)
-            for curve, *values in curves:
-                same = [*(row[name] for name in self.stage.labels), curve]
-                parts.append([*(np.full(len(values[0]), each) for each in same), *values])
-        names = (*self.stage.labels, "curve", "force", "displacement")
-        columns = map(np.concatenate, zip(*parts, strict=True))
-        loop_table = dict(zip(names, columns, strict=True))
-        return {**super().tables(), "loop": loop_table, "fretting": worn}
+        worn = self.stacked([fretting_columns([each]) for each in self.worn])
+        del worn["maximum"], worn["minimum"]  # fractions replace forces, as in the other tables
+        curves = self.stacked([_curves(loop) for loop in self.loops])
+        return {**super().tables(), "loop": curves, "fretting": worn}
 
     @property
     def smooth(self) -> bool:
@@ -244,6 +222,16 @@ class CycleResult(Result):
         return {**figures, **fretting_figures(widest)}
 
 
+def _curves(loop: Loop) -> Columns:
+    """The points of a loop in total, and below them those of each asperity."""
+    names = ["total", *loop.asperities.astype(str)]
+    return {
+        "curve": np.repeat(names, len(loop.forces)),
+        "force": np.concatenate([loop.forces, *loop.asperity_forces.T]),
+        "displacement": np.concatenate([loop.displacements, *loop.asperity_displacements.T]),
+    }
+
+
 class HistoryStage(Stage):
     """A sequence of shear forces that starts at 0, as fractions of the friction limit f P."""
 
@@ -252,12 +240,15 @@ class HistoryStage(Stage):
 
     fractions: Fractions
 
+    @property
+    def labels(self) -> Labels:
+        return {"fraction": self.fractions}
+
     def compute(self, contact: Contact) -> HistoryResult:
         past = history(contact, forces=limit(contact) * np.array(self.fractions))
         return HistoryResult(self, contact, (past,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class HistoryResult(Steps):
     """The result of [history]: the state after each force."""
 
@@ -267,6 +258,3 @@ class HistoryResult(Steps):
         "displacement": "displacement",
         "loss": "loss",
     }
-
-    def columns_of_steps(self) -> Columns:
-        return {"fraction": np.array(self.stage.fractions), **super().columns_of_steps()}

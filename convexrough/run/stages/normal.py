@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,6 @@ class NormalStage(Stage):
         return NormalResult(self, contact, (contact,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class NormalResult(Single):
     """The result of [normal]: the pressed contact."""
 

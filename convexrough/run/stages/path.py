@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -116,7 +115,6 @@ class PathStage(_Points):
         return PathResult(self, contact, (found,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class PathResult(Steps):
     """The result of [path]: the states at the points."""
 
@@ -193,7 +191,6 @@ class SteadyStage(_Points):
             )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class SteadyResult(Single):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
