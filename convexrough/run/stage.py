@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
+from convexrough import checks, frames
 from convexrough.contact import Contact
 from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
 from convexrough.plottable import Plottable
@@ -254,10 +254,7 @@ class Result(Table, Plottable):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The first table as a pandas DataFrame."""
-        from convexrough.frames import dataframe
-
-        columns = next(iter(self.tables().values()))
-        return dataframe({name: (("row",), it) for name, it in columns.items()}, {})
+        return frames.of_rows(next(iter(self.tables().values())))
 
 
 class Steps(Result):

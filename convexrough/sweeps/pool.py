@@ -23,7 +23,7 @@ from itertools import islice
 from types import ModuleType
 from typing import Any
 
-from convexrough.errors import ExtraError, InputError, WorkerError
+from convexrough.errors import InputError, WorkerError, needed
 from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.threads import cores
 
@@ -153,11 +153,8 @@ def dask(address: str) -> Iterator[Executor]:
 
     Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
     """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ExtraError("dask") from error
-    own = partial(Client, set_as_default=False)  # a failing client would stay the user's default
+    client_of = needed("distributed", "dask").Client
+    own = partial(client_of, set_as_default=False)  # a failing client would stay the user's default
     try:
         if address == "local":
             client = own(n_workers=cores(), threads_per_worker=1, dashboard_address=None)

@@ -19,7 +19,7 @@ import numpy as np
 
 from convexrough import checks, frames
 from convexrough.atomic import to_json, write_text
-from convexrough.errors import ExtraError, FileError, InputError, file_errors
+from convexrough.errors import FileError, InputError, file_errors, needed
 from convexrough.record import Record, in_text
 from convexrough.sweeps.batch import Columns, different
 
@@ -185,12 +185,7 @@ def _named(manifest: Mapping[str, Any]) -> str:
 
 def arrow() -> tuple[Any, Any]:
     """The modules pyarrow and pyarrow.parquet. Raises ExtraError if they are not installed."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise ExtraError("parquet") from error
-    return pyarrow, pyarrow.parquet
+    return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
 
 
 #: The quantiles that are computed by default.
@@ -308,28 +303,23 @@ class SweepTable(Record):
         Raises ExtraError if pandas is not installed; InputError if the table does not fit in memory
         (then use `to_dask`).
         """
-        variables: frames.Variables = {
-            name: (("row",), values) for name, values in self.read(columns).items()
-        }
         attributes = {name: self.manifest[name] for name in ("sweep", "version", "source")}
-        return frames.dataframe(variables, attributes)
+        return frames.of_rows(self.read(columns), **attributes)
 
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
         """A Dask data frame with some columns, by default all; parts are read when needed.
 
         Raises ExtraError if Dask is not installed; InputError if the table is not in a folder.
         """
-        try:
-            import dask.dataframe
-        except ImportError as error:
-            raise ExtraError("dask") from error
+        frames_of_dask = needed("dask.dataframe", "dask")
         self._refuse_unknown(columns or ())
         if self.folder is None or not len(self):
             raise InputError("table", found="no parts", expected="rows in a folder")
         names = self.columns if columns is None else list(columns)
         frame = partial(_frame, self.folder, names)
         meta = frame(self._parts()[0]).iloc[:0]
-        return dask.dataframe.from_map(frame, self._parts(), meta=meta)
+        found: dask.dataframe.DataFrame = frames_of_dask.from_map(frame, self._parts(), meta=meta)
+        return found
 
     def plot(
         self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
@@ -409,5 +399,4 @@ class SweepTable(Record):
 
 
 def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:
-    columns = folder.read(part, names)
-    return frames.dataframe({name: (("row",), it) for name, it in columns.items()}, {})
+    return frames.of_rows(folder.read(part, names))
