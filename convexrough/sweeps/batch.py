@@ -145,7 +145,8 @@ class Batch:
 def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     """The columns of a batch, and the versions of the packages that computed them.
 
-    No row depends on other scenes; a failed scene's row has the error.
+    No value depends on other scenes; the last bits of error bounds may, as products with matrices
+    are rounded in another way if there are more rows. A failed scene's row has the error.
     """
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
