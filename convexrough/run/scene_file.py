@@ -44,6 +44,20 @@ RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "
 #: Relative rounding error that is allowed for means and sums in the last row of a table.
 ROUNDED = 1e-3
 
+#: Number of mistakes in a scene file that are reported one by one; further ones are counted.
+MOST_MISTAKES = 50
+
+#: [bytes] size of the largest accepted scene file.
+MOST_BYTES = 2**25
+
+#: Columns of a file of asperities, unless the scene file names others.
+SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
+
+#: Largest number of parts of a dotted key: time and memory of tomllib grow with the square.
+MOST_PARTS = 100
+
+_DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
+
 
 def unknown(column: str) -> bool:
     """True if a column with this header may contain the heights."""
@@ -107,22 +121,6 @@ def is_permuted(cells: NDArray[Any]) -> bool:
     ordered = np.sort(cells)
     counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
     return bool(counts and (ordered != cells).any())
-
-
-#: Number of mistakes in a scene file that are reported one by one; further ones are counted.
-MOST_MISTAKES = 50
-
-
-#: [bytes] size of the largest accepted scene file.
-MOST_BYTES = 2**25
-
-#: Columns of a file of asperities, unless the scene file names others.
-SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
-
-#: Largest number of parts of a dotted key: time and memory of tomllib grow with the square.
-MOST_PARTS = 100
-
-_DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -40,6 +40,12 @@ MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 #: At most this many scenes are computed in order to find out which numbers can be measured.
 TRIED = 5
 
+#: What `sweep` computes: a sweep file, the tables of one, or scenes.
+What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
+
+#: Largest number of scenes that one call computes; larger sweeps are computed in parts.
+MOST = 10**8
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -239,13 +245,6 @@ def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
         return []
     own = [name for name, stage in stages.items() if name in used and stage.highest_load]
     return [name for name in own if not any(key.startswith(f"{name}.") for key in swept)]
-
-
-#: What `sweep` computes: a sweep file, the tables of one, or scenes.
-What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
-
-#: Largest number of scenes that one call computes; larger sweeps are computed in parts.
-MOST = 10**8
 
 
 def sweep(

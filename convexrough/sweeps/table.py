@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 
 MANIFEST, PARTS = "manifest.json", "parts"
 
+#: The quantiles that are computed by default.
+USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+#: [bytes] memory for a number of a table and its copy in a data frame.
+CELL = 24
+
 
 def part_from(manifest: Mapping[str, Any], first: int) -> range:
     """The scenes of the part of a sweep's table that begins with scene `first`."""
@@ -186,13 +192,6 @@ def _named(manifest: Mapping[str, Any]) -> str:
 def arrow() -> tuple[Any, Any]:
     """The modules pyarrow and pyarrow.parquet. Raises ExtraError if they are not installed."""
     return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
-
-
-#: The quantiles that are computed by default.
-USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
-
-#: [bytes] memory for a number of a table and its copy in a data frame.
-CELL = 24
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:

@@ -20,6 +20,18 @@ from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
+#: Largest number of asperities whose loops are computed, unless the scene file names them.
+MOST_LOOPS = 12
+
+#: Most and fewest points of a loop by default, and the limit on touching asperities times points.
+MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
+
+Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
+
+Chosen = Annotated[
+    Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
+]
+
 
 class ShearStage(Stage):
     """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
@@ -67,18 +79,6 @@ class ShearResult(Result):
         from convexrough.plots import shear_figures  # matplotlib: only when it draws
 
         return shear_figures(self.found)
-
-
-#: Largest number of asperities whose loops are computed, unless the scene file names them.
-MOST_LOOPS = 12
-
-#: Most and fewest points of a loop by default, and the limit on touching asperities times points.
-MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
-
-Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
-Chosen = Annotated[
-    Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
-]
 
 
 class CycleStage(Stage):
