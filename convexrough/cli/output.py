@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -102,14 +102,12 @@ class Output:
     formats: Sequence[str] = ("png",)
     dpi: int = 200
 
-    @contextmanager
-    def folder(self, default: Path, **given: Any) -> Iterator[Writer]:
+    def folder(self, default: Path, **given: Any) -> AbstractContextManager[Writer]:
         """The folder --out, or else `default`; further arguments as for `results_folder`."""
         from convexrough.run.results import results_folder
 
         given |= {"force": self.force, "formats": self.formats, "dpi": self.dpi}
-        with results_folder(self.out or default, **given) as new:
-            yield new
+        return results_folder(self.out or default, **given)
 
     def say(
         self, summary: dict[str, Any], lines: Iterable[str], warnings: Iterable[str] = ()

@@ -24,20 +24,12 @@ from convexrough.errors import FileError, blamed_on
 @click.command()
 @click.argument("scene", type=PATH)
 @solver_option
-@click.option(
-    "--within",
-    metavar="PART",
-    type=click.FloatRange(0, min_open=True),
-    default=1e-3,
-    show_default=True,
-    help="Largest difference allowed, as a fraction of the largest load.",
-)
-@click.option(
-    "--log",
-    metavar="FILE",
-    type=PATH,
-    help="Write the iterations of Newton's method and Clarabel to a CSV file.",
-)
+@click.option("--within", metavar="PART", type=click.FloatRange(0, min_open=True), default=1e-3,
+              show_default=True,
+              help="Largest difference allowed, as a fraction of the largest load.")  # fmt: skip
+@click.option("--log", metavar="FILE", type=PATH,
+              help="Write the iterations of Newton's method and Clarabel to a CSV file."
+              )  # fmt: skip
 @output_options("as_json")
 def compare(
     output: Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None

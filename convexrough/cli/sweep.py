@@ -39,19 +39,13 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
-@click.option(
-    "--part", metavar="K/N", callback=_part, help="Compute the K-th of N shares of the scenes."
-)
+@click.option("--part", metavar="K/N", callback=_part,
+              help="Compute the K-th of N shares of the scenes.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
-@click.option(
-    "--scheduler", metavar="ADDRESS", help='Dask scheduler: tcp://..., a file, or "local".'
-)
-@click.option(
-    "--workers",
-    metavar="N",
-    type=click.IntRange(1),
-    help="Number of processes; default: all cores.",
-)
+@click.option("--scheduler", metavar="ADDRESS",
+              help='Dask scheduler: tcp://..., a file, or "local".')  # fmt: skip
+@click.option("--workers", metavar="N", type=click.IntRange(1),
+              help="Number of processes; default: all cores.")  # fmt: skip
 @click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of the results in DIR.")
 @output_options("out", "force", "as_json")
 def sweep(
