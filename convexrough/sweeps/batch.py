@@ -54,8 +54,7 @@ class Tables:
         found: Columns = {}
         for key in self.grid.keys:
             values = [point[key] for point, _ in points]
-            listed = self.grid.listed.get(key, ())
-            if all(isinstance(value, (int, float)) for value in listed):
+            if all(isinstance(it, (int, float)) for it in self.grid.axes.get(key, ())):
                 found[key] = np.array(values, dtype=np.float64)
             else:  # text of lists
                 found[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])

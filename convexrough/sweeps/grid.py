@@ -111,14 +111,14 @@ class Grid(FileTable):
             yield "seeds", "missing, needed with [sweep.draw]"
 
     @property
-    def listed(self) -> dict[str, list[Any]]:
-        """The keys with listed values, and these values."""
+    def axes(self) -> dict[str, list[Any]]:
+        """The keys in `together` and `over`, and their values."""
         return self.together | self.over
 
     @property
     def keys(self) -> list[str]:
         """All swept keys, in the order of the columns."""
-        return [*self.listed, *self.draw]
+        return [*self.axes, *self.draw]
 
     @property
     def each(self) -> int:
@@ -146,11 +146,11 @@ class Grid(FileTable):
         if seed is not None:
             for key, laws in self.draw.items():
                 [(law, parameters)] = laws.items()
-                found[key] = drawn(key, seed, law, *parameters)
+                found[key] = random_value(key, seed, law, *parameters)
         return {key: found[key] for key in self.keys}, seed
 
 
-def drawn(key: str, seed: int, law: Law, first: float, second: float) -> float:
+def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
     """The random value of a key for a seed, which is independent of the values of other keys.
 
     "normal", and the logarithm of "lognormal", are clipped at six standard deviations.

@@ -98,7 +98,7 @@ def plan_of(
     if study is None or mistakes:
         raise SceneFileError(str(path), mistakes)
     own = [tables.get("asperities", {}).get("path")]
-    files = {str(each) for each in grid.listed.get("asperities.path", own) if each is not None}
+    files = {str(each) for each in grid.axes.get("asperities.path", own) if each is not None}
     inputs = {each: digest(path.parent / each) for each in sorted(files)}
     said = {"source": str(path), "text": text, "inputs": inputs}
     lists = [list(getattr(grid, where).items()) for where in WHERE]  # in order
