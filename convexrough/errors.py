@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -131,6 +132,17 @@ class ExtraError(ConvexroughError, ImportError):
         self.extra = extra
         packages = PACKAGES.get(extra, extra)
         super().__init__(f"needs {packages.split()[-1]}: pip install {packages}")
+
+
+def needed(module: str, extra: str = "") -> Any:
+    """The module of an optional package. Raises ExtraError if it is not installed.
+
+    extra : the name of the extra, by default that of the module
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise ExtraError(extra or module) from error
 
 
 class WorkerError(ConvexroughError):

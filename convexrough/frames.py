@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.errors import ExtraError
+from convexrough.errors import needed
 
 if TYPE_CHECKING:
     import pandas
@@ -30,10 +30,15 @@ def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFr
             columns[name] = values
         elif along == (*rows, "direction"):
             columns |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1]}
-    frame: pandas.DataFrame = _loaded("pandas").DataFrame(columns, copy=True)
+    frame: pandas.DataFrame = needed("pandas").DataFrame(columns, copy=True)
     frame.index.name = rows[0]
     frame.attrs.update(attributes)
     return frame
+
+
+def of_rows(columns: Mapping[str, NDArray[Any]], **attributes: Any) -> pandas.DataFrame:
+    """A data frame of columns with equal lengths."""
+    return dataframe({name: (("row",), it) for name, it in columns.items()}, attributes)
 
 
 def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
@@ -41,14 +46,7 @@ def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
     arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
     known = {"x", "y", "asperity"} & set(arrays)
     vectors = any("direction" in along for along, _ in arrays.values())
-    dataset: xarray.Dataset = _loaded("xarray").Dataset(
+    dataset: xarray.Dataset = needed("xarray").Dataset(
         arrays, DIRECTION if vectors else {}, attributes
     )
     return dataset.set_coords(sorted(known))
-
-
-def _loaded(extra: str) -> Any:
-    try:
-        return import_module(extra)
-    except ImportError as error:
-        raise ExtraError(extra) from error

@@ -92,11 +92,16 @@ def limits(
 
 def warnings_of(contact: Contact) -> Iterator[str]:
     """Reasons not to rely on a contact, each a sentence with numbers."""
+    yield from doubts_of(contact)
+    yield from cautions_of(contact)
+
+
+def doubts_of(contact: Contact) -> Iterator[str]:
+    """The reason why a contact is not certified, if it is not."""
     if contact.certificate.scope == "none":
         yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
         yield f"not certified: undecided asperities: {undecided}"
-    yield from cautions_of(contact)
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:

@@ -14,7 +14,7 @@ import numpy as np
 import convexrough as cr
 from convexrough.progress import logged
 from convexrough.run.scene_file import Task
-from convexrough.sweeps.scenes import Ask, Tables
+from convexrough.sweeps.batch import Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -101,7 +101,7 @@ class Deadly(Tables):
 
     worst: int = 0
 
-    def opened(self) -> Ask:
+    def opened(self) -> Callable[[int], Task]:
         ask = super().opened()
 
         def ask_one(number: int) -> Task:

@@ -11,7 +11,7 @@ from convexrough.atomic import replacing, write_text
 from convexrough.bench.measure import TASKS
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.errors import FileError, file_errors
-from convexrough.run.results import write_figures, write_json, write_tables
+from convexrough.run.results import Writer
 from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
 
@@ -91,21 +91,18 @@ def _messages(bench: Bench) -> list[str]:
     return lines
 
 
-def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None) -> list[Path]:
-    """Write bench.json, rows.csv, the figures and, if given, the page; return the paths.
+def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) -> None:
+    """Write bench.json, rows.csv, the figures and, if given, the page.
 
     Raises FileError; files already written remain.
     """
+    new.summary("bench.json", bench.summary())
     rows = [asdict(row) for row in bench.rows]
-    written = write_tables(
-        folder, {"rows": {name: [row[name] for row in rows] for name in rows[0]}}
-    )
+    new.tables({"rows": {name: [row[name] for row in rows] for name in rows[0]}})
     if figures:
-        written += write_figures(folder, _drawn(bench))
-    path = write_json(folder / "bench.json", bench.summary())
+        new.figures(_drawn(bench))
     if page is not None:
-        written += _renew(page, bench)
-    return [path, *written]
+        new.files += _renew(page, bench)
 
 
 def _drawn(bench: Bench) -> dict[str, Figure]:

@@ -1,3 +1,3 @@
-"""The command line: a module for each command, and modules for shared options and output."""
+"""The command line: the program, its commands, and the options and output that they share."""
 
 from convexrough.cli.program import main as main

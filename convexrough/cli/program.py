@@ -17,14 +17,7 @@ from types import FrameType
 import click
 from click.shell_completion import shell_complete
 
-from convexrough.cli.bench import bench
-from convexrough.cli.compare import compare
-from convexrough.cli.export import export
-from convexrough.cli.gallery import gallery
-from convexrough.cli.paper import paper
-from convexrough.cli.proof import check
-from convexrough.cli.run import new, run
-from convexrough.cli.speech import (
+from convexrough.cli.output import (
     DONE,
     INTERRUPTED,
     SOLVER_FAILED,
@@ -32,6 +25,8 @@ from convexrough.cli.speech import (
     WRONG_INPUT,
     say_aside,
 )
+from convexrough.cli.run import check, new, run
+from convexrough.cli.solvers import bench, compare, export, gallery, paper
 from convexrough.cli.summits import summits
 from convexrough.cli.sweep import sweep
 from convexrough.cli.verify import verify

@@ -1,41 +1,35 @@
-"""`run`, which computes a scene file, and `new`, which writes one."""
+"""`run`, which computes a scene file; `new`, which writes one; `check`, which checks its proof."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.atomic import replacing, write_text
-from convexrough.cli.options import PATH, figure_options, html_option, output_options, proof_option
-from convexrough.cli.proof import proved
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say, say_aside, written
+from convexrough.atomic import replacing
+from convexrough.cli.output import (
+    DONE,
+    NOT_CERTIFIED,
+    PATH,
+    Output,
+    html_option,
+    output_options,
+    progress,
+    proof_option,
+    proved,
+    say_aside,
+    written,
+)
 from convexrough.errors import FileError, blamed_on
-
-if TYPE_CHECKING:
-    from convexrough.proof import Proof
-    from convexrough.run.stage import Result
 
 
 @click.command()
 @click.argument("scene", type=PATH)
 @proof_option
 @html_option
-@figure_options
-@output_options
-def run(
-    scene: Path,
-    out: Path | None,
-    no_figures: bool,
-    force: bool,
-    as_json: bool,
-    html: bool,
-    proof: bool,
-    formats: tuple[str, ...],
-    dpi: int,
-) -> int:
+@output_options()
+def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
     """Compute a scene; write tables, certificate and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
@@ -43,11 +37,11 @@ def run(
     `convexrough sweep`.
     """
     from convexrough import checks
-    from convexrough.run.results import origin, results_folder, slider_page, write_results
+    from convexrough.run.results import origin, prove_results, slider_page
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
-        return _swept(scene, out, force, as_json, given=html or proof)
+        return _swept(scene, output, given=html or proof)
     file = read_scene(scene)
     with blamed_on(scene):
         if html:
@@ -56,46 +50,36 @@ def run(
             from convexrough.proof import refuse_many
 
             refuse_many(file.scene)
-    folder = out or Path(f"{scene.stem}-results")
-    with results_folder(folder, force=force, reads=file.inputs, **origin(file)) as new:
+    folder = output.folder(Path(f"{scene.stem}-results"), reads=file.inputs, **origin(file))
+    with folder as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
         for caution in file.cautions(contact):  # before work that may be long, or fail
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
-            for result in results:
-                result.prepare(figures=not no_figures)
-            page = slider_page(results[0]) if html else ""
-        evidence = _proved(results) if proof else None
-        with progress("writing results"):
-            saved: dict[str, Any] = {"formats": formats, "dpi": dpi}
-            files = write_results(new, results, figures=not no_figures, **saved)
-            files.append(write_text(new / "scene.toml", file.text))
-            if html:
-                files.append(write_text(new / "slider.html", page))
-            if evidence is not None:
-                evidence.save(new / "proof.json")
-    status = say(results, as_json, written(folder, files))
+            page = slider_page(results[0]) if html else None
+            new.results(results, figures=not output.no_figures)
+            new.text("scene.toml", file.text)
+            if page is not None:
+                new.text("slider.html", page)
+        evidence = proved(partial(prove_results, results)) if proof else None
+        if evidence is not None:
+            evidence.save(new.path / "proof.json")
+    status = output.say_results(results, written(new))
     if evidence is not None:
-        click.echo(f"{evidence.proved}\nwritten  {folder / 'proof.json'}", err=as_json)
+        output.say_proof(evidence, new.folder)
     return NOT_CERTIFIED if proof and evidence is None else status
 
 
-def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
+def _swept(sweep: Path, output: Output, *, given: bool) -> int:
     from convexrough.cli.sweep import sweep as command
 
     if given:
         raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
-    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json, force=force)
-    status: int = click.get_current_context().invoke(command, **options)
+    own = {"out": output.out, "force": output.force, "as_json": output.as_json}
+    status: int = click.get_current_context().invoke(command, sweep=sweep, **own)
     return status
-
-
-def _proved(results: list[Result]) -> Proof | None:
-    from convexrough.run.proving import prove_results
-
-    return proved(partial(prove_results, results))
 
 
 @click.command()
@@ -114,3 +98,18 @@ def new(scene: Path) -> int:
         temporary.write_text(template, encoding="utf-8")
     click.echo(f"written  {scene}")
     return DONE
+
+
+@click.command()
+@click.argument("proof", type=PATH)
+def check(proof: Path) -> int:
+    """Check the claims of a proof file, in exact arithmetic.
+
+    PROOF is a file that `run --proof` or `verify --proof` wrote. It claims bounds on loads and
+    losses, and statuses of asperities. Exit status: 0 if all claims are proved; 1 if the proof is
+    refused, with the reason; 2 if the file is unreadable. The checker is one file of the package,
+    checker.py, which needs only Python: python checker.py PROOF does the same.
+    """
+    from convexrough import checker
+
+    return checker.main([str(proof)])

@@ -10,12 +10,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from convexrough.cli.options import PATH, figure_options, output_options
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, echo, progress, say_aside, written
+from convexrough.cli.output import (
+    DONE,
+    NOT_CERTIFIED,
+    PATH,
+    Output,
+    output_options,
+    progress,
+    say_aside,
+    written,
+)
 from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
+    from convexrough.run.results import Writer
     from convexrough.scene.asperities import Asperities
     from convexrough.surface import Surface
     from convexrough.surface.report import Scanned
@@ -49,7 +58,7 @@ class Pressing(NamedTuple):
         if self.scene is not None:
             from convexrough.run.scene_file import read_scene, read_study
 
-            unit = read_study(self.scene).units.names.length
+            unit = read_study(self.scene)[0].units.names.length
             if unit and surface.unit:
                 surface = surface.to_unit(unit)
             file = read_scene(self.scene, asperities=surface.summits(prune, fit))
@@ -103,20 +112,14 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Remove hills less prominent than PART of the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
-@figure_options
-@output_options
+@output_options()
 def summits(
+    output: Output,
     surface: Path,
-    out: Path | None,
     prune: float,
     fit: int,
     detrend: Any,
     whole: bool,
-    no_figures: bool,
-    force: bool,
-    as_json: bool,
-    formats: tuple[str, ...],
-    dpi: int,
     **options: Any,
 ) -> int:
     """Find the summits of a measured surface.
@@ -131,7 +134,7 @@ def summits(
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
-    from convexrough.run.results import results_folder, versions
+    from convexrough.run.results import versions
     from convexrough.run.scene_file import digest
     from convexrough.surface import read, report
 
@@ -139,26 +142,26 @@ def summits(
     how.check()
     if whole and how.scene is None and how.radius is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
-    folder = out or Path(f"{surface.stem}-summits")
+    folder = output.out or Path(f"{surface.stem}-summits")
     if folder.suffix.lower() in (".csv", ".npz"):
         raise FileError(f"{folder}: expected the name of a folder, which gets summits.csv")
     reads = [surface, *([how.scene] if how.scene else [])]
     inputs = {str(each): digest(each) for each in reads}
     said: dict[str, Any] = {"inputs": inputs, "versions": versions()}
-    with results_folder(folder, force=force, reads=reads, **said) as new:
+    with output.folder(folder, reads=reads, **said) as new:
         with progress(f"reading {surface}"):
             scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
             with blamed_on(surface):
                 scan, press = how.of(scan, prune, fit)
                 scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
         with progress("writing"):
-            files = _written(new, scanned, figures=not no_figures, formats=formats, dpi=dpi)
-    lines = [*report.describe_surface(scanned), *written(folder, files)]
-    echo(report.surface_summary(scanned), lines, as_json, report.warnings_about(scanned))
+            _write(new, scanned, figures=not output.no_figures)
+    lines = [*report.describe_surface(scanned), *written(new)]
+    output.say(report.surface_summary(scanned), lines, report.warnings_about(scanned))
     if scanned.curve is None:
         say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
     if how.scene is not None and (other := _other_table(how.scene, folder / "summits.csv")):
-        table = files[0].name
+        table = new.files[0].name
         say_aside("hint", f"{how.scene} reads {other}, which is not {folder / table}")
     return DONE if scanned.certified else NOT_CERTIFIED
 
@@ -167,27 +170,25 @@ def _other_table(scene: Path, table: Path) -> str:
     """The table of asperities that a scene file names, if it is not `table`; else ""."""
     from convexrough.run.scene_file import read_study
 
-    layout = read_study(scene).asperities
+    layout = read_study(scene)[0].asperities
     if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
         return ""
     return layout.path
 
 
-def _written(folder: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """Write the table of summits, the results against pruning, summary and figures; the paths."""
-    from convexrough.run.results import write_figures, write_json, write_tables
+def _write(new: Writer, scanned: Scanned, *, figures: bool) -> None:
+    """Write the table of summits, the results against pruning, a summary and figures."""
     from convexrough.surface.report import summit_columns, surface_summary
 
-    tables = {"summits": summit_columns(scanned.summits)}
+    new.tables({"summits": summit_columns(scanned.summits)})
     if scanned.curve is not None:
-        tables["provability"] = scanned.curve.columns()
-    files = write_tables(folder, tables)
-    files.append(write_json(folder / "summary.json", surface_summary(scanned)))
+        new.tables({"provability": scanned.curve.columns()})
+    new.summary("summary.json", surface_summary(scanned))
     if figures:
         from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
 
-        pictures = surface_figures(
-            scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
+        new.figures(
+            surface_figures(
+                scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
+            )
         )
-        files += write_figures(folder, pictures, **saved)
-    return files

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.cli.options import PATH, force_option, json_option, out_option
-from convexrough.cli.speech import (
+from convexrough.cli.output import (
     DONE,
     INTERRUPTED,
     NOT_CERTIFIED,
+    PATH,
     SOLVER_FAILED,
-    echo,
+    Output,
+    output_options,
     progress,
     say_aside,
     written,
@@ -38,33 +39,23 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
-@json_option
-@click.option(
-    "--part", metavar="K/N", callback=_part, help="Compute the K-th of N shares of the scenes."
-)
-@force_option
+@click.option("--part", metavar="K/N", callback=_part,
+              help="Compute the K-th of N shares of the scenes.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
-@click.option(
-    "--scheduler", metavar="ADDRESS", help='Dask scheduler: tcp://..., a file, or "local".'
-)
-@click.option(
-    "--workers",
-    metavar="N",
-    type=click.IntRange(1),
-    help="Number of processes; default: all cores.",
-)
+@click.option("--scheduler", metavar="ADDRESS",
+              help='Dask scheduler: tcp://..., a file, or "local".')  # fmt: skip
+@click.option("--workers", metavar="N", type=click.IntRange(1),
+              help="Number of processes; default: all cores.")  # fmt: skip
 @click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of the results in DIR.")
-@out_option
+@output_options("out", "force", "as_json")
 def sweep(
+    output: Output,
     sweep: Path | None,
-    out: Path | None,
     summary: Path | None,
     workers: int | None,
     scheduler: str | None,
     resume: bool,
-    force: bool,
     part: tuple[int, int] | None,
-    as_json: bool,
 ) -> int:
     """Compute every scene of a sweep file.
 
@@ -80,31 +71,32 @@ def sweep(
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")
     if summary is not None:
-        return _say_summary(summary, out, as_json, overwrite=force)
+        return _say_summary(summary, output)
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
-    if resume and force:
+    if resume and output.force:
         raise click.UsageError("--resume and --force exclude each other.")
     from convexrough.errors import WorkerError
-    from convexrough.sweeps.file import read_sweep
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
-    from convexrough.sweeps.sweep import run
+    from convexrough.sweeps.sweep import read_sweep, run
 
     assert sweep is not None  # one of the two
-    folder = out or Path(f"{sweep.stem}-sweep")
+    folder = output.out or Path(f"{sweep.stem}-sweep")
     with progress("reading the first scene"):
         plan = read_sweep(sweep)
     try:
         with progress(str(sweep)), _executor(workers, scheduler) as executor:
-            done = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
+            table, did = run(
+                plan, executor, out=folder, resume=resume, overwrite=output.force, part=part
+            )
     except KeyboardInterrupt:
         say_aside("interrupted", progress_kept(folder, plan))
         return INTERRUPTED
     except WorkerError as error:
         say_aside("error", str(error), progress_kept(folder, plan))
         return SOLVER_FAILED
-    said = summarise(done.table, done)
-    echo(said, describe(said), as_json, (*failures(done.table), *cautions(done.table)))
+    said = summarise(table, **did)
+    output.say(said, describe(said), (*failures(table), *cautions(table)))
     return _status(said)
 
 
@@ -114,7 +106,7 @@ def _executor(workers: int | None, scheduler: str | None) -> AbstractContextMana
     return Processes(workers) if scheduler is None else dask(scheduler)
 
 
-def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bool) -> int:
+def _say_summary(folder: Path, output: Output) -> int:
     from convexrough.record import rows_of
     from convexrough.sweeps import report
     from convexrough.sweeps.table import open_sweep
@@ -124,11 +116,11 @@ def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bo
         said = report.summarise(table)
         found = table.quantiles(at=report.AT)
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
-    if out is not None:
-        with progress("writing results"):
-            lines += written(out, report.write_summary(out, table, found, overwrite=overwrite))
-        lines += report.figures_left_out(table)
-    echo({**said, "quantiles": rows_of(found)}, lines, as_json)
+    if output.out is not None:
+        with progress("writing results"), output.folder(output.out) as new:
+            report.write_summary(new, table, found)
+        lines += [*written(new), *report.figures_left_out(table)]
+    output.say({**said, "quantiles": rows_of(found)}, lines)
     return _status(said)
 
 

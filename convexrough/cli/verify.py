@@ -11,19 +11,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.atomic import write_text
-from convexrough.cli.options import (
-    PATH,
-    force_option,
-    json_option,
-    out_option,
-    proof_option,
-)
-from convexrough.cli.proof import proved
-from convexrough.cli.speech import (
+from convexrough.cli.output import (
     DONE,
     NOT_CERTIFIED,
-    echo,
+    PATH,
+    Output,
+    output_options,
     progress,
+    proof_option,
+    proved,
     say_aside,
     written,
 )
@@ -31,6 +27,7 @@ from convexrough.errors import ConvexroughError, FileError, InputError, blamed_o
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof
+    from convexrough.run.results import Writer
     from convexrough.run.scene_file import SceneFile
     from convexrough.verdict.claims import Manner
     from convexrough.verdict.report import Verified
@@ -85,12 +82,11 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
 @click.option("--shear-force", metavar="Q", type=float,
               help="Prescribed total of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
-@out_option
-@force_option
 @click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML.")
 @proof_option
-@json_option
+@output_options("out", "force", "as_json")
 def verify(
+    output: Output,
     scene: Path,
     loads: Path,
     *,
@@ -98,10 +94,7 @@ def verify(
     shear: Path | None,
     shear_force: float | None,
     explain: bool,
-    out: Path | None,
-    force: bool,
     junit: Path | None,
-    as_json: bool,
     proof: bool,
     **how: Any,
 ) -> int:
@@ -120,24 +113,23 @@ def verify(
     With --explain nothing is checked, and the status is 0 if the files can be read.
     """
     from convexrough.plausibility import cautions_about
-    from convexrough.run.results import results_folder
+    from convexrough.run.results import headed
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages.normal import describe, judged_loads
-    from convexrough.run.summary import headed
     from convexrough.verdict import report
     from convexrough.verdict.claims import read_loads, read_shear_forces
     from convexrough.verdict.files import verify_files
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
-    if explain and (out or junit or proof):
+    if explain and (output.out or junit or proof):
         raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
     if junit is not None and junit.suffix.lower() != ".xml":
         found_ending = junit.suffix or "no ending"
         raise FileError(f"--junit {junit}: found {found_ending}, expected .xml")
-    alone = [Path("proof.json")] if proof and out is None else []
+    alone = [Path("proof.json")] if proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
-        if each.exists() and not force:
+        if each.exists() and not output.force:
             raise FileError(f"{each}: exists already; --force replaces it")
         with file_errors(each, "be written"):
             each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
@@ -156,11 +148,10 @@ def verify(
                 for line in (f"{path}:", *each.explained, "")
             ]
             lines += report.describe_scene(file.scene)
-            echo({"read": lines}, lines, as_json)
+            output.say({"read": lines}, lines)
             return DONE
         inputs: list[str | Path] = [*file.inputs, loads, *([shear] if shear else [])]
-        made = results_folder(out, force=force, reads=inputs) if out is not None else None
-        new = stack.enter_context(made) if made else None
+        new = stack.enter_context(output.folder(output.out, reads=inputs)) if output.out else None
         with progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
@@ -170,16 +161,17 @@ def verify(
         normal = judged_loads(found.verdict.certificate, found.verdict.loads)
         summary = headed(normal=normal) | report.verdict_summary(found)
         evidence = proved(partial(_proof, file, found, scene)) if proof else None
-        files = [] if new is None else _written(new, summary, found)
+        if new is not None:
+            _write(new, summary, found)
         if evidence is not None:
-            evidence.save((new or Path()) / "proof.json")
+            evidence.save((new.path if new else Path()) / "proof.json")
     if junit is not None:
         write_text(junit, report.junit(found, names))
     lines = report.describe_verdict(found)
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
-    lines += written(out, files) if out is not None else []
+    lines += written(new) if new else []
     claimed = found.verdict.loads * found.verdict.claimed
-    echo(summary, lines, as_json, cautions_about(file.scene, claimed))
+    output.say(summary, lines, cautions_about(file.scene, claimed))
     for claim in found.claims:
         for hint in claim.hints():
             say_aside("hint", hint)
@@ -187,8 +179,7 @@ def verify(
         reasons = filter(None, map(report.reason, found.claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")
     if evidence is not None:
-        place = (out or Path()) / "proof.json"
-        click.echo(f"{evidence.proved}\nwritten  {place}", err=as_json)
+        output.say_proof(evidence, output.out or Path())
     return DONE if found.holds and (evidence is not None or not proof) else NOT_CERTIFIED
 
 
@@ -205,17 +196,13 @@ def _reported(path: Path | None, files: str) -> Iterator[None]:
         raise
 
 
-def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Path]:
+def _write(new: Writer, summary: dict[str, Any], found: Verified) -> None:
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
-    from convexrough.run.results import write_figures, write_json, write_tables
     from convexrough.verdict.report import asperity_columns
 
-    figures = verdict_figures(found.verdict, found.sheared)
-    return [
-        write_json(folder / "verdict.json", summary),
-        *write_tables(folder, {"verdict": asperity_columns(found)}),
-        *write_figures(folder, figures),
-    ]
+    new.summary("verdict.json", summary)
+    new.tables({"verdict": asperity_columns(found)})
+    new.figures(verdict_figures(found.verdict, found.sheared))
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -278,3 +281,17 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
 
     axis.set_major_formatter(said)
     return f"{name}  [{literal(length.said)}]"
+
+
+def _draw_summits(summits: Summits, axes: Axes) -> None:
+    every = np.ones(len(summits), dtype=bool)
+    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
+    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
+
+
+#: The function that draws each kind of result.
+PICTURES: dict[type, Callable[..., Any]] = {
+    Surface: lambda it, axes: draw_surface(axes, it),
+    Summits: _draw_summits,
+    Provability: lambda it, axes: draw_provability(axes, it),
+}

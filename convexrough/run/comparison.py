@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from convexrough.compare import CARRIES, Comparison, Entry
+from convexrough.run.results import headed
 from convexrough.run.stage import Summary, unit_of
 from convexrough.run.stages.normal import COUNTS
-from convexrough.run.summary import headed
 from convexrough.tabular.columns import aligned, bound
 from convexrough.tabular.units import UnitNames
 

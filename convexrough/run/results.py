@@ -1,9 +1,10 @@
-"""The results folder, which is written under a temporary name and then renamed.
+"""Results as a summary, a report and warnings, and the folder to which they are written.
 
-If the folder exists already, the complete new files are moved into it one by one, `files.json`
-last. A folder with contents is accepted only with `force`. Before the move, `files.json` of
-the earlier run is deleted, and then the files that it lists. Other files stay. If the process dies
-while files are moved, the folder has only some of the new files, and no `files.json`.
+The folder is written under a temporary name and then renamed. If it exists already, the complete
+new files are moved into it one by one, `files.json` last. A folder with contents is accepted only
+with `force`. Before the move, `files.json` of the earlier run is deleted, and then the files that
+it lists. Other files stay. If the process dies while files are moved, the folder has only some of
+the new files, and no `files.json`.
 """
 
 from __future__ import annotations
@@ -23,13 +24,19 @@ import numpy as np
 
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError, file_errors
+from convexrough.friction.shear import shear
 from convexrough.progress import LOGGER
 from convexrough.run.scene_file import SceneFile
-from convexrough.run.stage import Result, Summary
-from convexrough.run.summary import headed, summarise
+from convexrough.run.stage import Result, Summary, limit
+from convexrough.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from convexrough.proof import Proof
+
+#: Version of the keys of summary.json and of the columns of tables.
+SCHEMA = 2
 
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
@@ -40,15 +47,123 @@ MANIFEST = "files.json"
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
+#: The proof leaves out shear forces of at least this fraction of the limit, where all slide.
+BELOW_LIMIT = 1 - 1e-9
+
+
+def headed(**contents: Any) -> Summary:
+    """A summary of these contents, with the schema and the version of the package."""
+    return {"schema": SCHEMA, "version": __version__, **contents}
+
+
+def summarise(results: Iterable[Result]) -> Summary:
+    """The contents of summary.json, which `--json` prints, in the scene's units."""
+    return headed(**{result.name: result.summary() for result in results})
+
+
+def describe(results: Iterable[Result]) -> list[str]:
+    """The printed report of all stages, in aligned lines."""
+    first, *others = results
+    return [*first.lines(), *(line for it in others for line in ("", *it.lines()))]
+
+
+def warnings(results: Iterable[Result]) -> Iterator[str]:
+    """Warnings about results that are not proved and about limits of the model."""
+    for result in results:
+        yield from result.doubts()
+        yield from result.cautions()
+
+
+def prove_results(results: Sequence[Result]) -> Proof:
+    """The proof of the contact, and of its states at each shear force and each cycle's amplitude.
+
+    Raises InputError for scenes too large for exact arithmetic, ProofError if a proof fails.
+    """
+    contact = results[0].contact
+    most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
+    forces = sorted({force for result in results for force in result.proved_forces()})
+    return contact.proof(sheared=[shear(contact, force=it) for it in forces if 0 < it < most])
+
+
+class Writer:
+    """A folder of results that receives files.
+
+    folder  : the folder;  path : its temporary name;  files : the files written so far
+    formats : endings of figures;  dpi : pixels per inch of figures
+
+    All methods raise FileError if a file cannot be written.
+    """
+
+    def __init__(self, folder: Path, path: Path, formats: Sequence[str], dpi: int) -> None:
+        self.folder, self.path, self.formats, self.dpi = folder, path, formats, dpi
+        self.files: list[Path] = []
+
+    def text(self, name: str, text: str | bytes) -> None:
+        """Write a text, or bytes."""
+        self.files.append(write_text(self.path / name, text))
+
+    def summary(self, name: str, summary: Summary) -> None:
+        """Write a summary as JSON."""
+        self.text(name, to_json(summary) + "\n")
+
+    def tables(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
+        """Write each table of columns as NAME.csv, or as .npz if it has many rows; no loss."""
+        for name, columns in tables.items():
+            arrays = [np.asarray(values) for values in columns.values()]
+            path = self.path / f"{name}.csv"
+            if len(arrays[0]) > MOST_CSV_ROWS:
+                path = path.with_suffix(".npz")
+                with replacing(path) as temporary, temporary.open("wb") as file:
+                    np.savez(file, **columns)
+            else:
+                write_rows(path, [columns, *zip(*(it.tolist() for it in arrays), strict=True)])
+            self.files.append(path)
+
+    def figures(self, figures: Mapping[str, Figure]) -> None:
+        """Write each figure in each format."""
+        from convexrough.plots import save  # matplotlib: only when it draws
+
+        for stem, figure in figures.items():
+            for kind in self.formats:
+                path = self.path / f"{stem}.{kind}"
+                with replacing(path) as temporary:
+                    save(figure, temporary, kind, self.dpi)
+                self.files.append(path)
+                figure.set_layout_engine("none")  # the layout is the same in all formats
+
+    def results(
+        self, results: Sequence[Result], *, figures: bool, more: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write summary.json, to which `more` is added, all tables, and the figures if asked.
+
+        Everything is computed before the first file is written.
+        """
+        tables = [result.tables() for result in results]
+        drawn = [result.figures() for result in results] if figures else []
+        self.summary("summary.json", summarise(results) | dict(more or {}))
+        for result, each in zip(results, tables, strict=True):
+            LOGGER.info(f"writing {result.name}")
+            self.tables(each)
+        for result, some in zip(results, drawn, strict=False):
+            LOGGER.info(f"drawing {result.name}")
+            self.figures(some)
+
 
 @contextmanager
 def results_folder(
-    folder: Path, *, force: bool, reads: Iterable[str | Path] = (), **said: Any
-) -> Iterator[Path]:
+    folder: Path,
+    *,
+    force: bool,
+    reads: Iterable[str | Path] = (),
+    formats: Sequence[str] = ("png",),
+    dpi: int = 200,
+    **said: Any,
+) -> Iterator[Writer]:
     """A temporary folder; if the body succeeds, it becomes `folder`, or its files move there.
 
     force : accept a folder with contents
     reads : files that the body reads; none of them may be in `folder`
+    formats, dpi : of figures
     said  : entries of `files.json` in addition to the names of the files written
 
     Raises FileError, before the body runs, if `folder` cannot be written or replaced.
@@ -68,9 +183,9 @@ def results_folder(
             raise FileError(f"{folder}: not empty; {advice}")
         new.mkdir()
         try:
-            yield new
+            yield Writer(folder, new, formats, dpi)
             names = sorted(path.name for path in new.iterdir())
-            write_json(new / MANIFEST, headed(files=names, **said))
+            write_text(new / MANIFEST, to_json(headed(files=names, **said)) + "\n")
             _moved(new, folder)
         finally:
             shutil.rmtree(new, ignore_errors=True)
@@ -114,34 +229,6 @@ def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in NUMERICAL}
 
 
-def write_results(
-    folder: Path,
-    results: Sequence[Result],
-    *,
-    figures: bool,
-    more: Mapping[str, Any] | None = None,
-    **saved: Any,
-) -> list[Path]:
-    """Write all tables, figures and summary.json; return the paths.
-
-    more  : further entries of summary.json
-    saved : `formats` and `dpi` of figures, as for `write_figures`
-
-    Raises FileError if a file cannot be written.
-    """
-    written = []
-    for result in results:
-        LOGGER.info(f"writing {result.name}")
-        written += write_tables(folder, result.tables())
-    if figures:
-        for result in results:
-            LOGGER.info(f"drawing {result.name}")
-            written += write_figures(folder, result.figures(), **saved)
-    path = folder / "summary.json"
-    write_json(path, summarise(results) | dict(more or {}))
-    return [path, *written]
-
-
 def slider_page(pressed: Result) -> str:
     """An HTML page with a slider for the shear force, and the friction states computed for it.
 
@@ -152,50 +239,7 @@ def slider_page(pressed: Result) -> str:
     return slider_html(Slides.of(pressed.contact), pressed.lines())
 
 
-def write_json(path: Path, summary: Summary) -> Path:
-    """Write a summary; return the path."""
-    return write_text(path, to_json(summary) + "\n")
-
-
-def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
-    """Write each table of columns as NAME.csv; return the paths."""
-    return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
-
-
-def write_figures(
-    folder: Path,
-    figures: Mapping[str, Figure],
-    *,
-    formats: Sequence[str] = ("png",),
-    dpi: int = 200,
-) -> list[Path]:
-    """Write each figure in each format; return the paths."""
-    from convexrough.plots import save  # matplotlib: only when it draws
-
-    written = []
-    for stem, figure in figures.items():
-        for kind in formats:
-            path = folder / f"{stem}.{kind}"
-            with replacing(path) as temporary:
-                save(figure, temporary, kind, dpi)
-            written.append(path)
-            figure.set_layout_engine("none")  # the layout is the same in all formats: saves time
-    return written
-
-
-def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
-    """Write columns as CSV, or as .npz if there are many rows, without loss; return the path."""
-    arrays = [np.asarray(values) for values in columns.values()]
-    if len(arrays[0]) > MOST_CSV_ROWS:
-        path = path.with_suffix(".npz")
-        with replacing(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, **columns)
-        return path
-    write_rows(path, [list(columns), *zip(*(each.tolist() for each in arrays), strict=True)])
-    return path
-
-
-def write_rows(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
+def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> Path:
     """Write rows as CSV, with floats in full precision; return the path."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)

@@ -9,32 +9,42 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough.arrays import Array
 from convexrough.contact import Contact, assembled, solve
 from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
-from convexrough.run.tables import read_summits, read_text
 from convexrough.scene.asperities import CUT_DEVIATIONS, Asperities, largest_tip_radius
 from convexrough.scene.base import checked
-from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
-from convexrough.tabular.table import Reading, few, named_columns
+from convexrough.tabular.arrays import reading
+from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, few, named_columns, read_table
+from convexrough.tabular.text import bare
 from convexrough.tabular.toml_slips import explained
+from convexrough.tabular.units import parsed
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
     from convexrough.run.study import LatticeTable, Study
 
+#: Names of columns with results, which are ignored in a table of asperities.
+RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
+
+#: Relative rounding error that is allowed for means and sums in the last row of a table.
+ROUNDED = 1e-3
 
 #: Number of mistakes in a scene file that are reported one by one; further ones are counted.
 MOST_MISTAKES = 50
-
 
 #: [bytes] size of the largest accepted scene file.
 MOST_BYTES = 2**25
@@ -46,6 +56,70 @@ SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
+
+
+def unknown(column: str) -> bool:
+    """True if a column with this header may contain the heights."""
+    return bare(column).lower() not in (*INDEX, *RESULTS)
+
+
+def read_summits(
+    path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
+) -> Asperities:
+    """Asperities from the columns x and y of a file, and height (or z) and tip_radius if present.
+
+    tip_radius : [length] one number or (n,), if the file has no column tip_radius; else None
+    """
+    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
+    columns = table.columns
+    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
+    if "height" not in columns and unread:
+        named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
+        raise InputError("columns", found=f"{', '.join(unread)}, but no height",
+                         expected=f"a column height; {named}", where=str(path))  # fmt: skip
+    for name, said in table.units.items():
+        if parsed(said) and not how.units.length:
+            expected = f'[units] length in the scene file, as "{said}"'
+            raise InputError(f"column {name}", found=f"{said}, and a scene without units",
+                             expected=expected, where=str(path))  # fmt: skip
+    for name, cells in table.others.items():
+        if bare(name).lower() in INDEX and is_permuted(cells):
+            found = f"{cells[0]:g}, {cells[1]:g}, ..."
+            expected = "the rows in increasing order, or no such column"
+            raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
+    if what := _summary_in_last_row([*columns.values()]):
+        raise InputError(table.rows[-1], found=f"the {what} of the other rows",
+                         expected="an asperity: remove this row", where=str(path))  # fmt: skip
+    given = columns.get("tip_radius")
+    if (given is None) == (tip_radius is None):
+        found = "neither" if given is None else "both"
+        expected = "either a column tip_radius or the key tip_radius in the scene file"
+        raise InputError("tip radii", found=found, expected=expected, where=str(path))
+    positions = np.column_stack((columns["x"], columns["y"]))
+    radii = tip_radius if given is None else given
+    assert radii is not None  # one of the two
+    with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
+        return Asperities(positions, radii, columns.get("height", 0.0))
+
+
+def _summary_in_last_row(columns: list[Array]) -> str:
+    """ "means" or "sums" if the last row has those of the rows above in all columns; else ""."""
+    own = columns[2:]
+    if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
+        return ""  # the middle of a regular array is its mean
+    for what, of in (("means", np.mean), ("sums", np.sum)):
+        if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
+            return what
+    return ""
+
+
+def is_permuted(cells: NDArray[Any]) -> bool:
+    """True if the cells are the numbers 0, 1, ... or 1, 2, ... in another order."""
+    if cells.dtype.kind != "f" or len(cells) < 2:
+        return False
+    ordered = np.sort(cells)
+    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
+    return bool(counts and (ordered != cells).any())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -125,8 +199,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     if not isinstance(path, (str, os.PathLike)):
         raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
     path = Path(path)
-    text = read_text(path, MOST_BYTES)
-    study = _study(path, text)
+    study, text = read_study(path)
     if asperities is not None:
         from convexrough.surface.summits import Summits  # only for maps
 
@@ -149,18 +222,15 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     )
 
 
-def read_study(path: Path) -> Study:
-    """The checked tables of a scene file. Raises FileError and SceneFileError."""
-    return _study(path, read_text(path, MOST_BYTES))
-
-
-def _study(path: Path, text: str) -> Study:
+def read_study(path: Path) -> tuple[Study, str]:
+    """The checked tables of a scene file, and its text. Raises FileError and SceneFileError."""
     from convexrough.run.study import validate
 
-    study, mistakes = validate(parsed(path, text))
+    text = read_text(path)
+    study, mistakes = validate(tables_of(path, text))
     if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
-    return study
+    return study, text
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
@@ -181,7 +251,16 @@ def digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def parsed(path: Path, text: str) -> dict[str, Any]:
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, with or without a byte-order mark. Raises FileError."""
+    with reading(path), path.open("rb") as file:
+        contents = file.read(MOST_BYTES + 1)
+        if len(contents) > MOST_BYTES:
+            raise FileError(f"{path}: more than {MOST_BYTES / 2**20:g} MiB")
+        return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
+
+
+def tables_of(path: Path, text: str) -> dict[str, Any]:
     """The tables of a file with this text. Raises FileError if it is not TOML, or empty."""
     if key := _DOTTED.search(text):
         line = text.count("\n", 0, key.start()) + 1
@@ -197,43 +276,36 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
 
 def has_sweep(path: Path) -> bool:
     """True if a scene file has a table [sweep]."""
-    text = read_text(path, MOST_BYTES)
-    return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in parsed(path, text)
+    text = read_text(path)
+    return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in tables_of(path, text)
 
 
-class Layouts(NamedTuple):
-    """Functions that make asperities.
-
-    summits : reads asperities from a file;  regular : makes a pattern, without random parts
-    """
-
-    summits: Callable[..., Asperities]
-    regular: Callable[[str, float, float | tuple[float, ...], float], Asperities]
-
-
-def _regular(
+def regular(
     pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
 ) -> Asperities:
+    """Asperities in a pattern, without random parts."""
     make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
 
 
-READ = Layouts(read_summits, _regular)
-
-
 def task_of(
-    path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
+    path: Path,
+    study: Study,
+    *,
+    asperities: Asperities | None = None,
+    summits: Callable[..., Asperities] = read_summits,
+    lattice: Callable[..., Asperities] = regular,
 ) -> Task:
     """The scene and the stages described by tables that have been checked.
 
     path    : the scene file, for messages; paths in the tables are relative to its folder
-    layouts : functions that make the asperities
     asperities : asperities that replace those of the tables
+    summits, lattice : functions like `read_summits` and `regular`, which make the asperities
 
     Raises InputError for mistakes that the tables alone do not show.
     """
     with _blamed_on(path, "material"):
-        stuff = _material(study)
+        stuff = study.material.made()
 
     def press_on(asperities: Asperities) -> Scene:
         return Scene(
@@ -256,9 +328,9 @@ def task_of(
                 convert=study.units.convert,
             )
             place = path.parent / layout.path
-            scene = press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how))
+            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=how))
         else:
-            scene, highest = _lattice(layout, study, press_on, layouts)
+            scene, highest = _lattice(layout, study, press_on, lattice)
     return Task(
         scene=scene,
         approach=study.normal.approach,
@@ -270,22 +342,11 @@ def task_of(
     )
 
 
-def _material(study: Study) -> Material:
-    from convexrough.run.study import BodiesTable
-
-    def of(body: Any) -> Material:
-        return Material.from_youngs(body.youngs_modulus, body.poisson_ratio, body.hardness)
-
-    table = study.material
-    if isinstance(table, BodiesTable):
-        return Material.pair(of(table.sphere), of(table.base))
-    if table.youngs_modulus is not None:
-        return of(table)
-    return Material(table.contact_modulus, table.poisson_ratio, table.hardness)
-
-
 def _lattice(
-    layout: LatticeTable, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
+    layout: LatticeTable,
+    study: Study,
+    press_on: Callable[[Asperities], Scene],
+    lattice: Callable[..., Asperities],
 ) -> tuple[Scene, float | None]:
     """The scene with asperities up to the distance `within`, or with all that could touch.
 
@@ -296,7 +357,7 @@ def _lattice(
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:
-        asperities = layouts.regular(layout.pattern, layout.spacing, tip_radius, within)
+        asperities = lattice(layout.pattern, layout.spacing, tip_radius, within)
         rough = asperities.roughened(
             height_std=layout.height_std, tip_radius_cv=layout.tip_radius_cv, seed=layout.seed
         )

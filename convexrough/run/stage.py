@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
+from convexrough import checks, frames
 from convexrough.contact import Contact
 from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
 from convexrough.plottable import Plottable
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
+Labels = Mapping[str, Sequence[float]]
 
 #: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
@@ -61,13 +62,16 @@ class Stage(FileTable):
     name       : name of the table
     frictional : True if it needs the table [friction]
     numbers    : names of the numbers in a row of its result
-    labels     : names of the numbers that identify a row, if there are several rows
     """
 
     name: ClassVar[str]
     frictional: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ()
-    labels: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def labels(self) -> Labels:
+        """The numbers that identify the rows of the result, by name, if there are several rows."""
+        return {}
 
     @property
     def highest_load(self) -> float:
@@ -160,7 +164,12 @@ class Result(Table, Plottable):
 
     def rows(self) -> list[Summary]:
         """Rows of numbers and texts by key; by default one row for each object in `found`."""
-        return [numbers_of(each, self.stage.numbers) for each in self.found]
+        labels = self.stage.labels
+        return [
+            {name: values[k] for name, values in labels.items()}
+            | numbers_of(each, self.stage.numbers)
+            for k, each in enumerate(self.found)
+        ]
 
     @cached_property
     def known(self) -> list[Summary]:
@@ -182,6 +191,14 @@ class Result(Table, Plottable):
             why = "it is proved for one step only that indentations increase with the load"
             yield f"not proved: the losses of [{self.name}], as {why}"
 
+    def cautions(self) -> Iterator[str]:
+        """Warnings about limits of the model."""
+        yield from ()
+
+    def proved_forces(self) -> Iterator[float]:
+        """[force] the shear forces at which `run --proof` proves the friction state."""
+        yield from ()
+
     @property
     def orders(self) -> set[str]:
         """The set of the attributes `order` (docs/theory/states.md) of the objects in `found`."""
@@ -196,13 +213,15 @@ class Result(Table, Plottable):
         """The tables to write: for each file name without its ending, the columns by name."""
         return {self.name: columns_of(self.known)}
 
+    def stacked(self, tables: Sequence[Columns]) -> Columns:
+        """The tables of all rows one below the other, with the labels of the rows in front."""
+        counts = [len(next(iter(each.values()))) for each in tables]
+        left = {name: np.repeat(it, counts) for name, it in self.stage.labels.items()}
+        return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
+
     def figures(self) -> Mapping[str, Figure]:
         """The figures to write, by the file name without its ending."""
         return {}
-
-    def prepare(self, *, figures: bool) -> None:
-        """Compute all that tables and figures need, so that writing them solves nothing."""
-        self.tables()
 
     def lines(self) -> list[str]:
         """The lines of the printed table and of what is proved about its order."""
@@ -235,10 +254,7 @@ class Result(Table, Plottable):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The first table as a pandas DataFrame."""
-        from convexrough.frames import dataframe
-
-        columns = next(iter(self.tables().values()))
-        return dataframe({name: (("row",), it) for name, it in columns.items()}, {})
+        return frames.of_rows(next(iter(self.tables().values())))
 
 
 class Steps(Result):
@@ -247,33 +263,18 @@ class Steps(Result):
     steps = True
 
     def rows(self) -> list[Summary]:
-        return rows_of(self.columns_of_steps())
-
-    def columns_of_steps(self) -> Columns:
-        """Each number of the stage as an array with an entry for each step, by name."""
         (found,) = self.found
-        arrays = {singular(name): name for along in found._along.values() for name in along}
-        return {
-            name: number(found, name) if name in STATUSES else getattr(found, arrays[name])
-            for name in self.stage.numbers
-        }
-
-    @cached_property
-    def fine(self) -> Any:
-        """The path of this result with intermediate points, for figures."""
-        from convexrough.plots.points_between import between  # matplotlib: only when it draws
-
-        return between(self.found[0])
-
-    def prepare(self, *, figures: bool) -> None:
-        super().prepare(figures=figures)
-        if figures:
-            _ = self.fine
+        plural = {singular(name): name for names in found._along.values() for name in names}
+        return rows_of({
+            **{name: np.array(values) for name, values in self.stage.labels.items()},
+            **{name: number(found, plural.get(name, name)) for name in self.stage.numbers},
+        })  # fmt: skip
 
     def figures(self) -> Mapping[str, Figure]:
-        from convexrough.plots import path_figures  # matplotlib: only when it draws
+        from convexrough.plots import between, path_figures  # matplotlib: only when it draws
 
-        return path_figures(self.found[0], fine=self.fine)
+        (found,) = self.found
+        return path_figures(found, fine=between(found))
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""
@@ -295,13 +296,6 @@ def plain(value: Any) -> Any:
 
 def columns_of(rows: Sequence[Summary]) -> Columns:
     return {key: np.array([row[key] for row in rows]) for key in rows[0]} if rows else {}
-
-
-def repeated(labels: Columns, tables: Sequence[Columns]) -> Columns:
-    """The tables one below the other, with the columns `labels`, an entry for each table, added."""
-    count = len(next(iter(tables[0].values())))
-    left = {name: np.repeat(values, count) for name, values in labels.items()}
-    return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
 
 def unit_of(name: str, units: UnitNames) -> str:

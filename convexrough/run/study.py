@@ -33,6 +33,7 @@ from convexrough.run.values import (
     expected,
     phrased,
 )
+from convexrough.scene.material import Material
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
@@ -57,11 +58,20 @@ class MaterialTable(FileTable):
     poisson_ratio: Ratio
     hardness: Positive | None = None
 
+    def made(self) -> Material:
+        if self.youngs_modulus is not None:
+            return Material.from_youngs(self.youngs_modulus, self.poisson_ratio, self.hardness)
+        assert self.contact_modulus is not None  # one of the two
+        return Material(self.contact_modulus, self.poisson_ratio, self.hardness)
+
 
 class BodyTable(FileTable):
     youngs_modulus: Positive
     poisson_ratio: Ratio
     hardness: Positive | None = None
+
+    def made(self) -> Material:
+        return Material.from_youngs(self.youngs_modulus, self.poisson_ratio, self.hardness)
 
 
 class BodiesTable(FileTable):
@@ -70,6 +80,9 @@ class BodiesTable(FileTable):
     elsewhere = ("two bodies", frozenset(MaterialTable.model_fields))
     sphere: BodyTable
     base: BodyTable
+
+    def made(self) -> Material:
+        return Material.pair(self.sphere.made(), self.base.made())
 
 
 class SummitsTable(FileTable):

@@ -1,29 +1,122 @@
-"""Batches: consecutive scenes that one worker computes, and their rows of the sweep's table."""
+"""The scenes of a sweep, and the batches of consecutive scenes that one worker computes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from convexrough.run.scene_file import Task
-from convexrough.sweeps.measures import FAILURES, Column, Measured, measured
-from convexrough.sweeps.scenes import Source
-from convexrough.sweeps.together import measured_together
+from convexrough.errors import SceneFileError
+from convexrough.run.scene_file import Task, read_summits, regular, task_of
+from convexrough.run.study import LatticeTable, Study, validate
+from convexrough.sweeps.grid import Grid, table_in, with_values
+from convexrough.sweeps.measures import FAILURES, Column, Measured, measured, measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 
 #: Versions of the packages on which the last bits of rows depend.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
+#: Number of layouts (exact positions) of asperities that the cache keeps.
+KEPT = 8
+
+#: The entry of the column `seed` if nothing is random.
+NO_SEED = -1
+
 Columns = dict[str, NDArray[Any]]
 
 #: A row of the table: status, message, and measured numbers.
 Row = tuple[str, str, list[float]]
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Scenes of a grid over keys of a scene file at `path`, to which other paths are relative."""
+
+    grid: Grid
+    tables: Mapping[str, Any]
+    path: Path
+
+    @property
+    def count(self) -> int:
+        return self.grid.count
+
+    def labels(self, numbers: range) -> Columns:
+        """The columns that identify scenes: the swept keys, and the seed."""
+        points = [self.grid.point(number) for number in numbers]
+        known = table_in(self.tables, "asperities").get("seed", NO_SEED)
+        found: Columns = {}
+        for key in self.grid.keys:
+            values = [point[key] for point, _ in points]
+            if all(isinstance(it, (int, float)) for it in self.grid.axes.get(key, ())):
+                found[key] = np.array(values, dtype=np.float64)
+            else:  # text of lists
+                found[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
+        seeds = [known if seed is None else seed for _, seed in points]
+        return found | {"seed": np.array(seeds, dtype=np.int64)}
+
+    def part(self, numbers: range) -> Tables:
+        """The source of the scenes with these numbers, for a worker."""
+        return self
+
+    def opened(self) -> Callable[[int], Task]:
+        """A function that makes the scene of a number; consecutive scenes share common data."""
+        layouts: Any = {
+            "summits": lru_cache(KEPT)(read_summits),
+            "lattice": lru_cache(KEPT)(regular),
+        }
+        last: dict[str, Any] = {}
+        return lambda number: task_of(self.path, self._study(number, last), **layouts)
+
+    def _study(self, number: int, last: dict[str, Any]) -> Study:
+        """The checked tables of a scene. Scenes that differ only in the seed are checked once."""
+        values, seed = self.grid.point(number)
+        if last.get("values") != values:
+            study, mistakes = validate(with_values(self.tables, values, seed))
+            if study is None:
+                raise SceneFileError(str(self.path), mistakes)
+            last.update(values=values, study=study)
+        known: Study = last["study"]
+        if seed is None or not isinstance(known.asperities, LatticeTable):
+            return known
+        layout = known.asperities.model_copy(update={"seed": seed})
+        return known.model_copy(update={"asperities": layout})
+
+
+@dataclass(frozen=True)
+class Tasks:
+    """Scenes made in Python, by their numbers."""
+
+    tasks: Mapping[int, Task]
+
+    @property
+    def count(self) -> int:
+        return len(self.tasks)
+
+    def labels(self, numbers: range) -> Columns:
+        by_load = any(task.load is not None for task in self.tasks.values())
+        some = [self.tasks[number] for number in numbers]
+        given = [task.load if by_load else task.approach for task in some]
+        return {
+            "normal.load" if by_load else "normal.approach": np.array(given, dtype=np.float64),
+            "seed": np.full(len(numbers), NO_SEED, dtype=np.int64),
+        }
+
+    def part(self, numbers: range) -> Tasks:
+        return Tasks({number: self.tasks[number] for number in numbers})
+
+    def opened(self) -> Callable[[int], Task]:
+        return self.tasks.__getitem__
+
+
+#: The scenes of a sweep, by their numbers from 0.
+Source: TypeAlias = Tables | Tasks
 
 
 @dataclass(frozen=True)
@@ -37,23 +130,23 @@ class Batch:
     def __str__(self) -> str:
         return f"{self.numbers[0]} to {self.numbers[-1]}"
 
-
-class BatchRows(NamedTuple):
-    """The rows of a batch, and the versions of the packages that computed them."""
-
-    columns: Columns
-    versions: Mapping[str, str]
-
-
-def different(versions: Mapping[str, str]) -> str:
-    """The versions that differ from those of this process, as text; "" if none differs."""
-    said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
-            if versions.get(name) != here)  # fmt: skip
-    return ", ".join(said)
+    def table(self, rows: Sequence[Row]) -> Columns:
+        """The columns of the table, by name, from its rows."""
+        values = np.array([values for _, _, values in rows], dtype=np.float64)
+        values = values.reshape(len(rows), len(self.columns))
+        found: Columns = {"scene": np.array(self.numbers, dtype=np.int64)}
+        found |= self.source.labels(self.numbers)
+        found["status"] = np.array([status for status, _, _ in rows], dtype=np.str_)
+        found["message"] = np.array([message for _, message, _ in rows], dtype=np.str_)
+        return found | {column.name: values[:, i] for i, column in enumerate(self.columns)}
 
 
-def compute(batch: Batch) -> BatchRows:
-    """The rows of a batch. No row depends on other scenes; a failed scene's row has the error."""
+def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
+    """The columns of a batch, and the versions of the packages that computed them.
+
+    No value depends on other scenes; the last bits of error bounds may, as products with matrices
+    are rounded in another way if there are more rows. A failed scene's row has the error.
+    """
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
         for number in batch.numbers:
@@ -64,10 +157,10 @@ def compute(batch: Batch) -> BatchRows:
         known = measured_together(asked, batch.columns)
         for number, each in asked.items():
             rows[number] = _row(each, known.get(number), batch.columns)
-    return BatchRows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
+    return batch.table([rows[number] for number in batch.numbers]), VERSIONS
 
 
-def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Row:
+def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
     """The row of one scene; `known` has its numbers if the scene was computed with others."""
     try:
         wanted = {column.stage for column in columns}
@@ -81,17 +174,13 @@ def _row(asked: Task, known: Measured | None, columns: tuple[Column, ...]) -> Ro
     return ("undecided" if unsure else "certified"), said, values
 
 
-def _failed(error: Exception, columns: tuple[Column, ...]) -> Row:
+def _failed(error: Exception, columns: Sequence[Column]) -> Row:
     said = "; ".join(str(error).splitlines()) or type(error).__name__
     return "failed", said, [np.nan] * len(columns)
 
 
-def table(batch: Batch, rows: list[Row]) -> Columns:
-    """The columns of the table, by name, from the rows of a batch."""
-    values = np.array([values for _, _, values in rows], dtype=np.float64)
-    values = values.reshape(len(rows), len(batch.columns))
-    found: Columns = {"scene": np.array(batch.numbers, dtype=np.int64)}
-    found |= batch.source.labels(batch.numbers)
-    found["status"] = np.array([status for status, _, _ in rows], dtype=np.str_)
-    found["message"] = np.array([message for _, message, _ in rows], dtype=np.str_)
-    return found | {column.name: values[:, i] for i, column in enumerate(batch.columns)}
+def different(versions: Mapping[str, str]) -> str:
+    """The versions that differ from those of this process, as text; "" if none differs."""
+    said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
+            if versions.get(name) != here)  # fmt: skip
+    return ", ".join(said)

@@ -1,4 +1,4 @@
-"""The scenes of a sweep: combinations of listed values, random values and seeds.
+"""The table [sweep] of a sweep file: keys that vary, and the scenes that they give.
 
 Scenes are numbered as in nested loops. The outermost loop takes the k-th values of all lists in
 `together`. Inside it is one loop for each key in `over`, in their order. The innermost loop takes
@@ -9,113 +9,185 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
+from convexrough.run.values import FileTable, Mistake, expected
 from convexrough.scene.asperities import CUT_DEVIATIONS
 
-#: A key of a scene file, "table.key" or "table.table.key", and its values.
-Axis = tuple[str, tuple[Any, ...]]
+#: Tables whose keys cannot be swept, because columns are named after the fractions in them.
+FIXED = ("shear", "cycle", "history")
 
+WHERE = ("together", "over", "draw")
+
+#: The law of a random value, and its two parameters: for "uniform" the ends; for "normal" the mean
+#: and the standard deviation; for "lognormal" the mean and the coefficient of variation.
 Law = Literal["uniform", "normal", "lognormal"]
 
 
-class Draw(NamedTuple):
-    """The law of a random value.
-
-    first, second : for "uniform" the two ends; for "normal" the mean and the standard deviation;
-        for "lognormal" the mean and the coefficient of variation. "normal", and the logarithm of
-        "lognormal", are clipped at six standard deviations
-    """
-
-    key: str
-    law: Law
-    first: float
-    second: float
-
-    def value(self, seed: int) -> float:
-        """The random value for a seed, which is independent of the values of other keys."""
-        random = np.random.default_rng([seed, zlib.crc32(self.key.encode())])
-        if self.law == "uniform":
-            return float(random.uniform(self.first, self.second))
-        normal = float(np.clip(random.standard_normal(), -CUT_DEVIATIONS, CUT_DEVIATIONS))
-        if self.law == "normal":
-            return self.first + self.second * normal
-        width = math.sqrt(math.log1p(self.second**2))
-        return self.first * math.exp(width * normal - width**2 / 2)
+def _different(values: Any) -> bool:
+    return bool(values) and len({repr(value) for value in values}) == len(values)
 
 
-class Point(NamedTuple):
-    """The values of the swept keys in one scene, by key; and its seed, or None."""
+def _are_seeds(seeds: int | list[int]) -> bool:
+    if isinstance(seeds, int):
+        return 1 <= seeds < 2**63
+    return _different(seeds) and 0 <= min(seeds) <= max(seeds) < 2**63
 
-    values: dict[str, Any]
-    seed: int | None
+
+def _is_law(table: dict[Law, list[float]]) -> bool:
+    if len(table) != 1 or not all(len(pair) == 2 for pair in table.values()):
+        return False
+    [(law, (first, second))] = table.items()
+    if law == "lognormal":
+        return first > 0 and 0 < second <= 1
+    return first < second if law == "uniform" else second > 0
 
 
-@dataclass(frozen=True)
-class Grid:
-    """The points of a sweep: the values of the swept keys in each scene.
+_NAMES = 'a list of numbers of summary.json, none of them twice, such as ["load"]'
+_Names = Annotated[list[str], expected(_NAMES, _different)]
+_Seeds = Annotated[
+    int | list[int],
+    expected("how many (1 or more), or a list of whole numbers, none of them twice", _are_seeds),
+]
+_Values = Annotated[list[Any], expected("a list of values, none of them twice", _different)]
+_List = Annotated[list[Any], expected("a list of values", bool)]
+_Laws = Annotated[
+    dict[Law, list[float]],
+    expected(
+        "one of: uniform = [low, high] with low < high, normal = [mean, deviation > 0], "
+        "lognormal = [mean > 0, coefficient of variation from 0 to 1: not in per cent]",
+        _is_law,
+    ),
+]
+_KEYS = expected('a table of keys of the scene file, such as "asperities.height_std"')
 
-    tables : tables of the scene file, without swept keys
+
+class Grid(FileTable):
+    """The table [sweep]: keys "table.key" of a scene file that vary, and numbers to measure.
+
+    measure  : names of numbers
+    seeds    : how many seeds of random heights, tip radii and values, or a list of them
     together : keys with lists of the same length, whose k-th values belong together
-    over   : keys whose values are combined in every way
-    draws  : keys with random values, and their laws
-    seeds  : seeds of random heights, tip radii and values; None if nothing is random
+    over     : keys whose values are combined in every way
+    draw     : keys with random values, and their laws
     """
 
-    tables: Mapping[str, Mapping[str, Any]]
-    together: tuple[Axis, ...] = ()
-    over: tuple[Axis, ...] = ()
-    draws: tuple[Draw, ...] = ()
-    seeds: Sequence[int] | None = None
+    measure: _Names = Field(default_factory=list)
+    seeds: _Seeds | None = None
+    together: Annotated[dict[str, _List], _KEYS] = Field(default_factory=dict)
+    over: Annotated[dict[str, _Values], _KEYS] = Field(default_factory=dict)
+    draw: Annotated[dict[str, _Laws], _KEYS] = Field(default_factory=dict)
+
+    @classmethod
+    def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
+        """Mistakes: keys that cannot be swept, or are swept twice, and unequal lengths of lists."""
+        yield from super().mistakes_between(keys)
+        if "measure" not in keys:
+            yield "measure", f"missing, expected {_NAMES}"
+        first: dict[str, str] = {}
+        for where, key in swept(keys):
+            name, _, rest = key.partition(".")
+            if not all(key.split(".")) or not rest:
+                expects = 'expected a table and a key of it, such as "asperities.height_std"'
+                yield f"{where}.{key}", expects
+            elif name == "sweep":
+                yield f"{where}.{key}", "expected a key of a scene"
+            elif name in FIXED:
+                yield f"{where}.{key}", f"values of [{name}] name columns, so they cannot vary"
+            elif key == "asperities.seed" and "seeds" in keys:
+                yield f"{where}.{key}", "swept twice, by seeds too"
+            for other in first:  # a key, or a table that contains it
+                if f"{key}.".startswith(f"{other}.") or other.startswith(f"{key}."):
+                    yield f"{where}.{key}", f"swept twice, in [sweep.{first[other]}] {other} too"
+            first[key] = where
+        lists = table_in(keys, "together").values()
+        if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:
+            yield "together", f"found {sorted(lengths)} values, expected as many for every key"
+        if keys.get("draw") and "seeds" not in keys:
+            yield "seeds", "missing, needed with [sweep.draw]"
 
     @property
-    def keys(self) -> tuple[str, ...]:
-        """All swept keys, in the order of the columns."""
-        return (*(key for key, _ in (*self.together, *self.over)), *(it.key for it in self.draws))
+    def axes(self) -> dict[str, list[Any]]:
+        """The keys in `together` and `over`, and their values."""
+        return self.together | self.over
 
-    def is_number(self, key: str) -> bool:
-        """True if every listed value of a key is a single number."""
-        axes = dict((*self.together, *self.over))
-        return all(isinstance(value, (int, float)) for value in axes.get(key, ()))
+    @property
+    def keys(self) -> list[str]:
+        """All swept keys, in the order of the columns."""
+        return [*self.axes, *self.draw]
 
     @property
     def each(self) -> int:
         """The number of scenes that differ only in the seed."""
+        if isinstance(self.seeds, int):
+            return self.seeds
         return 1 if self.seeds is None else len(self.seeds)
 
     @property
     def count(self) -> int:
         """The number of scenes, which may exceed the range of `len`."""
-        tuples = len(self.together[0][1]) if self.together else 1
-        return tuples * math.prod(len(values) for _, values in self.over) * self.each
+        rows = len(next(iter(self.together.values()), [None]))
+        return rows * math.prod(map(len, self.over.values())) * self.each
 
-    def point(self, number: int) -> Point:
-        """The point of scene `number`, counted from 0."""
+    def point(self, number: int) -> tuple[dict[str, Any], int | None]:
+        """The values of the swept keys in scene `number`, counted from 0; and its seed, or None."""
         number, turn = divmod(number, self.each)
-        seed = None if self.seeds is None else int(self.seeds[turn])
+        seeds = range(self.seeds) if isinstance(self.seeds, int) else self.seeds
+        seed = None if seeds is None else seeds[turn]
         found: dict[str, Any] = {}
-        for key, values in reversed(self.over):
+        for key, values in reversed(self.over.items()):
             number, turn = divmod(number, len(values))
             found[key] = values[turn]
-        found |= {key: values[number] for key, values in self.together}
+        found |= {key: values[number] for key, values in self.together.items()}
         if seed is not None:
-            found |= {draw.key: draw.value(seed) for draw in self.draws}
-        return Point({key: found[key] for key in self.keys}, seed)
+            for key, laws in self.draw.items():
+                [(law, parameters)] = laws.items()
+                found[key] = random_value(key, seed, law, *parameters)
+        return {key: found[key] for key in self.keys}, seed
 
-    def with_values(self, values: Mapping[str, Any], seed: int | None) -> dict[str, dict[str, Any]]:
-        """The tables of a scene file with these values and this seed."""
-        tables = {name: {**table} for name, table in self.tables.items()}
-        for key, value in values.items():
-            *names, last = key.split(".")
-            table: dict[str, Any] = tables
-            for name in names:  # a table within a table is copied, too
-                table[name] = {**table.get(name, {})}
-                table = table[name]
-            table[last] = value
-        if seed is not None and tables.get("asperities", {}).get("pattern") != "file":
-            tables.setdefault("asperities", {})["seed"] = seed
-        return tables
+
+def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
+    """The random value of a key for a seed, which is independent of the values of other keys.
+
+    "normal", and the logarithm of "lognormal", are clipped at six standard deviations.
+    """
+    random = np.random.default_rng([seed, zlib.crc32(key.encode())])
+    if law == "uniform":
+        return float(random.uniform(first, second))
+    normal = float(np.clip(random.standard_normal(), -CUT_DEVIATIONS, CUT_DEVIATIONS))
+    if law == "normal":
+        return first + second * normal
+    width = math.sqrt(math.log1p(second**2))
+    return first * math.exp(width * normal - width**2 / 2)
+
+
+def with_values(
+    tables: Mapping[str, Any], values: Mapping[str, Any], seed: int | None
+) -> dict[str, dict[str, Any]]:
+    """Copies of the tables of a scene file, with these values of keys and this seed."""
+    made: dict[str, Any] = {name: {**table} for name, table in tables.items()}
+    for key, value in values.items():
+        *names, last = key.split(".")
+        table = made
+        for name in names:  # a table within a table is copied, too
+            table[name] = {**table.get(name, {})}
+            table = table[name]
+        table[last] = value
+    if seed is not None and made.get("asperities", {}).get("pattern") != "file":
+        made.setdefault("asperities", {})["seed"] = seed
+    return made
+
+
+def table_in(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The table of this name; {} if there is none, or something else has the name."""
+    value = tables.get(name)
+    return value if isinstance(value, dict) else {}
+
+
+def swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The swept keys of a table [sweep] that may have mistakes, each after its list."""
+    return [(where, key) for where in WHERE for key in table_in(table, where)]

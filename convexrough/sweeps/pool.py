@@ -23,8 +23,8 @@ from itertools import islice
 from types import ModuleType
 from typing import Any
 
-from convexrough.errors import ExtraError, InputError, WorkerError
-from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
+from convexrough.errors import InputError, WorkerError, needed
+from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.threads import cores
 
 #: Largest number of batches submitted at a time: to an executor, and for each local process.
@@ -55,7 +55,7 @@ def _together(
 ) -> Generator[Columns, None, list[Batch]]:
     """Yield the rows of batches in any order, and return the batches whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
-    pending: dict[Future[BatchRows], Batch] = {}
+    pending: dict[Future[Any], Batch] = {}
     lost: list[Batch] = []
     try:
         while True:
@@ -66,15 +66,15 @@ def _together(
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 batch = pending.pop(future)
                 try:
-                    rows = future.result()
+                    columns, versions = future.result()
                 except _lost() as error:
                     lost.append(batch)
                     if len(lost) > MOST_LOST:
                         raise WorkerError(f"all workers die soon after start: {error}") from error
                     continue
-                if rows.versions != VERSIONS:
-                    raise WorkerError(f"a worker has other versions: {different(rows.versions)}")
-                yield rows.columns
+                if other := different(versions):
+                    raise WorkerError(f"a worker has other versions: {other}")
+                yield columns
     except BrokenExecutor as error:  # the caller's executor cannot be restarted here
         raise WorkerError(f"the executor is broken: {error}") from error
     except CancelledError as error:
@@ -153,11 +153,8 @@ def dask(address: str) -> Iterator[Executor]:
 
     Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
     """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ExtraError("dask") from error
-    own = partial(Client, set_as_default=False)  # a failing client would stay the user's default
+    client_of = needed("distributed", "dask").Client
+    own = partial(client_of, set_as_default=False)  # a failing client would stay the user's default
     try:
         if address == "local":
             client = own(n_workers=cores(), threads_per_worker=1, dashboard_address=None)

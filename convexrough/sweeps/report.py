@@ -10,14 +10,11 @@ from typing import Any
 import numpy as np
 
 from convexrough.record import rows_of
-from convexrough.run.results import results_folder, write_figures, write_tables
+from convexrough.run.results import Writer, headed
 from convexrough.run.stage import Summary
-from convexrough.run.summary import headed
 from convexrough.sweeps.batch import Columns
-from convexrough.sweeps.folder import MANIFEST
-from convexrough.sweeps.plan import Plan
-from convexrough.sweeps.sweep import Done
-from convexrough.sweeps.table import SweepTable, open_sweep
+from convexrough.sweeps.sweep import Plan
+from convexrough.sweeps.table import MANIFEST, SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
 #: The quantiles that are printed; and the largest numbers of rows and failures that are printed,
@@ -25,18 +22,17 @@ from convexrough.tabular.columns import aligned, labelled
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
-def summarise(table: SweepTable, done: Done | None = None) -> Summary:
-    """The contents of the output of `--json`: the state of the table, and what this call did."""
-    said: Summary = {
+def summarise(table: SweepTable, **did: Any) -> Summary:
+    """The contents of the output of `--json`: the state of the table, and what `run` did."""
+    said = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
         "scenes": table.scenes,
         "rows": len(table),
         **table.counts(),
         "not_measured": table.manifest["not_measured"],
+        **did,
     }
-    if done is not None:
-        said |= {"found": done.found, "computed": done.computed, "seconds": done.seconds}
     return headed(sweep=said)
 
 
@@ -90,14 +86,12 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
             yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
-def write_summary(
-    folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
-) -> list[Path]:
-    """Write quantiles.csv, and figures of measured numbers over swept keys; return the paths."""
+def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
+    """Write quantiles.csv, and figures of measured numbers over swept keys."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
-    with results_folder(folder, force=overwrite) as new:
-        figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
-        return write_tables(new, {"quantiles": found}) + write_figures(new, figures)
+    new.tables({"quantiles": found})
+    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+    new.figures(figures)
 
 
 def figures_left_out(table: SweepTable) -> list[str]:

@@ -1,32 +1,197 @@
-"""The table of a sweep, stored in the parts of a folder or in memory."""
+"""The table of a sweep, in memory or in a folder: a manifest that never changes, and parts.
+
+A part is a Parquet file of consecutive rows, written once and named by its first scene. All parts
+have the same number of rows, so their contents do not depend on the process that computes them.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from convexrough import checks, frames
-from convexrough.errors import ExtraError, InputError
+from convexrough.atomic import to_json, write_text
+from convexrough.errors import FileError, InputError, file_errors, needed
 from convexrough.record import Record, in_text
-from convexrough.sweeps.batch import Columns
-from convexrough.sweeps.folder import Folder, open_folder
+from convexrough.sweeps.batch import Columns, different
 
 if TYPE_CHECKING:
     import dask.dataframe
     import pandas
     from matplotlib.axes import Axes
 
+MANIFEST, PARTS = "manifest.json", "parts"
+
 #: The quantiles that are computed by default.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 #: [bytes] memory for a number of a table and its copy in a data frame.
 CELL = 24
+
+
+def part_from(manifest: Mapping[str, Any], first: int) -> range:
+    """The scenes of the part of a sweep's table that begins with scene `first`."""
+    return range(first, min(first + manifest["batch"], manifest["scenes"]))
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The folder of a sweep on disk."""
+
+    path: Path
+    manifest: Mapping[str, Any]
+
+    def parts(self) -> list[range]:
+        """The range of scenes of each part in the folder, in order; other files are ignored."""
+        with file_errors(self.path / PARTS, "be read"):
+            names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
+        firsts = sorted(int(name) for name in names if name.isdecimal())
+        return [part_from(self.manifest, first) for first in firsts]
+
+    def file(self, first: int) -> Path:
+        """The file of the part that begins with scene `first`."""
+        return self.path / PARTS / f"{first:012d}.parquet"
+
+    def write(self, columns: Columns) -> None:
+        """Write the columns of a part. An interruption leaves no incomplete part."""
+        pyarrow, parquet = arrow()
+        whole = BytesIO()
+        parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
+        write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+
+    def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
+        """Some columns of a part, by default all.
+
+        Raises FileError if the part is damaged, or has other scenes than its name says.
+        """
+        pyarrow, parquet = arrow()
+        path = self.file(part.start)
+        wanted = list(self.manifest["columns"] if names is None else names)
+        try:
+            # Threads of pyarrow could outlive the interpreter and abort the process.
+            found = parquet.read_table(
+                path,
+                columns=list({"scene", *wanted}),
+                use_threads=False,
+                pre_buffer=False,
+                page_checksum_verification=True,
+            )
+        except (OSError, pyarrow.ArrowException) as error:
+            raise FileError(f"{path}: damaged ({error}); --resume computes it again") from error
+        if not np.array_equal(found["scene"].to_numpy(), part):
+            raise FileError(f"{path}: has rows of other scenes; --resume computes it again")
+        arrays = {name: found[name].to_numpy() for name in wanted}
+        return {  # pyarrow returns text as objects
+            name: values.astype(np.str_) if values.dtype == object else values
+            for name, values in arrays.items()
+        }
+
+    def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
+        """The parts of `wanted` to compute, and a message about the others, which exist already.
+
+        Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
+        """
+        known = {part.start for part in self.parts()}
+        there = [part for part in wanted if part.start in known]
+        count = sum(map(len, wanted))
+        if there and not resume:
+            raise FileError(
+                f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
+                "--resume computes the rest, --force overwrites them, --out takes another folder"
+            )
+        todo, damaged = [], 0
+        for part in wanted:
+            if part.start in known:
+                try:
+                    self.read(part)
+                    continue
+                except FileError:
+                    self.file(part.start).unlink()
+                    damaged += 1
+            todo.append(part)
+        mine = {self.file(part.start).name for part in todo}
+        left = 0
+        for path in (self.path / PARTS).glob(".*.unfinished"):
+            if path.name[1:].rsplit(".", 2)[0] in mine:
+                path.unlink(missing_ok=True)
+                left += 1
+        said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
+        said += f", {damaged:,} damaged parts removed" if damaged else ""
+        return todo, said + (f", {left:,} unfinished files removed" if left else "")
+
+
+def open_folder(path: Path) -> Folder:
+    """The folder of an existing sweep. Raises FileError if there is none."""
+    if not (path / MANIFEST).exists():
+        raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
+    try:
+        with file_errors(path / MANIFEST, "be read"):
+            manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+        if not isinstance(manifest, dict) or manifest.get("schema") != 2:
+            raise ValueError("not a sweep of this version")
+    except ValueError as error:
+        raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
+    return Folder(path, manifest)
+
+
+def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
+    """The folder of a sweep, created if it does not exist.
+
+    Raises FileError if it contains another sweep or other files, or cannot be written, and
+    ExtraError if pyarrow is not installed.
+    """
+    arrow()
+    if overwrite and (path / MANIFEST).exists():
+        for part in (path / PARTS).glob("*.parquet"):
+            part.unlink(missing_ok=True)
+        (path / MANIFEST).unlink()
+    if not (path / MANIFEST).exists():
+        with file_errors(path, "hold results"):
+            path.mkdir(parents=True, exist_ok=True)
+            # Meanwhile another process may write the manifest of this sweep or of another one.
+            strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
+            orphans = any((path / PARTS).glob("*.parquet"))
+        if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
+            raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
+        if not (path / MANIFEST).exists():
+            if orphans:  # parts without a manifest, which is always written before parts
+                raise FileError(
+                    f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they are: "
+                    f"restore it or remove {path / PARTS}; --out takes another folder"
+                )
+            with file_errors(path, "hold results"):
+                (path / PARTS).mkdir(exist_ok=True)
+            write_text(path / MANIFEST, to_json(manifest) + "\n")
+    folder = open_folder(path)
+    there = folder.manifest
+    if there["sweep"] != manifest["sweep"]:
+        raise FileError(
+            f"{path}: holds another sweep, {_named(there)}; this is {_named(manifest)}; "
+            f"--force overwrites it, --out takes another folder"
+        )
+    if other := different(there["versions"]):
+        raise FileError(f"{path}: was begun with {other}; rows could differ")
+    return folder
+
+
+def _named(manifest: Mapping[str, Any]) -> str:
+    return (
+        f"{manifest['scenes']:,} scenes of {manifest['source']} by version {manifest['version']}, "
+        f"hash {manifest['sweep'][:16]}"
+    )
+
+
+def arrow() -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet. Raises ExtraError if they are not installed."""
+    return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
@@ -137,28 +302,23 @@ class SweepTable(Record):
         Raises ExtraError if pandas is not installed; InputError if the table does not fit in memory
         (then use `to_dask`).
         """
-        variables: frames.Variables = {
-            name: (("row",), values) for name, values in self.read(columns).items()
-        }
         attributes = {name: self.manifest[name] for name in ("sweep", "version", "source")}
-        return frames.dataframe(variables, attributes)
+        return frames.of_rows(self.read(columns), **attributes)
 
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
         """A Dask data frame with some columns, by default all; parts are read when needed.
 
         Raises ExtraError if Dask is not installed; InputError if the table is not in a folder.
         """
-        try:
-            import dask.dataframe
-        except ImportError as error:
-            raise ExtraError("dask") from error
+        frames_of_dask = needed("dask.dataframe", "dask")
         self._refuse_unknown(columns or ())
         if self.folder is None or not len(self):
             raise InputError("table", found="no parts", expected="rows in a folder")
         names = self.columns if columns is None else list(columns)
         frame = partial(_frame, self.folder, names)
         meta = frame(self._parts()[0]).iloc[:0]
-        return dask.dataframe.from_map(frame, self._parts(), meta=meta)
+        found: dask.dataframe.DataFrame = frames_of_dask.from_map(frame, self._parts(), meta=meta)
+        return found
 
     def plot(
         self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
@@ -238,5 +398,4 @@ class SweepTable(Record):
 
 
 def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:
-    columns = folder.read(part, names)
-    return frames.dataframe({name: (("row",), it) for name, it in columns.items()}, {})
+    return frames.of_rows(folder.read(part, names))

@@ -5,7 +5,7 @@ from figure_checks import discs, fits, texts
 from scenes import MATERIAL
 
 import convexrough as cr
-from convexrough.plots import surface_figures
+from convexrough.plots.surface import surface_figures
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384, unit="µm")
 MAXIMA = MAP.summits(0.0)

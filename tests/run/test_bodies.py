@@ -8,15 +8,8 @@ import pytest
 from scene_files import FRICTION, TWO_BODIES, WITHIN, scene_text
 
 import convexrough as cr
-from convexrough.run.scene_file import read_scene
 
 INF = float("inf")
-
-
-def read(tmp_path: Path, **given: str) -> cr.SceneFile:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene_text(WITHIN, **given), encoding="utf-8")
-    return read_scene(path)
 
 
 @pytest.mark.parametrize(
@@ -29,13 +22,13 @@ def read(tmp_path: Path, **given: str) -> cr.SceneFile:
         ("[inf, inf]", INF),
     ],
 )
-def test_bases(tmp_path: Path, radius: str, expected: Any) -> None:
-    assert read(tmp_path, radius=radius).scene.sphere_radius == expected
+def test_bases(read: Any, radius: str, expected: Any) -> None:
+    assert read(WITHIN, radius=radius).scene.sphere_radius == expected
 
 
-def test_two_bodies(tmp_path: Path) -> None:
+def test_two_bodies(read: Any) -> None:
     steel, soft = cr.Material.from_youngs(210e3, 0.3, 8e3), cr.Material.from_youngs(70e3, 0.33)
-    assert read(tmp_path, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)
+    assert read(WITHIN, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)
 
 
 STAGES = """[shear]

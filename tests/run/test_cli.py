@@ -164,18 +164,6 @@ def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
 SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
 
 
-def test_bad_loads(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
-    for loads, expected in (
-        ("load\n" + "1e-9\n" * 36, "rows: found 36, expected 61"),
-        ("", "empty"),
-    ):
-        (tmp_path / "loads.csv").write_text(loads)
-        outcome = command("verify", "a.toml", "loads.csv")
-        assert (outcome.status, outcome.out) == (2, "")
-        assert outcome.err.startswith(f"convexrough: error: loads.csv: {expected}")
-
-
 def test_usage_errors(command: Any) -> None:
     for line in (
         "run",

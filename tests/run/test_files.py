@@ -6,18 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import HEXAGONAL
 
 import convexrough as cr
 from convexrough.atomic import replacing
 from convexrough.run.results import MANIFEST, results_folder
-from convexrough.run.scene_file import read_scene
-
-
-def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene_text(*parts, **tables), encoding="utf-8")
-    return read_scene(path)
 
 
 @pytest.mark.sample(2)
@@ -26,11 +19,11 @@ def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
 @pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])
 @pytest.mark.parametrize("rough", ["", "height_std = 4e-6\ntip_radius_cv = 0.3\nseed = 5"])
 def test_the_default_within_loses_no_asperity(
-    tmp_path: Path, geometry: str, pattern: str, normal: str, rough: str
+    read: Any, geometry: str, pattern: str, normal: str, rough: str
 ) -> None:
     text = HEXAGONAL.replace("hexagonal", pattern).replace("summit", geometry) + f"{rough}\n"
-    file = read(tmp_path, text, normal)
-    generous = read(tmp_path, text + "within = 0.05", normal)
+    file = read(text, normal)
+    generous = read(text + "within = 0.05", normal)
     n = len(file.scene)
     assert n < len(generous.scene) / 4
     same = cr.press(file.scene, approach=file.approach, load=file.load)
@@ -67,7 +60,7 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
 
     def write(error: BaseException | None, text: str, *, force: bool = False) -> None:
         with results_folder(folder, force=force) as new:
-            (new / "one.csv").write_text(text)
+            new.text("one.csv", text)
             assert not folder.exists() or (folder / "one.csv").read_text() == "1"
             if error is not None:
                 raise error

@@ -9,7 +9,7 @@ import pytest
 from scene_files import EVERYTHING, WITHIN, scene_text
 
 from convexrough import plots
-from convexrough.run import results
+from convexrough.run.results import Writer
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
@@ -28,19 +28,19 @@ def test_names_columns_and_keys(
 
     After a deliberate change the folder of the test holds what to pin, as found.json.
     """
-    write = results.write_results
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
+    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
+    with monkeypatch.context() as patch:
+        first = Writer.summary
 
-    def after(*given: Any, **options: Any) -> Any:
-        with monkeypatch.context() as patch:
+        def after(*given: Any) -> None:
             for solves in ("normal.problem.NormalProblem.assemble", "normal.levels.Levels.at",
                            "friction.levels.FrictionLevels.rows"):  # fmt: skip
                 patch.setattr(f"convexrough.{solves}", None)  # not to be called
-            return write(*given, **options)
+            first(*given)
 
-    monkeypatch.setattr(results, "write_results", after)
-    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
-    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
-    ran = command("run", "a.toml", "--out", "out", "--html")
+        patch.setattr(Writer, "summary", after)
+        ran = command("run", "a.toml", "--out", "out", "--html")
     assert (ran.status, ran.err) == (0, "")
     found: dict[str, Any] = {"files": sorted(path.name for path in (tmp_path / "out").iterdir())}
     for path in sorted((tmp_path / "out").glob("*.csv")):

@@ -8,8 +8,8 @@ import pytest
 from sweep_files import SMALL, sweeping, tables
 
 import convexrough as cr
-from convexrough.sweeps.file import plan_of
-from convexrough.sweeps.grid import Draw, Grid
+from convexrough.sweeps.grid import Grid, with_values
+from convexrough.sweeps.sweep import plan_of
 
 
 def identity(contents: dict[str, Any], folder: Path = Path()) -> Any:
@@ -23,29 +23,32 @@ def mistakes(contents: dict[str, Any]) -> str:
     return str(caught.value)
 
 
+def grid(**keys: Any) -> Grid:
+    return Grid(measure=["load"], **keys)
+
+
 def test_rows_are_in_the_order_of_lists_then_grid_then_seeds() -> None:
-    together = (("sphere.radius", (1.0, 2.0)), ("material.poisson_ratio", (0.1, 0.2)))
-    over = (("normal.load", (1, 2, 3)), ("asperities.height_std", (0.0, 1.0)))
-    grid = Grid({"asperities": {}}, together, over, seeds=[7, 5])
-    assert grid.count == 2 * 3 * 2 * 2
-    found = [grid.point(i) for i in range(grid.count)]
+    together = {"sphere.radius": [1.0, 2.0], "material.poisson_ratio": [0.1, 0.2]}
+    over = {"normal.load": [1, 2, 3], "asperities.height_std": [0.0, 1.0]}
+    mine = grid(together=together, over=over, seeds=[7, 5])
+    assert mine.count == 2 * 3 * 2 * 2
+    found = [mine.point(i) for i in range(mine.count)]
     expected = itertools.product([(1.0, 0.1), (2.0, 0.2)], (1, 2, 3), (0.0, 1.0), (7, 5))
-    for point, (both, load, height, seed) in zip(found, expected, strict=True):
-        assert tuple(point.values.values()) == (*both, load, height)
-        assert point.seed == seed
+    for (values, seed), (both, load, height, own) in zip(found, expected, strict=True):
+        assert (*values.values(), seed) == (*both, load, height, own)
 
 
 def test_draws_belong_to_the_seed_alone() -> None:
-    def samples(*draws: Draw) -> list[float]:
-        grid = Grid({"asperities": {}}, (), (("normal.load", (1, 2)),), draws, range(5))
-        return [grid.point(i).values["friction.coefficient"] for i in range(grid.count)]
+    def samples(**draw: Any) -> list[float]:
+        mine = grid(over={"normal.load": [1, 2]}, draw=draw, seeds=5)
+        return [mine.point(i)[0]["friction.coefficient"] for i in range(mine.count)]
 
-    friction = Draw("friction.coefficient", "uniform", 0.2, 0.6)
-    alone = samples(friction)
+    friction = {"friction.coefficient": {"uniform": [0.2, 0.6]}}
+    alone = samples(**friction)
     assert alone[:5] == alone[5:]
     assert len(set(alone)) == 5
     assert all(0.2 <= value <= 0.6 for value in alone)
-    assert samples(Draw("sphere.radius", "normal", 1.0, 0.1), friction) == alone
+    assert samples(**{"sphere.radius": {"normal": [1.0, 0.1]}}, **friction) == alone
 
 
 @pytest.mark.sample(3)
@@ -76,9 +79,8 @@ def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) ->
 
 def test_a_key_of_a_table_within_a_table() -> None:
     own = {"material": {"sphere": {"youngs_modulus": 1.0, "poisson_ratio": 0.3}, "base": {}}}
-    grid = Grid(own, over=(("material.sphere.youngs_modulus", (2.0, 3.0)),))
-    for number, modulus in enumerate((2.0, 3.0)):
-        there = grid.with_values(*grid.point(number))["material"]
+    for modulus in (2.0, 3.0):
+        there = with_values(own, {"material.sphere.youngs_modulus": modulus}, None)["material"]
         assert there == {"sphere": {"youngs_modulus": modulus, "poisson_ratio": 0.3}, "base": {}}
     assert own["material"]["sphere"]["youngs_modulus"] == 1.0
 

@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sweep_files import sweeping
 
-from convexrough.sweeps import batch, together
+from convexrough.sweeps import batch, measures
 from convexrough.sweeps.batch import Columns, compute
-from convexrough.sweeps.file import plan_of
+from convexrough.sweeps.sweep import plan_of
 
 #: Numbers that rows know, but for errors, which are bounds of their own.
-KNOWN = [f"normal.{name}" for name in together.NORMAL if "error" not in name]
-CYCLES = [f"cycle.{name}" for name in together.CYCLE if "error" not in name]
+KNOWN = [f"normal.{name}" for name in measures.NORMAL if "error" not in name]
+CYCLES = [f"cycle.{name}" for name in measures.CYCLE if "error" not in name]
 
 SCENES: dict[str, dict[str, Any]] = {
     "load": {
@@ -43,7 +43,7 @@ def tables(changes: dict[str, Any], measure: list[str]) -> dict[str, Any]:
 
 def rows(changes: dict[str, Any], measure: list[str]) -> Columns:
     plan = plan_of(tables(changes, measure), Path("sweep"), None)
-    return compute(plan.batch(range(plan.source.count))).columns
+    return compute(plan.batch(range(plan.source.count)))[0]
 
 
 @pytest.mark.sample(2)

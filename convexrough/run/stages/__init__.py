@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from convexrough.run.stage import Stage
-from convexrough.run.stages.cycle import CycleStage
+from convexrough.run.stages.constant_load import CycleStage, HistoryStage, ShearStage
 from convexrough.run.stages.gradient import GradientStage
-from convexrough.run.stages.history import HistoryStage
 from convexrough.run.stages.normal import NormalStage
 from convexrough.run.stages.path import PathStage, SteadyStage
 from convexrough.run.stages.shakedown import ShakedownStage
-from convexrough.run.stages.shear import ShearStage
 
 __all__ = [
     "STAGES",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,6 @@ class NormalStage(Stage):
         return NormalResult(self, contact, (contact,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class NormalResult(Single):
     """The result of [normal]: the pressed contact."""
 
@@ -74,7 +72,10 @@ class NormalResult(Single):
         return {"asperities": columns | contact.certificate.columns("load_errors")}
 
     def doubts(self) -> Iterator[str]:
-        yield from doubts_of(self.known[0])
+        return plausibility.doubts_of(self.contact)
+
+    def cautions(self) -> Iterator[str]:
+        return plausibility.cautions(self.known[0], self.units)
 
     def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import press_figures  # matplotlib: only when it draws
@@ -98,14 +99,6 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
     }
 
 
-def doubts_of(normal: Summary) -> Iterator[str]:
-    """The reasons why loads are not certified, from the summary of a contact."""
-    if normal["certificate"]["scope"] == "none":
-        yield "not certified: nothing is proved about these loads"
-    elif normal["undecided"]:
-        yield f"not certified: undecided asperities: {normal['undecided']}"
-
-
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of`, and two more.
 
@@ -119,11 +112,8 @@ def limits_of(contact: Contact) -> Summary:
         with suppress(SolverError):
             changes = closest_changes(contact)[heavy] / contact.loads[heavy]
             change = float(np.abs(changes).max())
-    return {
-        **plausibility.limits_of(contact),
-        "geometry": scene.geometry,
-        "closest_change": change,
-    }
+    own = {"geometry": scene.geometry, "closest_change": change}
+    return plausibility.limits_of(contact) | own
 
 
 def describe(normal: Summary, units: UnitNames) -> list[str]:

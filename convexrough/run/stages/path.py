@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -99,6 +98,14 @@ class _Points(Stage):
             loads, forces = np.array(self.loads), np.array(self.forces)
         return {"loads": self.reference * loads, "forces": self.reference * forces}
 
+    def chords(self) -> list[str]:
+        """A printed line on the chords that replace an ellipse; [] without an ellipse."""
+        if self.ellipse is None:
+            return []
+        n = self.ellipse.chords
+        more = f"the ellipse loses more, in our tests by at most {CHORDS_ERROR / n**2:.1g} of it"
+        return [f"losses and errors are those of a path of {n} chords; {more}"]
+
 
 class PathStage(_Points):
     """A path of normal load and shear force that starts without load."""
@@ -115,10 +122,10 @@ class PathStage(_Points):
         return PathResult(self, contact, (found,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class PathResult(Steps):
     """The result of [path]: the states at the points."""
 
+    stage: PathStage
     title = "load path"
     printed: ClassVar[Mapping[str, str]] = {
         "load": "P",
@@ -131,7 +138,7 @@ class PathResult(Steps):
     }
 
     def lines(self) -> list[str]:
-        return [*super().lines(), *chords_of(self.stage)]
+        return [*super().lines(), *self.stage.chords()]
 
     def summary(self) -> Summary:
         (path,) = self.found
@@ -192,10 +199,10 @@ class SteadyStage(_Points):
             )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class SteadyResult(Single):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
+    stage: SteadyStage
     printed: ClassVar[Mapping[str, str]] = {
         "level": "stuck below load",
         "loss": "loss",
@@ -231,7 +238,7 @@ class SteadyResult(Single):
         return tables
 
     def lines(self) -> list[str]:
-        said = [*super().lines(), *chords_of(self.stage)]
+        said = [*super().lines(), *self.stage.chords()]
         for losses in self.found[1:]:
             printed = {"phase": "phase", "factor": "factor", "loss": "loss"}
             printed |= {"smooth": "smooth sphere"}
@@ -246,15 +253,6 @@ class SteadyResult(Single):
         for losses in self.found[1:]:
             figures |= phase_figures(losses)
         return figures
-
-
-def chords_of(stage: Stage) -> list[str]:
-    """A line on the chords that replace an ellipse; [] without an ellipse."""
-    if not isinstance(stage, _Points) or stage.ellipse is None:
-        return []
-    n = stage.ellipse.chords
-    more = f"the ellipse loses more, in our tests by at most {CHORDS_ERROR / n**2:.1g} of it"
-    return [f"losses and errors are those of a path of {n} chords; {more}"]
 
 
 def _by_phase(losses: PhaseLosses) -> Columns:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -65,7 +64,6 @@ class ShakedownStage(Stage):
         return ShakedownResult(self, contact, (found,))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class ShakedownResult(Single):
     """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
 

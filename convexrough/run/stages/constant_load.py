@@ -1,22 +1,23 @@
-"""[cycle]: steady cycles between two shear forces, with their losses and loops."""
+"""[shear], [cycle] and [history]: shear forces at constant load."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Loop, cycles, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
-from convexrough.run.stage import Columns, Result, Stage, Summary, limit
-from convexrough.run.values import Fractions, Mistake, Whole, expected
+from convexrough.friction.path import history
+from convexrough.friction.shear import shear
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit
+from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
@@ -26,9 +27,58 @@ MOST_LOOPS = 12
 MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
 
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
+
 Chosen = Annotated[
     Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
 ]
+
+
+class ShearStage(Stage):
+    """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
+
+    name = "shear"
+    numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),
+               "scope")  # fmt: skip
+
+    fractions: Shares
+
+    @property
+    def labels(self) -> Labels:
+        return {"fraction": self.fractions}
+
+    def compute(self, contact: Contact) -> ShearResult:
+        f_p = limit(contact)
+        states = (shear(contact, force=part * f_p) for part in self.fractions)
+        return ShearResult(self, contact, tuple(states))
+
+
+class ShearResult(Result):
+    """The result of [shear]: a friction state for each fraction."""
+
+    stage: ShearStage
+    printed: ClassVar[Mapping[str, str]] = {
+        "fraction": "Q/(fP)",
+        "force": "force",
+        "displacement": "displacement",
+        "sliding": "sliding",
+        "partial": "partial",
+        "undecided": "undecided",
+    }
+
+    def proved_forces(self) -> Iterator[float]:
+        return (abs(state.force) for state in self.found)
+
+    def tables(self) -> dict[str, Columns]:
+        """The tables, with a row for each fraction and asperity."""
+        x, y = self.contact.scene.asperities.positions.T
+        names = ("forces", "stick_radii", "slips", "displacements", "status")
+        each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
+        return {"shear": self.stacked(each)}
+
+    def figures(self) -> Mapping[str, Any]:
+        from convexrough.plots import shear_figures  # matplotlib: only when it draws
+
+        return shear_figures(self.found)
 
 
 class CycleStage(Stage):
@@ -46,7 +96,6 @@ class CycleStage(Stage):
                "secant_stiffness", "loss_factor", "loss", "loss_error", "loss_normalised",
                "smooth_normalised", "balance_defect", "sliding", "partial",
                "undecided")  # fmt: skip
-    labels = ("maximum_fraction", "minimum_fraction")
 
     maximum_fraction: Fractions
     minimum_fraction: Fractions | None = None
@@ -59,6 +108,10 @@ class CycleStage(Stage):
         if self.minimum_fraction is not None:
             return self.minimum_fraction
         return [-value for value in self.maximum_fraction]
+
+    @property
+    def labels(self) -> Labels:
+        return {"maximum_fraction": self.maximum_fraction, "minimum_fraction": self.lowest}
 
     def mistakes_within(self) -> Iterator[Mistake]:
         if (n := len(self.lowest)) != len(self.maximum_fraction):
@@ -84,7 +137,6 @@ class CycleStage(Stage):
         return CycleResult(self, contact, tuple(found))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class CycleResult(Result):
     """The result of [cycle]: the steady cycles."""
 
@@ -108,18 +160,18 @@ class CycleResult(Result):
     }
 
     def rows(self) -> list[Summary]:
-        highs, lows = self.stage.maximum_fraction, self.stage.lowest
         return [
             {
-                "maximum_fraction": high,
-                "minimum_fraction": low,
                 **row,
                 "loss_over_smooth": cycle.loss_normalised / (cycle.smooth_normalised or math.nan),
                 "partial_slip_loss": float(cycle.partial_slip_losses.sum()),
                 "sliding_loss": float(cycle.sliding_losses.sum()),
             }
-            for high, low, row, cycle in zip(highs, lows, super().rows(), self.found, strict=True)
+            for row, cycle in zip(super().rows(), self.found, strict=True)
         ]
+
+    def proved_forces(self) -> Iterator[float]:
+        return ((cycle.maximum - cycle.minimum) / 2 for cycle in self.found)
 
     @cached_property
     def loops(self) -> list[Loop]:
@@ -144,25 +196,10 @@ class CycleResult(Result):
 
     def tables(self) -> dict[str, Columns]:
         """The tables of cycles, of fretting by asperity, and of loops, in total and by asperity."""
-        touching = int(np.count_nonzero(self.contact.loads))
-        worn = {  # fractions replace forces, as in the other tables
-            name: np.repeat([row[name] for row in self.known], touching)
-            for name in self.stage.labels
-        }
-        given = fretting_columns(self.worn)
-        worn |= {name: it for name, it in given.items() if name not in ("maximum", "minimum")}
-        parts: list[list[NDArray[Any]]] = []
-        for row, loop in zip(self.known, self.loops, strict=True):
-            forces, moved = loop.asperity_forces.T, loop.asperity_displacements.T
-            curves = [("total", loop.forces, loop.displacements)]
-            curves += zip(loop.asperities.astype(str), forces, moved, strict=True)
-            for curve, *values in curves:
-                same = [*(row[name] for name in self.stage.labels), curve]
-                parts.append([*(np.full(len(values[0]), each) for each in same), *values])
-        names = (*self.stage.labels, "curve", "force", "displacement")
-        columns = map(np.concatenate, zip(*parts, strict=True))
-        loop_table = dict(zip(names, columns, strict=True))
-        return {**super().tables(), "loop": loop_table, "fretting": worn}
+        worn = self.stacked([fretting_columns([each]) for each in self.worn])
+        del worn["maximum"], worn["minimum"]  # fractions replace forces, as in the other tables
+        curves = self.stacked([_curves(loop) for loop in self.loops])
+        return {**super().tables(), "loop": curves, "fretting": worn}
 
     @property
     def smooth(self) -> bool:
@@ -183,3 +220,41 @@ class CycleResult(Result):
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
         figures = cycle_figures(self.found, loops=self.loops)
         return {**figures, **fretting_figures(widest)}
+
+
+def _curves(loop: Loop) -> Columns:
+    """The points of a loop in total, and below them those of each asperity."""
+    names = ["total", *loop.asperities.astype(str)]
+    return {
+        "curve": np.repeat(names, len(loop.forces)),
+        "force": np.concatenate([loop.forces, *loop.asperity_forces.T]),
+        "displacement": np.concatenate([loop.displacements, *loop.asperity_displacements.T]),
+    }
+
+
+class HistoryStage(Stage):
+    """A sequence of shear forces that starts at 0, as fractions of the friction limit f P."""
+
+    name = "history"
+    numbers = ("force", "displacement", "loss", "loss_error")
+
+    fractions: Fractions
+
+    @property
+    def labels(self) -> Labels:
+        return {"fraction": self.fractions}
+
+    def compute(self, contact: Contact) -> HistoryResult:
+        past = history(contact, forces=limit(contact) * np.array(self.fractions))
+        return HistoryResult(self, contact, (past,))
+
+
+class HistoryResult(Steps):
+    """The result of [history]: the state after each force."""
+
+    stage: HistoryStage
+    printed: ClassVar[Mapping[str, str]] = {
+        "fraction": "Q/(fP)",
+        "displacement": "displacement",
+        "loss": "loss",
+    }

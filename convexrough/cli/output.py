@@ -1,0 +1,177 @@
+"""Options that several commands take, what commands print, and their exit statuses."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from convexrough.errors import ProofError
+
+if TYPE_CHECKING:
+    from convexrough.proof import Proof
+    from convexrough.run.results import Writer
+    from convexrough.run.stage import Result
+
+DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+PATH = click.Path(path_type=Path)
+
+#: Formats of figures.
+FORMATS = ("png", "svg", "pdf")
+
+
+def _formats(given: str) -> tuple[str, ...]:
+    formats = tuple(dict.fromkeys(each.strip().lower() for each in given.split(",")))
+    if unknown := [each for each in formats if each not in FORMATS]:
+        raise click.BadParameter(f"found {unknown[0]!r}, expected {', '.join(FORMATS)}")
+    return formats
+
+
+def _from_here(given: tuple[str, ...]) -> tuple[str, ...]:
+    """The solvers of --solver. This call makes modules of the current folder importable."""
+    if given and "" not in sys.path:
+        sys.path.insert(0, "")
+    return given
+
+
+solver_option = click.option(
+    "--solver", "solvers", metavar="NAME", multiple=True,
+    callback=lambda *given: _from_here(given[-1]),
+    help="A solver of the package, or the import path of your class, such as mine.Solver; may be "
+    "repeated.",
+)  # fmt: skip
+proof_option = click.option(
+    "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
+)
+html_option = click.option(
+    "--html", is_flag=True, help="Also write slider.html, an interactive page."
+)
+
+#: The options that say where results go and in which form, in the order of the help.
+OPTIONS = {
+    "formats": click.option(
+        "--formats", metavar="LIST", default="png", show_default=True,
+        callback=lambda *given: _formats(given[-1]), help="Formats of figures: png, svg, pdf."),
+    "dpi": click.option(
+        "--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
+        help="Pixels per inch of figures."),
+    "out": click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
+    "no_figures": click.option("--no-figures", is_flag=True, help="Do not write figures."),
+    "force": click.option(
+        "--force", is_flag=True, help="Replace the files of an earlier run in this folder."),
+    "as_json": click.option(
+        "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."),
+}  # fmt: skip
+
+
+def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """A decorator that adds these `OPTIONS`, by default all, to a command.
+
+    The command is called with an `Output`, which has their values, as its first argument.
+    """
+    names = names or tuple(OPTIONS)
+
+    def add(command: Callable[..., int]) -> Callable[..., int]:
+        @wraps(command)
+        def called(**given: Any) -> int:
+            own = {name: given.pop(name) for name in names}
+            return command(Output(**own), **given)
+
+        for name in reversed(names):
+            called = OPTIONS[name](called)
+        return called
+
+    return add
+
+
+@dataclass
+class Output:
+    """Where a command writes results, and in which form it prints them; fields are `OPTIONS`."""
+
+    out: Path | None = None
+    force: bool = False
+    as_json: bool = False
+    no_figures: bool = False
+    formats: Sequence[str] = ("png",)
+    dpi: int = 200
+
+    def folder(self, default: Path, **given: Any) -> AbstractContextManager[Writer]:
+        """The folder --out, or else `default`; further arguments as for `results_folder`."""
+        from convexrough.run.results import results_folder
+
+        given |= {"force": self.force, "formats": self.formats, "dpi": self.dpi}
+        return results_folder(self.out or default, **given)
+
+    def say(
+        self, summary: dict[str, Any], lines: Iterable[str], warnings: Iterable[str] = ()
+    ) -> None:
+        """Print the summary as a JSON object, or the lines; and warnings on standard error."""
+        from convexrough.atomic import to_json
+
+        click.echo(to_json(summary) if self.as_json else "\n".join(lines))
+        for warning in warnings:
+            say_aside("warning", warning)
+
+    def say_results(
+        self,
+        results: Sequence[Result],
+        lines: Sequence[str] = (),
+        more: dict[str, Any] | None = None,
+    ) -> int:
+        """Print the summary with `more`, or results and `lines`; return the exit status."""
+        from convexrough.run.results import describe, summarise, warnings
+
+        summary = summarise(results) | (more or {})
+        self.say(summary, [*describe(results), *lines], warnings(results))
+        return DONE if all(result.certified for result in results) else NOT_CERTIFIED
+
+    def say_proof(self, proof: Proof, folder: Path) -> None:
+        """Print what is proved, and where proof.json is."""
+        click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}", err=self.as_json)
+
+
+def written(new: Writer) -> list[str]:
+    """A line with the names of the files in a folder of results."""
+    place = "here" if new.folder == Path() else f"to {new.folder}"
+    return ["", f"written {place}: {', '.join(path.name for path in new.files)}"]
+
+
+def say_aside(*parts: str) -> None:
+    click.echo(": ".join(("convexrough", *parts)), err=True)
+
+
+def proved(work: Callable[[], Proof]) -> Proof | None:
+    """The proof, or None after a warning with the reason."""
+    try:
+        with progress("proving"):
+            return work()
+    except ProofError as error:
+        say_aside("warning", f"proof.json is not written: {error}")
+        return None
+
+
+@contextmanager
+def progress(message: str) -> Iterator[None]:
+    """Show a status line on standard error while the body runs, if that is a terminal.
+
+    The line also shows records of the logger `convexrough`.
+    """
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    from convexrough.progress import logged
+
+    with (
+        Console(stderr=True).status(message) as status,
+        logged(lambda record: status.update(f"{message}: {record.getMessage()}")),
+    ):
+        yield

@@ -1,0 +1,239 @@
+"""Commands about solvers: compare, export, gallery, bench; and paper, a published example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from convexrough.cli.output import (
+    DONE,
+    NOT_CERTIFIED,
+    PATH,
+    SOLVER_FAILED,
+    Output,
+    html_option,
+    output_options,
+    progress,
+    solver_option,
+    written,
+)
+from convexrough.errors import FileError, blamed_on
+
+
+@click.command()
+@click.argument("scene", type=PATH)
+@solver_option
+@click.option("--within", metavar="PART", type=click.FloatRange(0, min_open=True), default=1e-3,
+              show_default=True,
+              help="Largest difference allowed, as a fraction of the largest load.")  # fmt: skip
+@click.option("--log", metavar="FILE", type=PATH,
+              help="Write the iterations of Newton's method and Clarabel to a CSV file."
+              )  # fmt: skip
+@output_options("as_json")
+def compare(
+    output: Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None
+) -> int:
+    """Solve a scene with all solvers; compare loads, proofs, times.
+
+    SCS and QOCO also solve the cone program if they are installed. With --solver, only the named
+    solvers are compared with Newton's method.
+
+    Exit status: 0 if all results agree; 2 wrong input; 3 if a certified result
+    contradicts another that is proved to be the only solution; else 4 if a solver failed; else 3
+    if no result is certified, if a load differs from Newton's by more than --within, or if a
+    solver does not accept the scene. A contradiction would reveal a mistake in the mathematics
+    or the code.
+    """
+    from convexrough.compare import compare as compare_solvers
+    from convexrough.compare import solver_named
+    from convexrough.run import comparison as report
+    from convexrough.run.results import write_rows
+    from convexrough.run.scene_file import read_scene
+
+    chosen = [solver_named(name) for name in solvers] or None
+    if log is not None and log.exists():
+        raise FileError(f"{log}: exists already; name another file")
+    file = read_scene(scene)
+    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
+        comparison = compare_solvers(
+            file.scene,
+            approach=file.approach,
+            load=file.load,
+            influence=file.influence,
+            solvers=chosen,
+            log=log is not None,
+        )
+    if log is not None:
+        write_rows(log, report.steps(comparison))
+    summary = report.comparison_summary(comparison, within)
+    lines = report.describe_comparison(summary, file.scene.units)
+    output.say(summary, lines, report.comparison_warnings(summary))
+    outcomes = {entry.outcome for entry in comparison.entries}
+    if "failed" in outcomes and not comparison.contradictions:
+        return SOLVER_FAILED
+    wrong = comparison.contradictions or summary["disagreeing"]
+    if wrong or "refused" in outcomes or not comparison.certified:
+        return NOT_CERTIFIED
+    return DONE
+
+
+@click.command()
+@click.argument("scene", type=PATH)
+@click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
+              multiple=True, help="Write only this format; may be repeated.")  # fmt: skip
+@click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
+              help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
+              )  # fmt: skip
+@output_options("out", "force", "as_json")
+def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
+    """Write a scene as cone and quadratic programs for other solvers.
+
+    The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
+    contact law, and its dual, which bounds the energy from below. The format mps and a second npz
+    (qpsolvers) contain the quadratic program of bristles (springs that together follow Hertz's
+    law). index.json gives the minimum of each program, and how to convert a solution to loads.
+
+    Programs go to the folder SCENE-programs unless --out names another.
+    """
+    from convexrough.programs.program import FORMATS, write_programs
+    from convexrough.run.scene_file import read_scene
+
+    file = read_scene(scene)
+    stating = progress(f"stating {len(file.scene):,} asperities")
+    folder = output.folder(Path(f"{scene.stem}-programs"), reads=file.inputs)
+    with folder as new, blamed_on(scene), stating:
+        new.files, index = write_programs(
+            new.path,
+            scene.stem,
+            file.scene,
+            approach=file.approach,
+            load=file.load,
+            formats=formats or tuple(FORMATS),
+            bristles=bristles,
+        )
+    lines = [
+        f"{name}: {about['form']}, {about['variables']:,} variables, least objective "
+        f"{about['objective']:.12g}"
+        for name, about in index["programs"].items()
+    ]
+    left_out = (f"{name}: left out: {reason}" for name, reason in index["left_out"].items())
+    output.say(index, [*lines, *written(new)], left_out)
+    return DONE
+
+
+@click.command()
+@click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
+@click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
+@click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
+@solver_option
+@click.argument("names", nargs=-1)
+@output_options("force", "as_json")
+def gallery(
+    output: Output,
+    show_list: bool,
+    export: Path | None,
+    profile: bool,
+    solvers: tuple[str, ...],
+    names: tuple[str, ...],
+) -> int:
+    """List, export or time hard scenes with 50-digit answers.
+
+    A case is a scene; a family has cases that are hard in the same way. NAMES are names of cases or
+    families; default: all cases. --export writes each case as a quadratic program (.npz for
+    qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index. --profile prints
+    how often each solver is right, and how fast; with --solver it times only Newton's method and
+    the named solvers. Loads are right if all errors are at most 0.1 % of the largest load; the
+    contact set is right if exactly the asperities that touch have a load.
+    """
+    from convexrough import gallery as wing
+    from convexrough.compare import solver_named
+    from convexrough.gallery.export import exported
+    from convexrough.tabular.columns import aligned
+
+    if export is not None and (profile or solvers):
+        raise click.UsageError("--export excludes --profile and --solver.")
+    wanted = wing.names(*names)
+    if profile or solvers:
+        chosen = [solver_named(each) for each in solvers]
+        from convexrough.bench.profile import profile_of
+
+        with progress("timing"):
+            found = profile_of(chosen or None, cases=wanted)
+        rows, reported = found.rows(), []
+        cells: list[list[str]] = [list(rows[0])]
+        for row, each in zip(rows, found.outcomes, strict=True):
+            cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
+            reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
+        output.say({"profile": reported}, aligned(cells, left=1))
+        return DONE
+    cases = [wing.case(name) for name in wanted]
+    lines = []
+    if show_list or export is None:
+        heading = ["case", "family", "what is hard", "asperities", "touching"]
+        lines_of_cases = [
+            [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]
+            for case in cases
+        ]
+        lines = aligned([heading, *lines_of_cases], left=3)
+    summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
+    if export is not None:
+        with output.folder(export) as new, progress("writing"):
+            for name, text in exported(wanted):
+                new.text(name, text)
+        lines += [f"{len(wanted)} cases, {len(new.files)} files, written to {export}"]
+    output.say({"cases": summary}, lines)
+    return DONE
+
+
+@click.command()
+@output_options("out", "no_figures", "force", "as_json")
+@click.option("--quick", is_flag=True, help="Use fewer and smaller scenes.")
+@click.option("--page", metavar="FILE", type=PATH, help="Also update this Markdown page.")
+def bench(output: Output, quick: bool, page: Path | None) -> int:
+    """Measure time and error of solvers for many scene sizes.
+
+    Results go to the folder bench-results unless --out names another. With --page, the command also
+    replaces the text of the page FILE between the markers "bench: begin" and "bench: end", and the
+    figures of the page in the folder "figures" next to FILE.
+    """
+    from convexrough.bench import page as pages
+    from convexrough.bench import suite
+
+    if page is not None:
+        pages.split_page(page)  # a page without markers is refused before anything is computed
+    with output.folder(Path("bench-results")) as new, progress("measuring"):
+        found = suite.run(quick=quick)
+        pages.write_bench(new, found, figures=not output.no_figures, page=page)
+    output.say(found.summary(), [*pages.describe(found), *written(new)])
+    return DONE
+
+
+@click.command()
+@html_option
+@output_options()
+def paper(output: Output, html: bool) -> int:
+    """Reproduce the example of Dini and Hills (2009).
+
+    Tables and figures go to the folder paper-results unless --out names another.
+    """
+    from convexrough.paper import example
+    from convexrough.paper.figure_data import figure_data
+    from convexrough.paper.states import PaperStates
+    from convexrough.run.results import slider_page
+
+    with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
+        found = example.results()
+        contact = found[0].contact
+        comparison = example.compare(found)
+        states = PaperStates.of(contact)
+        new.tables(figure_data(states))
+        if not output.no_figures:
+            from convexrough.paper.figures import paper_figures
+
+            new.figures(paper_figures(contact, states))
+        if html:
+            new.text("slider.html", slider_page(found[0]))
+        more = {"paper": comparison}
+        new.results(found, figures=False, more=more)
+    return output.say_results(found, ["", *example.table(comparison), *written(new)], more)
