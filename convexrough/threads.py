@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, ContextDecorator, nullcontext
 from types import TracebackType
 from typing import Any, TypeVar
@@ -31,15 +30,25 @@ def worthwhile(numbers: int) -> int:
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
     """Call work(part) for each part, in any order; no call may write what another one reads.
 
-    The threads have ended when this returns, so the process may be forked.
+    This thread works, too. The others have ended when this returns, so the process may be forked.
     """
-    if threads == 1:
-        for part in parts:
-            work(part)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(work, parts):
-            pass  # this raises an error of a part
+    todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
+
+    def some() -> None:
+        try:
+            for part in todo:
+                work(part)
+        except BaseException as error:
+            errors.append(error)
+
+    others = [threading.Thread(target=some) for _ in range(threads - 1)]
+    for other in others:
+        other.start()
+    some()
+    for other in others:
+        other.join()
+    if errors:
+        raise errors[0]
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:

@@ -99,8 +99,8 @@ class SiteBox:
         from scipy import fft
 
         rows, columns = self.padded
-        shape, whole = (rows, columns // 2 + 1), np.result_type(dtype, np.complex64)
-        last = rows // 2 + 1
+        last = rows // 2 + 1  # the transform of row -i is, up to sign, conjugate to that of row i
+        shape, whole = (last, columns // 2 + 1), np.result_type(dtype, np.complex64)
         block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
@@ -112,17 +112,17 @@ class SiteBox:
             sums[taken.start] = []
             for k, each in enumerate(self._laid_out(values, taken)):
                 if k == len(halves):
-                    halves.append(np.zeros(shape, dtype=whole))
+                    halves.append(np.empty(shape, dtype=whole))
                 sums[taken.start].append(float(weights @ np.einsum("ij,ij->i", each, each)))
-                halves[k][taken] = fft.rfft(each.astype(dtype, copy=False), axis=1)
+                waves = fft.rfft(each.astype(dtype, copy=False), axis=1)
+                halves[k][taken] = -1j * waves if odd else waves
 
         transform(blocks[0])  # this first block shows how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
         squares = np.sum([sums[taken.start] for taken in blocks], axis=0)
         found = []
         for square in squares.tolist():
-            spectrum = self._spectrum(halves.pop(0), dtype, odd)
-            found.append(Kernel(spectrum, math.sqrt(square)))
+            found.append(Kernel(self._spectrum(halves.pop(0)), math.sqrt(square)))
         return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
@@ -150,20 +150,15 @@ class SiteBox:
                 whole[beyond] = 0.0
         return found
 
-    def _spectrum(self, half: NDArray[Any], dtype: Any, odd: bool) -> NDArray[Any]:
-        """The transform of a kernel (or its imaginary part) from the transforms of its rows."""
+    def _spectrum(self, half: NDArray[Any]) -> NDArray[Any]:
+        """The real transform of an even kernel, from the transforms of its rows 0, 1, ..."""
         from scipy import fft
 
-        last = (self.padded[0] - 1) // 2
-        if last:  # row -i of an even kernel is row i reversed
-            np.conj(half[last:0:-1], out=half[-last:])
-            if odd:
-                np.negative(half[-last:], out=half[-last:])
-        spectrum = np.empty(half.shape, dtype=dtype)
+        rows = self.padded[0]
+        spectrum = np.empty((rows, half.shape[1]), dtype=half.real.dtype)
 
         def transform(each: slice) -> None:
-            waves = fft.fft(half[:, each], axis=0)
-            spectrum[:, each] = waves.imag if odd else waves.real
+            spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
 
         threads.each(transform, in_blocks(half), self.workers)
         return spectrum
@@ -189,6 +184,12 @@ class SiteBox:
         y *= y
         x += y
         return x
+
+    def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
+        """(rows, padded columns) values (n,) at sites with these flat indices, zeros elsewhere."""
+        field = np.zeros((self.shape[0], self.padded[1]), dtype=values.dtype)
+        field.ravel()[places] = values  # where points coincide, the last value remains
+        return field
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
         """The convolution of a field (rows, columns) with a kernel.

@@ -165,14 +165,7 @@ class Sliced:
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
         slices, bits = self._cut(shares)
         sizes = [float(np.linalg.norm(each)) for each in slices]
-        shape = self.box.shape[0], self.box.padded[1]
-
-        def laid_out(values: Array) -> Array:
-            field = np.zeros(shape)
-            field.ravel()[at] = values
-            return field
-
-        fields = (laid_out(slices.pop(0)) for _ in range(count))
+        fields = (self.box.laid_out(slices.pop(0), at) for _ in range(count))
         levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
