@@ -9,14 +9,15 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_product, two_s
 from convexrough.arrays import Array
 
 
-def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
-    """k P^(2/3) + v - D for asperities with loads P (0 if negative), displacements v, depths D."""
-    return elementwise(_residual, k, loads, displacement, depth)
+def residual(k: Ball, loads: Ball, displacement: Ball, offsets: Ball, approach: Ball) -> Ball:
+    """k P^(2/3) + v - d - D for loads P (0 if negative), displacements v and offsets d."""
+    return elementwise(_residual, k, loads, displacement, offsets, approach)
 
 
 def _residual(
-    k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array, D: Pair, dD: Array
-) -> tuple[Pair, Array]:
+    k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array,
+    d: Pair, dd: Array, D: Pair, dD: Array,
+) -> tuple[Pair, Array]:  # fmt: skip
     """The residual. Its rounding error is below 64 squared roundoffs times `sizes`."""
     safe, loaded = positive(P)
     power = safe.two_thirds()
@@ -26,12 +27,14 @@ def _residual(
     if safe is not P:
         local, rest = local * loaded, rest * loaded
     total, first = two_sum(local, v.high)
-    total, second = two_sum(total, -D.high)
-    mid = Pair(*two_sum(total, (first + second) + ((rest + v.low) - D.low)))
-    sizes = np.abs(local) + (np.abs(v.high) + np.abs(D.high))
+    total, second = two_sum(total, -d.high)
+    total, third = two_sum(total, -D.high)
+    low = (first + second + third) + (((rest + v.low) - d.low) - D.low)
+    mid = Pair(*two_sum(total, low))
+    sizes = np.abs(local) + (np.abs(v.high) + np.abs(d.high) + np.abs(D.high))
     radius = dk * power.high
     if dP.any():
         off = power_error(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
         radius = radius + (np.abs(k.high) + dk) * off
     lost = PAIR_ROUNDOFF * sizes + TINY * (1.0 + np.abs(k.high) * slope)
-    return mid, (radius * UP + (dv + dD) + lost) * UP
+    return mid, (radius * UP + (dv + dd + dD) + lost) * UP

@@ -167,17 +167,19 @@ class Sliced:
         sizes = [float(np.linalg.norm(each)) for each in slices]
         fields = (self.box.laid_out(slices.pop(0), at) for _ in range(count))
         levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
+        unit = size / self.unit
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
         def add_up(some: slice) -> Pair:
-            parts = [level.ravel()[at[some]] for level in levels]
-            total = Pair.exact(np.rint(parts[0]) * units[0])
-            for part, each in zip(parts[1:-1], units[1:], strict=False):
-                total = total + Pair.exact(np.rint(part) * each)
-            total = total + Pair.exact(parts[-1] * units[-1])
-            return Pair(total.high * unit, total.low * unit) + Pair.exact(change[some])
+            high, low = change[some], np.zeros(some.stop - some.start)
+            for level, each in zip(levels[::-1], units[::-1], strict=True):
+                part = level.ravel()[at[some]]
+                if level is not levels[-1]:
+                    part = np.rint(part)
+                high, lost = two_sum(part * (each * unit), high)
+                low += lost
+            return Pair(*two_sum(high, low))
 
-        unit = size / self.unit
         left = behind = 0.0  # norms of the products that `_levels` adds up in its last field
         for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
             behind = behind * 2.0**-self.more + norm

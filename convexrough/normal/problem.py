@@ -47,9 +47,6 @@ from convexrough.sphere import hertz
 #: box", 3).
 FITTED = 0.9
 
-#: Number of candidates up to which the prescribed displacements are cached.
-MOST_KEPT = 2**20
-
 #: If no load changes by more than this part of the largest one, A P is updated by a product of A
 #: with the changes in float64, and keeps 29 digits.
 NEARBY = 1e-13
@@ -158,16 +155,6 @@ class NormalProblem:
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places
-
-    @property
-    def exact_depths(self) -> Ball:
-        """(n,) D = D0 + d for a prescribed approach D0; cached for at most MOST_KEPT candidates."""
-        found: Ball | None = self.__dict__.get("_depths")
-        if found is None:
-            found = self.exact.offsets + self.depth
-            if len(self) <= MOST_KEPT:
-                self.__dict__["_depths"] = found
-        return found
 
     def product(self, loads: Pair) -> Ball:
         """(n,) A P to about thirty digits."""

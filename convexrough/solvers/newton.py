@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import refined_loads
+from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.solvers.pressing import Pressing, PressingState, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
@@ -60,15 +60,18 @@ class Newton:
         start: Array | None = None,
     ) -> Solution:
         """The solution in scaled units; `start` (n,) are initial loads >= 0, or None."""
-        loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration has stopped early
-            trial = refined_loads(problem, loads).frozen()
+        loads, approach, iterations, trial = self._found(problem, start)
+        if trial is not None:  # the iteration has stopped early
+            trial = refined(problem, trial).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
         answer = Solution.of(problem, loads, approach, iterations)
         return replace(answer, refine=not self.tolerance > 0)
 
-    def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
+    def _found(
+        self, problem: NormalProblem, start: Array | None
+    ) -> tuple[Array, float, int, Trial | None]:
+        """Loads, approach, number of steps, and the trial of the loads if it is to be refined."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -81,16 +84,20 @@ class Newton:
             del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
+            loads = among_zeros(state.forces, near, len(problem))
+            unknown, approach = state.unknown, state.approach
+            del state  # saves memory
+            trial = trial_of(problem, loads) if self._refines(problem) else None
             if len(near) == len(problem):
-                return state.forces, state.approach, iterations
+                return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
-            loads, gap = _everywhere(problem, near, state)
+            gap = trial.gap.value if trial else _gaps(problem, loads, approach)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                return loads, state.approach, iterations
+                return loads, approach, iterations, trial
             indentation = -gap
-            indentation[near] = state.unknown
+            indentation[near] = unknown
             touched[near] = True  # `near` only grows, so the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
@@ -141,6 +148,5 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
-def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    loads = among_zeros(state.forces, near, len(problem))
-    return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)
+def _gaps(problem: NormalProblem, loads: Array, approach: float) -> Array:
+    return problem.gap(loads, problem.influence.apply(loads), approach)
