@@ -94,6 +94,19 @@ class SiteBox:
 
         return self.kernels(values, dtype)[0]
 
+    def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
+        """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two sites.
+
+        over_cube : 1 / r^3, or the softened 1 / r^3, as a function of squared distances
+        """
+
+        def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
+            weights = over_cube(squares)
+            x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
+            return [weights * x, weights * y]
+
+        return self.kernels(values, np.float64, odd=True)
+
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
         """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
         from scipy import fft

@@ -34,7 +34,6 @@ from convexrough.influence.coupling import (
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
-from convexrough.influence.slopes import pulls
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
@@ -261,7 +260,7 @@ class LatticeInfluence:
 
     def _pulls(self, box: SiteBox) -> list[Kernel]:
         """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: pulls(box, cubed))
+        return self._cached("pulls", lambda: box.pulls(cubed))
 
     def separations(self) -> Array:
         if not self._filled:
