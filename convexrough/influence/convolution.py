@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arrays import Array, Indices
+from convexrough.roundoff import ROUNDOFF
 
 #: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
 #: docs/theory/operators-lattice.md, "Rounding". A pass of radix 4 has a smaller error than two
@@ -217,13 +218,12 @@ class SiteBox:
 
         return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
-    def bound(self, kernel: Kernel, roundoff: float) -> float:
+    def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        (1) of docs/theory/operators-lattice.md, "Rounding".
+        (1) of docs/theory/operators-lattice.md, "Rounding"; `norm` is the 2-norm of the kernel.
         """
-        inverse = float(np.sqrt(2.0)) * self.loss
-        return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
+        return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ from convexrough.influence.coupling import (
 )
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
+from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
@@ -151,7 +151,7 @@ class LatticeInfluence:
     def rounding(self, loads: Array) -> Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
         # sum of site_error / r^2 in a row bounds the change of a component.
-        each = self.box.bound(self._kernel, ROUNDOFF) * float(np.linalg.norm(loads))
+        each = self.box.bound(self._kernel.norm) * float(np.linalg.norm(loads))
         each += self._displaced * float(np.abs(loads).max(initial=0.0))
         return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
@@ -161,7 +161,7 @@ class LatticeInfluence:
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
         total = self._convolve(shares, kernel.spectrum).astype(np.float64)
-        total += self.box.bound(kernel, 2.0**-24) * float(np.linalg.norm(shares))
+        total += self.box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
@@ -363,7 +363,7 @@ class LatticeInfluence:
         # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
-        error = 2.0 * each_loss(box, 2) * norm * most * float(np.linalg.norm(shares))
+        error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * float(np.abs(change).max())
         unit = top / self.spacing

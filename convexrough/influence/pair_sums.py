@@ -318,7 +318,7 @@ class Product:
         to_mesh, from_mesh = self._weighing
         from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
         # Cauchy's inequality for a row of G, and the sum of a row of |W|.
-        transforms = self.mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.norm
+        transforms = self.mesh.bound(kernel.norm) + from_mesh * kernel.norm
         growth = lebesgue(soft.order) ** 2
         each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
         return Rounding(relative, 1.01 * each)

@@ -32,7 +32,7 @@ from convexrough.roundoff import ROUNDOFF
 #: Numbers of bits of a float64 number and of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches (`mesh.Interpolation`) that are processed together and fit in the cache.
+#: Number of patches (`pair_sums.Interpolation`) that are processed together and fit in the cache.
 PATCHES = 64
 
 #: L is computed with whole numbers, in units of 2^-FIXED.

@@ -134,7 +134,7 @@ class Sliced:
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
-        budget = SURE / ((count - 1) * each_loss(box, count))
+        budget = SURE / ((count - 1) * box.bound(1.0, operations=_operations(count)))
         # Slices of the kernel should have about equal norms, and so should slices of the loads.
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
@@ -186,7 +186,7 @@ class Sliced:
             left += kernel.norm * behind
         # The errors of the values and of operations on pairs, by Cauchy's inequality.
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
-        radius = each_loss(self.box, count) * left * units[-1]
+        radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
         radius = 1.01 * radius * unit + error + PAIR_ROUNDOFF * float(np.abs(change).max()) + TINY
         return Ball.around(in_parts(len(at), add_up), radius)
@@ -229,10 +229,9 @@ class Sliced:
         return [*levels, left]
 
 
-def each_loss(box: SiteBox, count: int) -> float:
-    """Bound on the error of a component of a level, divided by the 2-norms of its two slices.
+def _operations(count: int) -> int:
+    """The number that replaces 4 in (1) of docs/theory/operators-lattice.md.
 
-    It is (1) of docs/theory/operators-lattice.md with 2 `count` + 6 roundoffs instead of 4, because
-    up to `count` products are added up before the inverse transform, and last slices are rounded.
+    Up to `count` products are added up before the inverse transform, and last slices are rounded.
     """
-    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
+    return 2 * count + 6

@@ -135,20 +135,14 @@ def lebesgue(order: int) -> float:
     Between these two nodes the sum equals a polynomial that is even about the middle, and all its
     roots lie outside. So it is largest in the middle.
     """
-    return float(np.abs(lagrange(np.array([0.5]), order)).sum())
-
-
-def lagrange(places: Array, order: int) -> Array:
-    """(n, p) values of Lagrange's polynomials for the nodes 1 - p/2, ..., p/2.
-
-    places : (n,) from 0 to 1
-    """
-    weights: Array = twofold_lagrange(places, order).high
-    return weights
+    return float(np.abs(twofold_lagrange(np.array([0.5]), order).high).sum())
 
 
 def twofold_lagrange(places: Array, order: int) -> Pair:
-    """Lagrange's polynomials as in `lagrange`, in double-double numbers."""
+    """(n, p) Lagrange's polynomials for the nodes 1 - p/2, ..., p/2, in double-double numbers.
+
+    places : (n,) from 0 to 1
+    """
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Pair(*two_sum(places, -float(node))) for node in nodes]
     left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]

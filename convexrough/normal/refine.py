@@ -17,8 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import TINY, Ball, of_rows
-from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.balls import TINY, Ball, of_rows, residual
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess

@@ -54,7 +54,7 @@ def different(versions: Mapping[str, str]) -> str:
 
 def compute(batch: Batch) -> BatchRows:
     """The rows of a batch. No row depends on other scenes; a failed scene's row has the error."""
-    with one_thread:
+    with one_thread():
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
         for number in batch.numbers:
             try:

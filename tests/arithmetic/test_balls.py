@@ -12,8 +12,7 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.balls import Ball, residual
 from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
