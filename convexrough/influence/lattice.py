@@ -87,15 +87,6 @@ class LatticeInfluence:
     stored: ClassVar[bool] = False
     cheap_sums: ClassVar[bool] = True
 
-    @classmethod
-    def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """The operator of points (n, 2) [length]. Raises ValueError for points off the lattice."""
-        places = lattice.sites(points)
-        if places is None:
-            raise ValueError("points off the lattice")
-        layout = Layout(points, (lattice, places))
-        return cls(points, np.arange(len(points)), layout, lattice, scale)
-
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
         """The box, and (n,) flat indices of the asperities' sites in an array of padded rows."""
@@ -119,7 +110,9 @@ class LatticeInfluence:
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = self._kept["boxed"] = reach, box, i * np.intp(box.padded[1]) + j
+            last = reach, box, i * np.intp(box.padded[1]) + j
+            if len(self) <= MOST_KEPT:
+                self._kept["boxed"] = last
         return last[1:]
 
     @property

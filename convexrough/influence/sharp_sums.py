@@ -241,7 +241,9 @@ class SoftValues:
         mesh, kernel, spacing = product.mesh, product.splitting.kernel, product.splitting.spacing
         basis = [[Fraction(x) / Fraction(unit) for x in row] for row in mesh.basis.tolist()]
         distances = Distances.of(basis, max(mesh.shape))
-        return cls(_within_reach(kernel, spacing, unit), distances)
+        step, reach = Fraction(spacing) ** 2, Fraction(kernel.reach)
+        (near,) = soft_terms(kernel, step, math.ceil(reach**2 / step), 1)
+        return cls(soft_values(near, Fraction(unit) / reach), distances)
 
     @property
     def error(self) -> float:
@@ -253,15 +255,6 @@ class SoftValues:
         near = squares < len(self.near.high)
         found.high[near], found.low[near] = self.near.at(squares[near])
         return found
-
-
-def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
-    """`unit` times L at the distances spacing sqrt(s) within the reach, for s = 0, 1, ..."""
-    step = Fraction(spacing) ** 2
-    nodes = math.ceil(Fraction(kernel.reach) ** 2 / step)
-    return soft_values(
-        soft_terms(kernel, step, nodes, 1)[0], Fraction(unit) / Fraction(kernel.reach)
-    )
 
 
 class MeshSums:

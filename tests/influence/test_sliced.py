@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.typing import NDArray
+from point_layouts import on_lattice
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.coupling import inverse_distances
-from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
-from convexrough.scene.lattice import Lattice
 
 Array = NDArray[np.float64]
 
@@ -146,9 +145,7 @@ def perturbed(seed: int, count: int) -> Array:
 def test_points_are_where_they_are(seed: int, slices: int) -> None:
     """What points are off their sites is taken into account."""
     points = perturbed(seed, 120)
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    A = LatticeInfluence.assemble(points, lattice, 1.0)
+    A = on_lattice(points, 1.0)
     loads = np.random.default_rng(seed).random(120)
     found = A.sums(Pair.exact(loads), slices)
     worst = 0.0
@@ -167,9 +164,7 @@ def test_points_are_where_they_are(seed: int, slices: int) -> None:
 def test_loads_near_the_middle_take_smaller_transforms(seed: int) -> None:
     """In turn a few loads, more of them, all of them, and few again, on one operator."""
     points = perturbed(seed, 300)
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    A = LatticeInfluence.assemble(points, lattice, 1.0)
+    A = on_lattice(points, 1.0)
     rng = np.random.default_rng(seed)
     sizes = []
     for count in (1, 20, 150, 300, 5):
