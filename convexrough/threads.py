@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ContextDecorator, nullcontext
-from types import TracebackType
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar
 
 Part = TypeVar("Part")
@@ -31,15 +29,25 @@ def worthwhile(numbers: int) -> int:
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
     """Call work(part) for each part, in any order; no call may write what another one reads.
 
-    The threads have ended when this returns, so the process may be forked.
+    This thread works, too. The others have ended when this returns, so the process may be forked.
     """
-    if threads == 1:
-        for part in parts:
-            work(part)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(work, parts):
-            pass  # this raises an error of a part
+    todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
+
+    def some() -> None:
+        try:
+            for part in todo:
+                work(part)
+        except BaseException as error:
+            errors.append(error)
+
+    others = [threading.Thread(target=some) for _ in range(threads - 1)]
+    for other in others:
+        other.start()
+    some()
+    for other in others:
+        other.join()
+    if errors:
+        raise errors[0]
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
@@ -48,42 +56,36 @@ def chunks(length: int, size: int) -> Iterator[slice]:
         yield slice(start, min(start + size, length))
 
 
-class OneThread(ContextDecorator):
+_lock = threading.Lock()
+_inside: list[Any] = []
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
     """A context in which linear algebra uses one thread.
 
     Several threads would round sums differently and slow down the threads of `each`. When the last
     thread leaves the context, the former limits are restored.
     """
+    with _lock:
+        if not _inside:
+            import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
+            from threadpoolctl import threadpool_limits
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._limits: Any = None
-
-    def __enter__(self) -> OneThread:
-        with self._lock:
-            self._inside += 1
-            if self._limits is None:
-                import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
-                from threadpoolctl import threadpool_limits
-
+            _free()
+            limits = threadpool_limits(1)
+        else:
+            limits = _inside[0]
+        _inside.append(limits)
+    try:
+        yield
+    finally:
+        with _lock:
+            if len(_inside) == 1:
                 _free()
-                self._limits = threadpool_limits(1)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0 and self._limits is not None:
+                limits.restore_original_limits()
                 _free()
-                self._limits.restore_original_limits()
-                self._limits = None
-                _free()
+            _inside.pop()
 
 
 def _free() -> None:
@@ -94,9 +96,6 @@ def _free() -> None:
         OpenBLASController.clear_controlling_thread(force=True)
 
 
-one_thread = OneThread()
-
-
 def one_where(numbers: int) -> AbstractContextManager[object]:
     """The context `one_thread` if `each` uses several threads for this many numbers."""
-    return one_thread if worthwhile(numbers) > 1 else nullcontext()
+    return one_thread() if worthwhile(numbers) > 1 else nullcontext()

@@ -1,6 +1,10 @@
-"""Layouts of points without a lattice, for the operators that couple them."""
+"""Layouts of points without a lattice, and the operator of points on one."""
 
 import numpy as np
+
+from convexrough.influence.lattice import LatticeInfluence
+from convexrough.scene.lattice import Lattice
+from convexrough.scene.layout import Layout
 
 COUNT = 4000
 
@@ -36,3 +40,15 @@ def coincident(rng: np.random.Generator) -> np.ndarray:
 
 
 LAYOUTS = {each.__name__: each for each in (disc, clustered, two, line, jittered, coincident)}
+
+
+def on_lattice(
+    points: np.ndarray, scale: float, lattice: Lattice | None = None
+) -> LatticeInfluence:
+    """The operator of points on a lattice, which is found if it is not given."""
+    lattice = lattice or Lattice.through(points)
+    assert lattice is not None
+    sites = lattice.sites(points)
+    assert sites is not None
+    layout = Layout(points, (lattice, sites))
+    return LatticeInfluence(points, np.arange(len(points)), layout, lattice, scale)

@@ -54,6 +54,8 @@ class Pair(NamedTuple):
 
     def __add__(self, other: object) -> Pair:
         assert isinstance(other, Pair)
+        if np.ndim(self.high) == 1 and len(self.high) > CHUNK and len(other.high) > CHUNK:
+            return in_parts(len(self.high), lambda some: self.at(some) + other.at(some))
         first, high_rest = two_sum(self.high, other.high)
         low, low_rest = two_sum(self.low, other.low)
         low = high_rest + low

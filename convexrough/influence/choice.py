@@ -35,18 +35,19 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     """
     if kind is not None and kind not in KINDS:
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
-    points, error = scene.contact_points[which], scene.point_error
+    n, error = len(which), scene.point_error
+    lattice = scene.lattice if kind == "lattice" or (kind is None and n > FEW_ASPERITIES) else None
+    if lattice is not None:
+        layout = scene.asperities.layout
+        return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
+    points = scene.contact_points[which]
     tails = None if scene.contact_tails is None else scene.contact_tails[which]
-    n = len(which)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
             layout = scene.asperities.layout
             inverse, sums = _restricted(layout.cached(_inverse), which), layout.cached(_sums)
             return DenseInfluence.of(points, scale, scale * inverse, sums.restricted(which))
         return DenseInfluence.assemble(points, scale, error, tails)
-    if kind != "scattered" and scene.lattice is not None:
-        layout, lattice = scene.asperities.layout, scene.lattice
-        return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
     if kind == "lattice":
         expected = "contact points on a two-dimensional lattice"
         if scene.asperities.lattice is not None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arrays import Array, Indices
+from convexrough.roundoff import ROUNDOFF
 
 #: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
 #: docs/theory/operators-lattice.md, "Rounding". A pass of radix 4 has a smaller error than two
@@ -94,13 +95,26 @@ class SiteBox:
 
         return self.kernels(values, dtype)[0]
 
+    def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
+        """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two sites.
+
+        over_cube : 1 / r^3, or the softened 1 / r^3, as a function of squared distances
+        """
+
+        def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
+            weights = over_cube(squares)
+            x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
+            return [weights * x, weights * y]
+
+        return self.kernels(values, np.float64, odd=True)
+
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
         """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
         from scipy import fft
 
         rows, columns = self.padded
-        shape, whole = (rows, columns // 2 + 1), np.result_type(dtype, np.complex64)
-        last = rows // 2 + 1
+        last = rows // 2 + 1  # the transform of row -i is, up to sign, conjugate to that of row i
+        shape, whole = (last, columns // 2 + 1), np.result_type(dtype, np.complex64)
         block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
@@ -112,17 +126,17 @@ class SiteBox:
             sums[taken.start] = []
             for k, each in enumerate(self._laid_out(values, taken)):
                 if k == len(halves):
-                    halves.append(np.zeros(shape, dtype=whole))
+                    halves.append(np.empty(shape, dtype=whole))
                 sums[taken.start].append(float(weights @ np.einsum("ij,ij->i", each, each)))
-                halves[k][taken] = fft.rfft(each.astype(dtype, copy=False), axis=1)
+                waves = fft.rfft(each.astype(dtype, copy=False), axis=1)
+                halves[k][taken] = -1j * waves if odd else waves
 
         transform(blocks[0])  # this first block shows how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
         squares = np.sum([sums[taken.start] for taken in blocks], axis=0)
         found = []
         for square in squares.tolist():
-            spectrum = self._spectrum(halves.pop(0), dtype, odd)
-            found.append(Kernel(spectrum, math.sqrt(square)))
+            found.append(Kernel(self._spectrum(halves.pop(0)), math.sqrt(square)))
         return found
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
@@ -150,20 +164,15 @@ class SiteBox:
                 whole[beyond] = 0.0
         return found
 
-    def _spectrum(self, half: NDArray[Any], dtype: Any, odd: bool) -> NDArray[Any]:
-        """The transform of a kernel (or its imaginary part) from the transforms of its rows."""
+    def _spectrum(self, half: NDArray[Any]) -> NDArray[Any]:
+        """The real transform of an even kernel, from the transforms of its rows 0, 1, ..."""
         from scipy import fft
 
-        last = (self.padded[0] - 1) // 2
-        if last:  # row -i of an even kernel is row i reversed
-            np.conj(half[last:0:-1], out=half[-last:])
-            if odd:
-                np.negative(half[-last:], out=half[-last:])
-        spectrum = np.empty(half.shape, dtype=dtype)
+        rows = self.padded[0]
+        spectrum = np.empty((rows, half.shape[1]), dtype=half.real.dtype)
 
         def transform(each: slice) -> None:
-            waves = fft.fft(half[:, each], axis=0)
-            spectrum[:, each] = waves.imag if odd else waves.real
+            spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
 
         threads.each(transform, in_blocks(half), self.workers)
         return spectrum
@@ -190,6 +199,12 @@ class SiteBox:
         x += y
         return x
 
+    def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
+        """(rows, padded columns) values (n,) at sites with these flat indices, zeros elsewhere."""
+        field = np.zeros((self.shape[0], self.padded[1]), dtype=values.dtype)
+        field.ravel()[places] = values  # where points coincide, the last value remains
+        return field
+
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
         """The convolution of a field (rows, columns) with a kernel.
 
@@ -203,13 +218,12 @@ class SiteBox:
 
         return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
-    def bound(self, kernel: Kernel, roundoff: float) -> float:
+    def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        (1) of docs/theory/operators-lattice.md, "Rounding".
+        (1) of docs/theory/operators-lattice.md, "Rounding"; `norm` is the 2-norm of the kernel.
         """
-        inverse = float(np.sqrt(2.0)) * self.loss
-        return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
+        return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,8 +33,7 @@ from convexrough.influence.coupling import (
 )
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
-from convexrough.influence.slopes import pulls
+from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
@@ -88,26 +87,33 @@ class LatticeInfluence:
     stored: ClassVar[bool] = False
     cheap_sums: ClassVar[bool] = True
 
-    @classmethod
-    def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """The operator of points (n, 2) [length]. Raises ValueError for points off the lattice."""
-        places = lattice.sites(points)
-        if places is None:
-            raise ValueError("points off the lattice")
-        layout = Layout(points, (lattice, places))
-        return cls(points, np.arange(len(points)), layout, lattice, scale)
-
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
         """The box, and (n,) flat indices of the asperities' sites in an array of padded rows."""
         basis, (i, j) = self.lattice.basis / self.spacing, self.places
         if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
-        (row, column), (last_row, last_column) = (i.min(), j.min()), (i.max(), j.max())
-        shape = (int(last_row - row) + 1, int(last_column - column) + 1)
-        middle = (row + last_row) / 2.0, (column + last_column) / 2.0
-        box = SiteBox(shape, basis, _extent(i, j, middle, basis))
-        return box, (i - row) * np.intp(box.padded[1]) + (j - column)
+        i, j = i - i.min(), j - j.min()
+        shape = int(i.max()) + 1, int(j.max()) + 1
+        box = SiteBox(shape, basis, 2.0 * _farthest(i, j, shape, basis))
+        return box, i * np.intp(box.padded[1]) + j
+
+    def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
+        """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
+
+        They are smaller if only asperities near the middle carry loads: the extent is then the
+        largest distance of any asperity from a loaded one. The last ones are cached.
+        """
+        box, loaded, (i, j) = self.box, loads.nonzero()[0], self.cells
+        reach = _farthest(i[loaded], j[loaded], box.shape, box.basis)
+        last: tuple[float, SiteBox, Indices] = self._kept.get("boxed", (-1.0, box, i))
+        if last[0] < reach:
+            self._kept.clear()  # transforms of kernels on the last box
+            box = replace(box, extent=box.extent / 2.0 + reach)
+            last = reach, box, i * np.intp(box.padded[1]) + j
+            if len(self) <= MOST_KEPT:
+                self._kept["boxed"] = last
+        return last[1:]
 
     @property
     def box(self) -> SiteBox:
@@ -138,7 +144,7 @@ class LatticeInfluence:
     def rounding(self, loads: Array) -> Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
         # sum of site_error / r^2 in a row bounds the change of a component.
-        each = self.box.bound(self._kernel, ROUNDOFF) * float(np.linalg.norm(loads))
+        each = self.box.bound(self._kernel.norm) * float(np.linalg.norm(loads))
         each += self._displaced * float(np.abs(loads).max(initial=0.0))
         return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
@@ -148,7 +154,7 @@ class LatticeInfluence:
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
         total = self._convolve(shares, kernel.spectrum).astype(np.float64)
-        total += self.box.bound(kernel, 2.0**-24) * float(np.linalg.norm(shares))
+        total += self.box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
@@ -173,19 +179,16 @@ class LatticeInfluence:
 
     @cached_property
     def _single(self) -> NDArray[Any]:
-        return self._kernel.spectrum.astype(np.float32)
+        if "_kernel" in vars(self):
+            return self._kernel.spectrum.astype(np.float32)
+        return self.box.kernel(1, np.float32).spectrum
 
     def _spectrum(self, dtype: Any) -> NDArray[Any]:
         return self._single if dtype == np.float32 else self._kernel.spectrum
 
     def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._boxed[1]]
-
-    def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(rows, padded columns) the values (n,) at their sites, and zeros at all other sites."""
-        field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
-        field.ravel()[self._boxed[1]] = values  # where points coincide, the last value remains
-        return field
+        box, places = self._boxed
+        return box.convolve(box.laid_out(values, places), spectrum).ravel()[places]
 
     def __len__(self) -> int:
         return len(self.members)
@@ -213,13 +216,18 @@ class LatticeInfluence:
         return i[self.members], j[self.members]
 
     def restricted(self, which: Indices) -> LatticeInfluence:
-        last: LatticeInfluence | None = self._spectra.get("restricted")
-        if last is not None and np.array_equal(last.members, self.members[which]):
-            return last
-        found = replace(self, members=self.members[which])
+        members = self.members[which]
+        if self._parts and np.array_equal(self._parts[0].members, members):
+            return self._parts[0]
+        found = replace(self, members=members)
         if len(self) <= MOST_KEPT:
-            self._spectra["restricted"] = found
+            self._parts[:] = [found]
         return found
+
+    @cached_property
+    def _parts(self) -> list[LatticeInfluence]:
+        """The last result of `restricted`, if it is cached."""
+        return []
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
@@ -237,13 +245,15 @@ class LatticeInfluence:
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
 
     def slopes(self, loads: Array) -> Array:
-        each = [self._convolve(loads, 1j * pull.spectrum) for pull in self._pulls]
+        box, places = self._boxed_for(loads)
+        field = box.laid_out(loads, places)
+        each = [box.convolve(field, 1j * kernel.spectrum) for kernel in self._pulls(box)]
+        each = [found.ravel()[places] for found in each]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
-    @property
-    def _pulls(self) -> list[Kernel]:
+    def _pulls(self, box: SiteBox) -> list[Kernel]:
         """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: pulls(self.box, cubed))
+        return self._cached("pulls", lambda: box.pulls(cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -295,29 +305,30 @@ class LatticeInfluence:
             3, and 4 on a large box (docs/theory/operators-lattice.md, "Slices")
         """
         slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
-        off_sites = self._off_sites(np.asarray(loads.high))
-        sliced = self._cached(slices, lambda: self._slice(slices))
-        return sliced.sums(loads, self._boxed[1], *off_sites)
+        box, places = self._boxed_for(np.asarray(loads.high))
+        off_sites = self._off_sites(np.asarray(loads.high), box, places)
+        sliced = self._cached(slices, lambda: self._slice(box, slices))
+        return sliced.sums(loads, places, *off_sites)
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object that `make` returns, cached under `name` unless there are many asperities."""
-        found: Made = self._spectra[name] if name in self._spectra else make()
+        found: Made = self._kept[name] if name in self._kept else make()
         if len(self) <= MOST_KEPT:
-            self._spectra[name] = found
+            self._kept[name] = found
         return found
 
     @cached_property
-    def _spectra(self) -> dict[object, Any]:
+    def _kept(self) -> dict[object, Any]:
         return {}
 
-    def _slice(self, count: int) -> Sliced:
+    def _slice(self, box: SiteBox, count: int) -> Sliced:
         unit = float(2.0 ** np.floor(np.log2(self.spacing)))
         basis = [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
-        distances = Distances.of(basis, max(self.box.shape))
+        distances = Distances.of(basis, max(box.shape))
         norm = self._kernel.norm * unit / self.spacing
-        return Sliced.of(self.box, distances, norm, unit, count)
+        return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array) -> tuple[Array, float]:
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> tuple[Array, float]:
         """(n,) changes of sum_j P_j / r_ij by deviations from the sites, and their error bound.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
@@ -330,23 +341,22 @@ class LatticeInfluence:
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return np.zeros(len(self)), 0.0
-        shares, pulls = loads / top, self._pulls
-        places = self._boxed[1]
+        shares, pulls = loads / top, self._pulls(box)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
             whole, *moments = waves
             return [along * whole, across * whole, along * moments[0] + across * moments[1]]
 
-        given = (self._laid_out(weight * shares) for weight in (1.0, x, y))
-        fields = through_waves(given, self.box.padded, self.box.workers, pull)
+        given = (box.laid_out(weight * shares, places) for weight in (1.0, x, y))
+        fields = through_waves(given, box.padded, box.workers, pull)
         change = fields[2].ravel()[places]
         change -= x * fields[0].ravel()[places]
         change -= y * fields[1].ravel()[places]
         # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
-        error = 2.0 * each_loss(self.box, 2) * norm * most * float(np.linalg.norm(shares))
+        error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * float(np.abs(change).max())
         unit = top / self.spacing
@@ -404,11 +414,11 @@ def _least_symbol(lattice: Lattice) -> float:
     return least_symbol(lattice.basis / lattice.spacing)
 
 
-def _extent(i: Indices, j: Indices, middle: tuple[float, float], basis: Array) -> float:
-    """Upper bound on the distance of two sites: twice the largest distance from the middle."""
+def _farthest(i: Indices, j: Indices, shape: tuple[int, int], basis: Array) -> float:
+    """Upper bound on the distances of sites (i, j) from the middle of a box of this shape."""
     (g11, g12), (_, g22) = basis @ basis.T
     largest = 0.0
-    for start in range(0, len(i), CHUNK):
-        x, y = i[start : start + CHUNK] - middle[0], j[start : start + CHUNK] - middle[1]
+    for some in threads.chunks(len(i), CHUNK):
+        x, y = i[some] - (shape[0] - 1) / 2.0, j[some] - (shape[1] - 1) / 2.0
         largest = max(largest, float((x * (g11 * x + 2.0 * g12 * y) + g22 * (y * y)).max()))
-    return 2.0 * float(np.sqrt(largest)) * (1.0 + 1e-9)
+    return float(np.sqrt(largest)) * (1.0 + 1e-9)

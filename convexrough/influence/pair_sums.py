@@ -11,20 +11,224 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
-from convexrough.arrays import Array
+from convexrough import checks, threads
+from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
+from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.coupling import Rounding
-from convexrough.influence.mesh import BLOCK, Interpolation
-from convexrough.influence.near_pairs import NearPairs, Order
-from convexrough.influence.softened import WEIGHT_ROUNDOFFS, lebesgue
+from convexrough.influence.softened import WEIGHT_ROUNDOFFS, Softened, lebesgue, twofold_lagrange
 from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
+
+#: Memory [bytes] per near neighbour of a point while the matrix is assembled; and the number of
+#: points from whose near neighbours the number of all near pairs is estimated first.
+BYTES, SAMPLE = 24, 1000
+
+#: Largest number of points in a patch: sums stay short, and a matrix product fits in the cache.
+BLOCK = 256
+
+#: Number of points whose weights are computed together: they fit in the cache.
+PLACES = 2**12
+
+#: Number of pairs whose slopes are computed together.
+PAIRS = 2**22
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """Points sorted by the block of the mesh that contains them.
+
+    places : (n,) original indices of the sorted points
+    points : (n, 2) [length] the sorted points
+    tails  : (n, 2) [length] low parts of the sorted points, or None
+    cells  : (n, 2) mesh cell of each sorted point
+    shares : (n, 2) position of each sorted point in its cell, from 0 to 1
+    keys   : (b,) numbers of the blocks that contain points, sorted
+    starts : (b + 1,) first point of each of these blocks, and the number of all points
+    shape  : numbers of rows and of columns of blocks
+    """
+
+    places: Indices
+    points: Array
+    tails: Array | None
+    cells: Indices
+    shares: Array
+    keys: Indices
+    starts: Indices
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, points: Array, splitting: Splitting, tails: Array | None = None) -> Order:
+        low = points.min(axis=0)
+        cells, shares = _placed(points, low, splitting.spacing, tails)
+        blocks = cells // splitting.block
+        rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
+        key = blocks[:, 0] * columns + blocks[:, 1]
+        places = np.argsort(key, kind="stable")
+        keys, starts = np.unique(key[places], return_index=True)
+        return cls(
+            places,
+            points[places],
+            None if tails is None else tails[places],
+            cells[places],
+            shares[places],
+            keys,
+            np.append(starts, len(points)).astype(np.intp),
+            (rows, columns),
+        )
+
+    def back(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (n, ...) at the sorted points, in the original order."""
+        result = np.empty_like(values)
+        result[self.places] = values
+        return result
+
+    def squares(self, i: Indices, j: Indices) -> Array:
+        """(m,) [length^2] squared distances of the sorted points i (m,) from sorted points j."""
+        apart = self.points[i] - self.points[j]
+        if self.tails is not None:
+            apart += self.tails[i] - self.tails[j]
+        apart *= apart
+        return np.asarray(apart[:, 0] + apart[:, 1])
+
+
+def _placed(
+    points: Array, low: Array, spacing: float, tails: Array | None
+) -> tuple[Indices, Array]:
+    """(n, 2) the mesh cell of each point, and (n, 2) its position in the cell, rounded once.
+
+    low : (2,) [length] the origin of the mesh
+    """
+    away = Pair(*two_sum(points, -low))
+    if tails is not None:
+        away += Pair.exact(tails)
+    away /= Pair.exact(spacing)
+    cells = np.floor(away.high)
+    cells -= (away.high == cells) & (away.low < 0)
+    cells = np.maximum(cells, 0.0)
+    return cells.astype(np.intp), (away.high - cells) + away.low
+
+
+@dataclass(frozen=True, eq=False)
+class NearPairs:
+    """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
+
+    upper   : (n, n) sparse, the entries for pairs of sorted points i < j
+    own     : the number on the diagonal, -L(0), as a point does not displace itself
+    terms   : largest number of near neighbours of a point
+    nearest : [length] least distance of a near pair that is not 0
+    """
+
+    upper: Any
+    own: float
+    terms: int
+    nearest: float
+
+    @classmethod
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
+        from scipy.sparse import csr_array
+        from scipy.spatial import cKDTree
+
+        n, tree = len(order.points), cKDTree(order.points)
+        some = order.points[:: max(1, n // SAMPLE)]
+        near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
+        checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
+        i, j = tree.query_pairs(splitting.cut, output_type="ndarray").T.astype(np.int32)
+        values, nearest = np.empty(len(i), dtype=dtype), [splitting.cut]
+
+        def compute(some: slice) -> None:
+            squares = order.squares(i[some], j[some])
+            values[some] = splitting.kernel.local(squares)
+            nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
+
+        threads.each(compute, threads.chunks(len(i), CHUNK), threads.worthwhile(len(i)))
+        terms = np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
+        upper = csr_array((values, (i, j)), shape=(n, n))
+        most = int(terms.max(initial=0))
+        return cls(upper, -splitting.kernel.centre, most, min(nearest))
+
+    def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
+        result: NDArray[Any] = self.upper @ loads
+        result += self.upper.T @ loads
+        result += loads.dtype.type(self.own) * loads
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """The interpolation W from nodes to points.
+
+    x, y    : (n, width) weights in each direction; an entry of W is the product of one of each
+    patches : for each group of consecutive points in one block of mesh cells: the first point, the
+        point after the last, and the indices i and j of the first node
+    shape   : numbers of nodes of the mesh in both directions
+    """
+
+    x: NDArray[Any]
+    y: NDArray[Any]
+    patches: list[tuple[int, int, int, int]]
+    shape: tuple[int, int]
+
+    @classmethod
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
+        rows, columns = order.shape
+        patches = []
+        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * splitting.block
+        for key, (i, j) in enumerate(corners.tolist()):
+            start, stop = order.starts[key : key + 2].tolist()
+            for first in range(start, stop, BLOCK):
+                patches.append((first, min(first + BLOCK, stop), i, j))
+        x, y = (np.empty((len(order.places), splitting.width), dtype=dtype) for _ in (0, 1))
+        for start in range(0, len(x), PLACES):
+            some = slice(start, start + PLACES)
+            x[some], y[some] = (factor.high for factor in twofold_weights(order, splitting, some))
+        extra = splitting.kernel.order - 1
+        shape = (rows * splitting.block + extra, columns * splitting.block + extra)
+        return cls(x, y, patches, shape)
+
+    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+        """W^T P at the nodes of the mesh for loads P (n,), or |W|^T P if `absolute`."""
+        field = np.zeros(self.shape, dtype=loads.dtype)
+        x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
+        width = x.shape[1]
+        column = loads[:, None]
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
+        return field
+
+    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
+        """(n,) W times a field of values at the nodes of the mesh."""
+        result = np.empty(len(self.x), dtype=field.dtype)
+        width = self.x.shape[1]
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            along = self.x[mine] @ field[i : i + width, j : j + width]
+            np.einsum("ij,ij->i", along, self.y[mine], out=result[mine])
+        return result
+
+
+def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
+    """The double-double weights (m, width) of some points, in x and in y.
+
+    They are 0 except at the nodes from which a point interpolates.
+    """
+    stencil = np.arange(splitting.kernel.order)
+    factors = []
+    for k in (0, 1):
+        weights = twofold_lagrange(order.shares[some, k], len(stencil))
+        rows = Pair(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
+        columns = (order.cells[some, k] % splitting.block)[:, None] + stencil
+        for row, values in zip(rows, weights, strict=True):
+            np.put_along_axis(row, columns, values, axis=1)
+        factors.append(rows)
+    return factors[0], factors[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +236,14 @@ class Product:
     """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors.
 
     splitting, order : the choice of L and of the mesh; the points sorted by blocks of mesh cells
-    near, weights : the matrix S, and the interpolation W; None if there is no mesh
+    near, weights : the matrix S, and the interpolation W
     mesh, kernel : the box of the nodes, and L on it, which multiplies by G
     """
 
     splitting: Splitting
     order: Order
     near: NearPairs
-    weights: Interpolation | None
+    weights: Interpolation
     mesh: SiteBox
     kernel: Kernel
 
@@ -49,9 +253,6 @@ class Product:
     ) -> Product:
         order = Order.of(points, splitting, tails)
         near = NearPairs.assemble(order, splitting, dtype)
-        if not splitting.meshed:
-            nothing = Kernel(np.empty((0, 0)), 0.0)
-            return cls(splitting, order, near, None, SiteBox((1, 1), np.eye(2)), nothing)
         weights = Interpolation.assemble(order, splitting, dtype)
         mesh = SiteBox(weights.shape, splitting.spacing * np.eye(2))
         size = float(mesh.padded[0]) * mesh.padded[1]
@@ -65,22 +266,12 @@ class Product:
         GIL.
         """
         ordered = loads[self.order.places]
-        if self.weights is None:
-            total = self.near.apply(ordered)
-        else:
-            with ThreadPoolExecutor(1) as other:
-                near = other.submit(self.near.apply, ordered)
-                total = self.smooth(ordered)
-                total += near.result()
-        result = np.empty_like(total)
-        result[self.order.places] = total
-        return result
-
-    def smooth(self, ordered: NDArray[Any]) -> NDArray[Any]:
-        """(n,) the part of the sums that is computed on the mesh, W G W^T P, for sorted loads P."""
-        assert self.weights is not None
-        field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
-        return self.weights.from_nodes(field)
+        with ThreadPoolExecutor(1) as other:
+            near = other.submit(self.near.apply, ordered)
+            field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
+            total = self.weights.from_nodes(field)
+            total += near.result()
+        return self.order.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on the interpolation error of near pairs in sums of `strengths` (n,) >= 0.
@@ -89,13 +280,9 @@ class Product:
         other pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
-        if not self.splitting.meshed:
-            return np.zeros(len(strengths))
         points, ordered = self.order.points, strengths[self.order.places]
         near = within(points, ordered, kernel.reach + kernel.sway(spacing))
-        bounds = np.empty_like(near)
-        bounds[self.order.places] = kernel.pair_error(spacing) * near
-        return bounds
+        return self.order.back(kernel.pair_error(spacing) * near)
 
     def above(self, strengths: Array) -> Array:
         """(n,) upper bounds on the sums over j of strengths_j / r_ij^q, for `strengths` >= 0."""
@@ -124,18 +311,59 @@ class Product:
         """
         relative, own = self._rounding
         each = own * float(np.abs(loads).max(initial=0.0))
-        if self.weights is not None:
-            ordered = loads[self.order.places]
-            field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
-            sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
-            kernel, soft = self.kernel, self.splitting.kernel
-            to_mesh, from_mesh = self._weighing
-            from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
-            # Cauchy's inequality for a row of G, and the sum of a row of |W|.
-            transforms = self.mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.norm
-            growth = lebesgue(soft.order) ** 2
-            each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
+        ordered = loads[self.order.places]
+        field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
+        sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
+        kernel, soft = self.kernel, self.splitting.kernel
+        to_mesh, from_mesh = self._weighing
+        from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
+        # Cauchy's inequality for a row of G, and the sum of a row of |W|.
+        transforms = self.mesh.bound(kernel.norm) + from_mesh * kernel.norm
+        growth = lebesgue(soft.order) ** 2
+        each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
         return Rounding(relative, 1.01 * each)
+
+    def slopes(self, values: Array) -> Array:
+        """(n, 2) the sums over j of (c_i - c_j) v_j / r_ij^3 for points c and `values` v.
+
+        They have no error bounds. The smooth part of the kernel is -grad L, the distance vector
+        times the softened 1 / r^3 whose order is one less.
+        """
+        ordered = values[self.order.places]
+        total = self._near_slopes(ordered)
+        field = self.weights.to_nodes(ordered)
+        for k, pull in enumerate(self._pulls):
+            total[:, k] += self.weights.from_nodes(self.mesh.convolve(field, 1j * pull.spectrum))
+        return self.order.back(total)
+
+    @cached_property
+    def _pulls(self) -> list[Kernel]:
+        return self.mesh.pulls(self._softer.smooth)
+
+    @property
+    def _softer(self) -> Softened:
+        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
+
+    def _near_slopes(self, ordered: Array) -> Array:
+        """(n, 2) the part of `slopes` by near pairs of sorted points: 1 / r^3 less its smooth part.
+
+        ordered : (n,) the values v_j at the sorted points
+        """
+        upper, points, kernel = self.near.upper, self.order.points, self._softer
+        total, n = np.zeros_like(points), len(points)
+        edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + PAIRS, PAIRS))
+        edges = np.unique(np.append(np.minimum(edges, n), (0, n)))
+        for first, last in pairwise(edges):
+            counts = np.diff(upper.indptr[first : last + 1])
+            here = np.repeat(np.arange(first, last), counts)
+            there = upper.indices[upper.indptr[first] : upper.indptr[last]]
+            apart = points[here] - points[there]
+            weights = kernel.local((apart**2).sum(axis=1))
+            for k in (0, 1):
+                pull = weights * apart[:, k]
+                total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
+                total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
+        return total
 
     @property
     def _weighing(self) -> tuple[float, float]:

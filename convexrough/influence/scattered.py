@@ -15,7 +15,6 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Kernel
 from convexrough.influence.coupling import (
     Coupling,
     JointCoupling,
@@ -24,11 +23,10 @@ from convexrough.influence.coupling import (
     Smoother,
     known,
 )
-from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
+from convexrough.influence.dense import DenseCoupling, DenseInfluence, dense_matrix, entry_error
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
-from convexrough.influence.slopes import by_mesh, mesh_pulls
 from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
@@ -54,6 +52,8 @@ class ScatteredInfluence:
     point_error : [length] bound on the error of each coordinate of the points
     tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
     tolerance   : largest relative error of a product that is due to interpolation
+
+    Few points, or points in dense clusters, have no mesh: their products are those of a matrix.
     """
 
     points: Array
@@ -70,14 +70,18 @@ class ScatteredInfluence:
         return len(self.points)
 
     def apply(self, loads: Array) -> Array:
-        if loads.dtype == np.float32:
-            product = self._single.apply(loads)
-        else:
-            product = self._double.apply(loads.astype(np.float64, copy=False))
-        product *= product.dtype.type(self.scale)
-        return product
+        dtype = np.float32 if loads.dtype == np.float32 else np.float64
+        tolerance = max(self.tolerance, SINGLE_TOLERANCE) if dtype == np.float32 else self.tolerance
+        product = self._product(1, tolerance, dtype)
+        if product is None:
+            return self._dense.apply(loads.astype(np.float64, copy=False)).astype(dtype, copy=False)
+        found = product.apply(loads.astype(dtype, copy=False))
+        found *= dtype(self.scale)
+        return found
 
     def rounding(self, loads: Array) -> Rounding:
+        if self._double is None:
+            return self._dense.rounding(loads)
         rounding = self._double.rounding(loads)
         points = entry_error(self._unknown, self._double.near.nearest)
         interpolated = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
@@ -88,7 +92,10 @@ class ScatteredInfluence:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         product = self._product(power, FALLOFF_TOLERANCE, np.float64)
-        return product.above(strengths) * self._stretched(power)
+        if product is None:
+            return self._dense.falloff(strengths, power)
+        moved = entry_error(self._unknown, product.near.nearest)
+        return product.above(strengths) * float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
     @property
     def matrix(self) -> Array:
@@ -112,11 +119,9 @@ class ScatteredInfluence:
         return JointCoupling(replace(self, points=together, tails=None), len(points))
 
     def slopes(self, loads: Array) -> Array:
-        return -self.scale * by_mesh(self._double, self._pulls, loads)
-
-    @cached_property
-    def _pulls(self) -> list[Kernel]:
-        return mesh_pulls(self._double)
+        if self._double is None:
+            return self._dense.slopes(loads)
+        return -self.scale * self._double.slopes(loads)
 
     def separations(self) -> Array:
         return separations(self.points, self.point_error)
@@ -138,34 +143,32 @@ class ScatteredInfluence:
 
     @cached_property
     def _sums(self) -> MatrixSums | MeshSums:
-        if len(self) > FEW and self._double.splitting.meshed:
+        if len(self) > FEW and self._double is not None:
             return MeshSums(self._double)
         return MatrixSums(*known(self.points, self.tails, self.point_error))
 
     def smoother(self, root: Array) -> Smoother:
         return smoother_of_points(self.points, self.scale, root)
 
-    def _stretched(self, power: int) -> float:
-        """A bound on the factor by which errors of the points can increase 1 / r^power."""
-        moved = entry_error(self._unknown, self._double.near.nearest)
-        return float((1.0 + moved) ** power) * (1.0 + 1e-6)
-
     @property
-    def _double(self) -> Product:
+    def _double(self) -> Product | None:
         return self._product(1, self.tolerance, np.float64)
 
-    @property
-    def _single(self) -> Product:
-        return self._product(1, max(self.tolerance, SINGLE_TOLERANCE), np.float32)
+    @cached_property
+    def _dense(self) -> DenseInfluence:
+        """The operator as a matrix, for points for which a mesh costs more."""
+        return DenseInfluence.assemble(self.points, self.scale, self.point_error, self.tails)
 
     @cached_property
-    def _products(self) -> dict[tuple[int, Any], Product]:
+    def _products(self) -> dict[tuple[int, Any], Product | None]:
         return {}
 
-    def _product(self, power: int, tolerance: float, dtype: Any) -> Product:
+    def _product(self, power: int, tolerance: float, dtype: Any) -> Product | None:
+        """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
         if (power, dtype) not in self._products:
-            splitting = Splitting.choose(self.points, power, tolerance)
-            found = Product.assemble(self.points, splitting, dtype, self.tails)
+            splitting, found = Splitting.choose(self.points, power, tolerance), None
+            if splitting is not None:
+                found = Product.assemble(self.points, splitting, dtype, self.tails)
             self._products[power, dtype] = found
         return self._products[power, dtype]
 

@@ -134,7 +134,7 @@ class Sliced:
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
-        budget = SURE / ((count - 1) * each_loss(box, count))
+        budget = SURE / ((count - 1) * box.bound(1.0, operations=_operations(count)))
         # Slices of the kernel should have about equal norms, and so should slices of the loads.
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
@@ -165,33 +165,28 @@ class Sliced:
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
         slices, bits = self._cut(shares)
         sizes = [float(np.linalg.norm(each)) for each in slices]
-        shape = self.box.shape[0], self.box.padded[1]
-
-        def laid_out(values: Array) -> Array:
-            field = np.zeros(shape)
-            field.ravel()[at] = values
-            return field
-
-        fields = (laid_out(slices.pop(0)) for _ in range(count))
+        fields = (self.box.laid_out(slices.pop(0), at) for _ in range(count))
         levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
+        unit = size / self.unit
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
         def add_up(some: slice) -> Pair:
-            parts = [level.ravel()[at[some]] for level in levels]
-            total = Pair.exact(np.rint(parts[0]) * units[0])
-            for part, each in zip(parts[1:-1], units[1:], strict=False):
-                total = total + Pair.exact(np.rint(part) * each)
-            total = total + Pair.exact(parts[-1] * units[-1])
-            return Pair(total.high * unit, total.low * unit) + Pair.exact(change[some])
+            high, low = change[some], np.zeros(some.stop - some.start)
+            for level, each in zip(levels[::-1], units[::-1], strict=True):
+                part = level.ravel()[at[some]]
+                if level is not levels[-1]:
+                    part = np.rint(part)
+                high, lost = two_sum(part * (each * unit), high)
+                low += lost
+            return Pair(*two_sum(high, low))
 
-        unit = size / self.unit
         left = behind = 0.0  # norms of the products that `_levels` adds up in its last field
         for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
         # The errors of the values and of operations on pairs, by Cauchy's inequality.
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
-        radius = each_loss(self.box, count) * left * units[-1]
+        radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
         radius = 1.01 * radius * unit + error + PAIR_ROUNDOFF * float(np.abs(change).max()) + TINY
         return Ball.around(in_parts(len(at), add_up), radius)
@@ -234,10 +229,9 @@ class Sliced:
         return [*levels, left]
 
 
-def each_loss(box: SiteBox, count: int) -> float:
-    """Bound on the error of a component of a level, divided by the 2-norms of its two slices.
+def _operations(count: int) -> int:
+    """The number that replaces 4 in (1) of docs/theory/operators-lattice.md.
 
-    It is (1) of docs/theory/operators-lattice.md with 2 `count` + 6 roundoffs instead of 4, because
-    up to `count` products are added up before the inverse transform, and last slices are rounded.
+    Up to `count` products are added up before the inverse transform, and last slices are rounded.
     """
-    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
+    return 2 * count + 6

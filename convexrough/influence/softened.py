@@ -25,7 +25,7 @@ CUT_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Softened:
-    """The kernel L of 1 / r^q with power q, even order p, reach a [length]; 0 if a is infinite."""
+    """The kernel L of 1 / r^q with power q, even order p, reach a [length]."""
 
     power: int
     order: int
@@ -49,17 +49,14 @@ class Softened:
         values[squares == 0.0] = 0.0
         if self.power > 1:
             values **= self.power
-        if np.isfinite(self.reach):
-            ratio = squares / -(self.reach**2)
-            ratio += 1.0
-            values -= self._series(ratio) / self.reach**self.power
+        ratio = squares / -(self.reach**2)
+        ratio += 1.0
+        values -= self._series(ratio) / self.reach**self.power
         return values
 
     @cached_property
     def centre(self) -> float:
         """The value L(0)."""
-        if not np.isfinite(self.reach):
-            return 0.0
         return float(_series(self.order, self.power).sum()) / self.reach**self.power
 
     @property
@@ -81,8 +78,6 @@ class Softened:
 
         docs/theory/operators-mesh.md, "Rounding", for any q.
         """
-        if not np.isfinite(self.reach):
-            return 0.0
         q = self.power
         return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
 
@@ -96,24 +91,18 @@ class Softened:
         1 / r^q - L is the rest of the series. For t <= 1/2 it is at most 2.3 times its first term,
         because each coefficient is less than a tenth larger than the one before.
         """
-        if not np.isfinite(self.reach):
-            return np.inf
         first = 2.3 * float(_series(self.order + 1, self.power)[-1])
         error = CUT_SHARE * self._interpolation_error(spacing) * self.reach**self.power
         t = min(0.5, (error / first) ** (1.0 / (self.order + 1)))
         return self.reach * math.sqrt(1.0 - t)
 
     def _interpolation_error(self, spacing: float) -> float:
-        if not np.isfinite(self.reach):
-            return 0.0
         worst = _steepest(self.order, self.power)
         ratio = (spacing / self.reach) ** self.order
         return _interpolated(self.order) * worst * ratio / self.reach**self.power
 
     def far_error(self, spacing: float) -> float:
         """Bound on the relative interpolation error for pairs beyond the reach plus the `sway`."""
-        if not np.isfinite(self.reach):
-            return 0.0
         worst = float(math.comb(self.order + self.power - 1, self.order))
         nearer = (self.reach + self.sway(spacing)) / self.reach
         ratio = (spacing / self.reach) ** self.order
@@ -124,7 +113,7 @@ class Softened:
 
         d is the distance of any two nodes from which the values at the two points interpolate.
         """
-        return math.sqrt(2.0) * self.order * spacing if np.isfinite(self.reach) else 0.0
+        return math.sqrt(2.0) * self.order * spacing
 
     @property
     def _slope(self) -> float:
@@ -146,20 +135,14 @@ def lebesgue(order: int) -> float:
     Between these two nodes the sum equals a polynomial that is even about the middle, and all its
     roots lie outside. So it is largest in the middle.
     """
-    return float(np.abs(lagrange(np.array([0.5]), order)).sum())
-
-
-def lagrange(places: Array, order: int) -> Array:
-    """(n, p) values of Lagrange's polynomials for the nodes 1 - p/2, ..., p/2.
-
-    places : (n,) from 0 to 1
-    """
-    weights: Array = twofold_lagrange(places, order).high
-    return weights
+    return float(np.abs(twofold_lagrange(np.array([0.5]), order).high).sum())
 
 
 def twofold_lagrange(places: Array, order: int) -> Pair:
-    """Lagrange's polynomials as in `lagrange`, in double-double numbers."""
+    """(n, p) Lagrange's polynomials for the nodes 1 - p/2, ..., p/2, in double-double numbers.
+
+    places : (n,) from 0 to 1
+    """
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Pair(*two_sum(places, -float(node))) for node in nodes]
     left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]

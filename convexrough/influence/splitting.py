@@ -45,11 +45,15 @@ class Splitting:
     block: int
 
     @classmethod
-    def choose(cls, points: Array, power: int, tolerance: float) -> Splitting:
-        """The cheapest splitting whose relative error in a product is probably within tolerance."""
+    def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
+        """The cheapest splitting whose relative error in a product is probably within tolerance.
+
+        None if sums over all pairs are cheaper.
+        """
         n = len(points)
         extent = np.ptp(points, axis=0) if n else np.zeros(2)
-        best, least = cls(Softened(power, 2, np.inf), 1.0, 1), PAIR_COST * n * n / 2
+        best: Splitting | None = None
+        least = PAIR_COST * n * n / 2
         if n < 2 or not extent.any():
             return best
         sums = _Sums.of(points, power)
@@ -70,10 +74,6 @@ class Splitting:
                 if cost < least:
                     best, least = found, cost
         return best
-
-    @property
-    def meshed(self) -> bool:
-        return bool(np.isfinite(self.kernel.reach))
 
     @property
     def cut(self) -> float:

@@ -40,9 +40,6 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Number of candidates up to which the prescribed displacements are cached.
-MOST_KEPT = 2**20
-
 #: If no load changes by more than this part of the largest one, A P is updated by a product of A
 #: with the changes in float64, and keeps 29 digits.
 NEARBY = 1e-13
@@ -193,16 +190,6 @@ class NormalProblem:
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places
-
-    @property
-    def exact_depths(self) -> Ball:
-        """(n,) D = D0 + d for a prescribed approach D0; cached for at most MOST_KEPT candidates."""
-        found: Ball | None = self.__dict__.get("_depths")
-        if found is None:
-            found = self.exact.offsets + self.control
-            if len(self) <= MOST_KEPT:
-                self.__dict__["_depths"] = found
-        return found
 
     def apply(self, loads: Array) -> Array:
         """(n,) A P in float64."""

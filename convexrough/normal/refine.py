@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import TINY, Ball, of_rows
-from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.balls import TINY, Ball, of_rows, residual
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
@@ -90,10 +89,7 @@ class Trial:
     @property
     def indentation(self) -> Ball:
         """(n,) indentations D0 + d - A P under these loads; a negative one is minus the gap."""
-        problem = self.problem
-        if problem.load is None:
-            return problem.exact_depths - self.product
-        return problem.exact.offsets + self.approach - self.product
+        return self.problem.exact.offsets + self.approach - self.product
 
     def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
         """This trial of a stack, with the rows chosen by `where` replaced by those of `other`."""
@@ -114,9 +110,9 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
-        gap = residual(data.coefficients, exact, product, problem.exact_depths)
+        gap = residual(data.coefficients, exact, product, data.offsets, problem.control)
         return Trial(problem, loads, product, local, gap, problem.control, missing)
-    above = residual(data.coefficients, exact, product, data.offsets)  # D0 where touching
+    above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))  # as D0
     weights = np.cbrt(loads.high)
     total = summed(weights)
     shift = summed(weights * above.value) / total
@@ -154,8 +150,13 @@ def refined(problem: Problem, best: Trial) -> Trial:
 
 def refined_loads(problem: Problem, loads: Array) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
+    return refined(problem, trial_of(problem, loads))
+
+
+def trial_of(problem: Problem, loads: Array) -> Trial:
+    """The trial of loads (n,) >= 0, which are changed to have the prescribed total."""
     pair, missing = completed(problem, Pair.exact(loads))
-    return refined(problem, trial(problem, pair, missing, problem.product(pair)))
+    return trial(problem, pair, missing, problem.product(pair))
 
 
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
@@ -171,7 +172,9 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
     ratio = np.divide(step, own, out=np.zeros(own.shape), where=inside)
     near = inside & (ratio > -0.5)
     ends = hertz.load(own + step, problem.coefficients)
-    grown = loads.high * np.expm1(1.5 * np.log1p(np.where(near, ratio, 0.0)))
+    x = np.where(near, ratio, 0.0)
+    root = np.sqrt(1.0 + x)
+    grown = loads.high * (x * (1.0 + x + root + 1.0) / (1.0 + root))  # P ((1 + x)^(3/2) - 1)
     following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
     loaded = near | (ends > 0)
     following, missing = completed(problem, Pair(*(part * loaded for part in following)))

@@ -71,11 +71,6 @@ class Stack:
         return None if self.by_load else self.control.value
 
     @cached_property
-    def exact_depths(self) -> Ball:
-        """(m, n) D, the prescribed approaches plus the offsets."""
-        return self.exact.offsets + self.control
-
-    @cached_property
     def row_norm(self) -> Array:
         """(m, 1) for each problem a bound on the largest 2-norm of a row of A."""
         return self._each("row_norm")

@@ -20,7 +20,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import refined_loads
+from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
@@ -130,15 +130,18 @@ class Newton:
         start: Array | None = None,
     ) -> Solution:
         """The solution in scaled units; `start` (n,) are initial loads >= 0, or None."""
-        loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration has stopped early
-            trial = refined_loads(problem, loads).frozen()
+        loads, approach, iterations, trial = self._found(problem, start)
+        if trial is not None:  # the iteration has stopped early
+            trial = refined(problem, trial).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
         refine = not self.tolerance > 0
         return Solution.of(problem, loads, approach, iterations, refine=refine)
 
-    def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
+    def _found(
+        self, problem: NormalProblem, start: Array | None
+    ) -> tuple[Array, float, int, Trial | None]:
+        """Loads, approach, number of steps, and the trial of the loads if it is to be refined."""
         indentation = _start(problem, start)
         near, iterations = np.arange(len(problem)), 0
         if len(problem) > ALL_ITERATED and start is None:
@@ -149,17 +152,20 @@ class Newton:
             del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
-            if len(near) == len(problem):
-                return state.forces, float(state.at.approach), iterations
-            # The iteration left out some asperities: compute the gaps of all.
             loads = among_zeros(state.forces, near, len(problem))
-            gap = problem.gap(loads, problem.influence.apply(loads), float(state.at.approach))
+            unknown, approach = state.unknown, float(state.at.approach)
+            del state  # saves memory
+            trial = trial_of(problem, loads) if self._refines(problem) else None
+            if len(near) == len(problem):
+                return loads, approach, iterations, trial
+            # The iteration left out some asperities: compute the gaps of all.
+            gap = trial.gap.value if trial else _gaps(problem, loads, approach)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                return loads, float(state.at.approach), iterations
+                return loads, approach, iterations, trial
             indentation = -gap
-            indentation[near] = state.unknown
+            indentation[near] = unknown
             touched[near] = True  # `near` only grows, so the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
@@ -215,3 +221,7 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     if problem.load is not None:
         loads = loads / loads.max() * problem.load  # also if they are too small for a sum
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
+
+
+def _gaps(problem: NormalProblem, loads: Array, approach: float) -> Array:
+    return problem.gap(loads, problem.influence.apply(loads), approach)

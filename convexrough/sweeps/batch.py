@@ -147,7 +147,7 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     No value depends on other scenes; the last bits of error bounds may, as products with matrices
     are rounded in another way if there are more rows. A failed scene's row has the error.
     """
-    with one_thread:
+    with one_thread():
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
         for number in batch.numbers:
             try:

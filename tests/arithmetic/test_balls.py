@@ -12,8 +12,7 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.kernels import residual
+from convexrough.arithmetic.balls import Ball, residual
 from convexrough.arithmetic.pairs import MANY, PAIR_ROUNDOFF, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
@@ -123,16 +122,16 @@ def test_functions(rows: Any, name: str) -> None:
 
 
 @settings(max_examples=20, deadline=None)
-@given(some, some, some, some)
-def test_residual(k: Any, P: Any, v: Any, D: Any) -> None:
-    """The kernel: k P^(2/3) + v - D."""
-    operands = [balls(rows) for rows in (k, P, v, D)]
+@given(some, some, some, some, some)
+def test_residual(k: Any, P: Any, v: Any, d: Any, D: Any) -> None:
+    """The kernel: k P^(2/3) + v - d - D."""
+    operands = [balls(rows) for rows in (k, P, v, d, D)]
     found = residual(*operands)
     for i in range(6):
-        ks, Ps, vs, Ds = (samples(each, i)[::2] for each in operands)
+        ks, Ps, vs, ds, Ds = (samples(each, i)[::2] for each in operands)
         powers = [_cube_root(P) ** 2 for P in Ps]
-        for a, x, b, c in itertools.product(ks, powers, vs, Ds):
-            assert holds(found, i, a * x + b - c)
+        for a, x, b, c, e in itertools.product(ks, powers, vs, ds, Ds):
+            assert holds(found, i, a * x + b - c - e)
 
 
 @settings(max_examples=60, deadline=None)

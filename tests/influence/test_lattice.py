@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from point_layouts import on_lattice
 
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
@@ -43,10 +44,8 @@ def patch(basis: Array, count: int) -> Array:
     return points[order[:count]]
 
 
-def operator(points: Array, scale: float = SCALE) -> LatticeInfluence:
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    return LatticeInfluence.assemble(points, lattice, scale)
+def operator(points: Array) -> LatticeInfluence:
+    return on_lattice(points, SCALE)
 
 
 def assert_spans(lattice: Lattice, basis: Array) -> None:

@@ -6,10 +6,11 @@ from flint import arb
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from point_layouts import on_lattice
 
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.influence.lattice import LEAST_NEGATIVE, LatticeInfluence
+from convexrough.influence.lattice import LEAST_NEGATIVE
 from convexrough.influence.lattice_symbol import LOST, TOLERANCE, _Symbol, least_symbol
 from convexrough.scene.lattice import Lattice, _shortest
 
@@ -121,7 +122,7 @@ def test_points_off_their_sites_are_counted(seed: int, share: float, off: float)
     lattice = Lattice(np.zeros(2), basis, 1e-13 + off * float(np.hypot(*basis[0])))
     sites = np.stack(np.divmod(np.arange(100), 10), axis=1) @ basis
     points = sites + rng.uniform(-off, off, sites.shape) * lattice.spacing * (1 - 1e-9)
-    A = LatticeInfluence.assemble(points, lattice, SCALE)
+    A = on_lattice(points, SCALE, lattice)
     radius = lattice.spacing / share
     if not A.semidefinite_with(radius):
         return

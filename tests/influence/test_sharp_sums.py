@@ -111,7 +111,6 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     points[0] = 0.7, 0.6
     product, loads = assembled(order, points), scattered_loads(rng, 300)
     weights, placed = product.weights, product.order
-    assert weights is not None
     lows = sharp._low_weights(product)
     field, error = sharp._to_nodes(product, lows, Pair.exact(loads[placed.places]))
     plain = weights.to_nodes(loads[placed.places])
@@ -145,7 +144,6 @@ def test_values_at_points(order: int) -> None:
     rng = np.random.default_rng(order)
     product = assembled(order, disc(rng, 200))
     weights, placed = product.weights, product.order
-    assert weights is not None
     whole = np.rint(rng.uniform(-1, 1, weights.shape) * 2.0**43)
     rest = rng.uniform(-1, 1, weights.shape) * 2.0**20
     nodes = Pair((whole * 2.0**-40).ravel(), (rest * 2.0**-40).ravel())
