@@ -145,14 +145,18 @@ def open_folder(path: Path) -> Folder:
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
     """The folder of a sweep, created if it does not exist.
 
-    Raises FileError if it contains another sweep or other files, or cannot be written, and
+    overwrite : remove the parts of an earlier sweep in the folder; other files in it stay
+
+    Raises FileError if it contains another sweep, or files but no sweep, or cannot be written, and
     ExtraError if pyarrow is not installed.
     """
     arrow()
     if overwrite and (path / MANIFEST).exists():
-        for part in (path / PARTS).glob("*.parquet"):
-            part.unlink(missing_ok=True)
-        (path / MANIFEST).unlink()
+        earlier = open_folder(path)
+        with file_errors(path, "hold results"):
+            for part in earlier.parts():
+                earlier.file(part.start).unlink(missing_ok=True)
+        write_text(path / MANIFEST, to_json(manifest) + "\n")
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
             path.mkdir(parents=True, exist_ok=True)

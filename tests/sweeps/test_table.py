@@ -166,8 +166,18 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
         swept(SMALL, out=folder)
     assert sorted(path.name for path in (folder / "parts").iterdir()) == before
     other = tables(sweep={"seeds": 1})
+    (folder / "notes.txt").write_text("mine")
+    (folder / "parts/7.parquet.bak").write_text("mine")
     replaced = swept(other, out=folder, overwrite=True)
     assert same(replaced, swept(other))
+    assert (folder / "notes.txt").read_text() == (folder / "parts/7.parquet.bak").read_text()
+
+
+def test_nothing_of_a_folder_that_is_no_sweep_is_removed(tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text("{}")
+    with pytest.raises(cr.FileError, match="not a sweep of this version"):
+        swept(SMALL, out=tmp_path, overwrite=True)
+    assert (tmp_path / "manifest.json").read_text() == "{}"
 
 
 def test_resuming_computes_what_is_missing_or_damaged_only(
