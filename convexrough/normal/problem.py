@@ -26,15 +26,12 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
-from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, taken
+from convexrough.arrays import Array, Indices, among_zeros, evenly, frozen, largest, taken
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import shells
-from convexrough.normal.load_control import (
-    approach_bound,
-    highest_approach,
-)
+from convexrough.normal.load_control import approach_bound, highest_approach
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
@@ -121,6 +118,12 @@ class NormalProblem:
     load: float | None
     highest: float
     exact_control: Ball | None = None
+
+    def __post_init__(self) -> None:
+        # The proof uses these arrays after a solver, which could be any class, has seen them.
+        for each in (*vars(self).values(), *vars(self.influence).values()):
+            if isinstance(each, np.ndarray):
+                frozen(each)
 
     def __len__(self) -> int:
         return len(self.candidates)
