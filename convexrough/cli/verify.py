@@ -41,20 +41,30 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
     from convexrough.tabular.table import named_columns
     from convexrough.verdict.claims import Manner
 
-    names = ("load", "pressure", "area", "x", "y", "force", "status")
+    names = ("load", "pressure", "area", "x", "y", "force", "status", "index")
     factors = {}
-    for each in scale:
-        name, _, factor = each.partition("=")
+    for name, factor in _pairs("--scale", scale).items():
         try:
             factors[name] = finite("--scale", float(factor))
         except ValueError as error:
-            raise InputError("--scale", found=each, expected="NAME=FACTOR, a number") from error
-        if name not in names[:-1] or not factors[name]:
-            expected = f"NAME=FACTOR, not 0, where NAME is one of {', '.join(names[:-1])}"
-            raise InputError("--scale", found=each, expected=expected)
-    pairs = dict(each.partition("=")[::2] for each in column)
-    columns = named_columns("--column", pairs, names)
+            found = f"{name}={factor}"
+            raise InputError("--scale", found=found, expected="NAME=FACTOR, a number") from error
+        if name not in names[:-2] or not factors[name]:
+            expected = f"NAME=FACTOR, not 0, where NAME is one of {', '.join(names[:-2])}"
+            raise InputError("--scale", found=f"{name}={factor}", expected=expected)
+    columns = named_columns("--column", _pairs("--column", column), names)
     return Manner(columns=columns, scales=factors, sign=int(sign), **options)
+
+
+def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """The parts before and after the equals sign of each value of an option."""
+    pairs: dict[str, str] = {}
+    for each in given:
+        name, _, value = each.partition("=")
+        if name in pairs:
+            raise InputError(option, found=f"{name} twice", expected=f"one {option} {name}")
+        pairs[name] = value
+    return pairs
 
 
 @click.command()
@@ -70,7 +80,7 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
               help="Largest distance of a position from its asperity; default 1 % of the smallest "
               "spacing.")  # fmt: skip
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Read NAME (load, x, y, ...) from this column: a header, or a number from 1."
+              help="Read NAME (load, x, index, ...) from this column: a header, or a number from 1."
               )  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
               help="Multiply the numbers of a column by FACTOR.")  # fmt: skip

@@ -108,6 +108,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         optional=("x", "y", *CLAIMS),
         instead={"load": ("pressure", "area")},
         unnamed=((name,), ("x", "y", name)),
+        line=0 if how.missing_open else len(scene),
         how=how,
     )
     columns, mistakes = table.columns, list[str]()
