@@ -104,31 +104,28 @@ TASKS: dict[str, Task] = {
 }
 
 
-class Reference(NamedTuple):
-    """Reference loads (n,) [force], with a proved bound on their errors over the largest load."""
-
-    loads: Array
-    bound: float
-
-    def error(self, loads: Array) -> float:
-        """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
-        return float(np.abs(loads - self.loads).max() / self.loads.max())
-
-
-def reference(scene: Scene, approach: float) -> Reference:
-    """Accurate loads at an approach. Raises SolverError if they are not proved accurate."""
+def reference(scene: Scene, approach: float) -> Array:
+    """(n,) [force] accurate loads. Raises SolverError if they are not proved accurate."""
     contact = press(scene, approach=approach)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
         advice = "another approach, or asperities further apart"
         raise SolverError(f"loads proved to {bound:.2g} only", solver="reference", advice=advice)
-    return Reference(contact.loads, bound)
+    return contact.loads
+
+
+def relative_error(loads: Array, right: Array) -> float:
+    """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
+    return float(np.abs(loads - right).max() / right.max())
 
 
 def measure_attempt(
-    family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
+    family: Family, scene: Scene, attempt: Attempt, right: Array | None, patience: float
 ) -> Row:
-    """The row of an attempt: the least time to assemble and solve, in runs for `patience` [s]."""
+    """The row of an attempt: the least time to assemble and solve, in runs for `patience` [s].
+
+    right : (n,) [force] reference loads; None leaves the error unknown
+    """
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
@@ -146,7 +143,7 @@ def measure_attempt(
         row,
         touching=int(np.count_nonzero(loads)),
         iterations=solution.iterations,
-        error=math.nan if reference is None else reference.error(loads),
+        error=math.nan if right is None else relative_error(loads, right),
     )
 
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from convexrough.atomic import replacing, write_text
+from convexrough.atomic import write_text
 from convexrough.bench.measure import TASKS
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.errors import FileError, file_errors
 from convexrough.run.results import write_figures, write_json, write_tables
 from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
@@ -28,7 +24,14 @@ def describe(bench: Bench) -> list[str]:
     """The measurements as aligned lines for the terminal."""
     lines = [machine_line(bench)]
     for (family, n), rows in bench.panels().items():
-        lines += ["", f"{n:,} asperities ({family})", *aligned(_work_table(rows), left=2)]
+        table = [["solver", "setting", "error", "seconds", "iterations", ""]]
+        best = frontier(rows)
+        for row in rows:
+            error = f"{row.error:.1e}" if row.known else row.outcome
+            mark = "frontier" if row in best else ""
+            cells = [row.solver, row.setting, error, _seconds(row), str(row.iterations), mark]
+            table.append(cells)
+        lines += ["", f"{n:,} asperities ({family})", *aligned(table, left=2)]
     return [*lines, "", *aligned(size_table(bench), left=1), "", *_messages(bench)]
 
 
@@ -65,17 +68,17 @@ def size_table(bench: Bench) -> list[list[str]]:
     on = f"in products on {bench.machine['cores']} cores"
     heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *OTHERS]
     table = [[*heading, "MB", "proved error"]]
-    found = {(row.task, row.family, row.asperities): row for row in bench.rows}
     for row in bench.rows:
         if row.task == "press" and row.outcome == "answered":
+            scene = (row.family, row.asperities)
+            found = {it.task: it for it in bench.rows if (it.family, it.asperities) == scene}
             cells = [row.family, f"{row.asperities:,}", f"{row.touching:,}"]
-            for task in ("press", "from nothing"):
-                one = found[task, row.family, row.asperities]
-                counted = f"{one.products:.0f}" if math.isfinite(one.products) else "-"
-                cells += [_seconds(one), counted]
-            cells += [_seconds(found.get((task, row.family, row.asperities))) for task in OTHERS]
+            for one in (row, found["from nothing"]):
+                counted = one.seconds / one.product  # nan without a lattice
+                cells += [_seconds(one), f"{counted:.0f}" if math.isfinite(counted) else "-"]
             memory = "-" if row.memory is None else f"{row.memory / 1e6:.0f}"
-            table.append([*cells, memory, f"{row.bound:.0e}"])
+            others = [_seconds(found.get(task)) for task in OTHERS]
+            table.append([*cells, *others, memory, f"{row.bound:.0e}"])
     return table
 
 
@@ -96,35 +99,24 @@ def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None)
 
     Raises FileError; files already written remain.
     """
-    rows = [asdict(row) for row in bench.rows]
-    written = write_tables(
-        folder, {"rows": {name: [row[name] for row in rows] for name in rows[0]}}
-    )
-    if figures:
-        written += write_figures(folder, _drawn(bench))
-    path = write_json(folder / "bench.json", bench.summary())
-    if page is not None:
-        written += _renew(page, bench)
-    return [path, *written]
-
-
-def _drawn(bench: Bench) -> dict[str, Figure]:
+    table = {each.name: [getattr(row, each.name) for row in bench.rows] for each in fields(Row)}
+    written = [write_json(folder / "bench.json", bench.summary())]
+    written += write_tables(folder, {"rows": table})
+    if not figures and page is None:
+        return written
     from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
 
-    return bench_figures(bench)
-
-
-def _renew(page: Path, bench: Bench) -> list[Path]:
-    before, after = split_page(page)
-    folder, written = page.parent / "figures", []
-    with file_errors(folder, "be made"):
-        folder.mkdir(exist_ok=True)
-    for stem, figure in _drawn(bench).items():
-        with replacing(path := folder / f"{stem}.png") as temporary:
-            figure.savefig(temporary, format="png", dpi=200)
-        written.append(path)
-    block = [before + BEGIN, "", *page_block(bench), "", END + after]
-    return [*written, write_text(page, "\n".join(block))]
+    drawn = bench_figures(bench)
+    if figures:
+        written += write_figures(folder, drawn)
+    if page is not None:
+        before, after = split_page(page)
+        with file_errors(beside := page.parent / "figures", "be made"):
+            beside.mkdir(exist_ok=True)
+        written += write_figures(beside, drawn)
+        block = [before + BEGIN, "", *page_block(bench), "", END + after]
+        written.append(write_text(page, "\n".join(block)))
+    return written
 
 
 def split_page(page: Path) -> tuple[str, str]:
@@ -136,16 +128,6 @@ def split_page(page: Path) -> tuple[str, str]:
     if not begin or not end or BEGIN in after or END in after or END in before:
         raise FileError(f"{page}: expected one line {BEGIN} and below it one line {END}")
     return before, after
-
-
-def _work_table(rows: list[Row]) -> list[list[str]]:
-    best = frontier(rows)
-    table = [["solver", "setting", "error", "seconds", "iterations", ""]]
-    for row in rows:
-        error = f"{row.error:.1e}" if row.known else row.outcome
-        mark = "frontier" if row in best else ""
-        table.append([row.solver, row.setting, error, _seconds(row), str(row.iterations), mark])
-    return table
 
 
 def _seconds(row: Row | None) -> str:

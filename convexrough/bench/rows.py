@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -27,7 +27,8 @@ class Row:
         `setting` describes), "sweep", or a name in `convexrough.bench.measure.TASKS`
     outcome : "refused" means that the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
-    product : [s] the unit of `products`, from `measure.plain_product`; nan without a lattice
+    product : [s] time of a plain product of the same size, from `measure.plain_product`; nan
+        without a lattice
     error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
     memory  : [bytes] largest increase of the memory of the process; None where unknown
     """
@@ -52,11 +53,6 @@ class Row:
     def default(self) -> bool:
         """True for the default solver with its default settings."""
         return (self.solver, self.setting) == ("newton", "default")
-
-    @property
-    def products(self) -> float:
-        """The time divided by that of a plain product of the same size."""
-        return self.seconds / self.product
 
     @property
     def known(self) -> bool:
@@ -88,9 +84,15 @@ class Bench:
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes."""
+        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes.
+
+        It is that of the least-squares fit  log time = a + b log n.
+        """
         large = self.presses(family, FITTED_FROM)
-        return exponent([row.asperities for row in large], [row.seconds for row in large])
+        if len({row.asperities for row in large}) < 2:
+            return math.nan
+        sizes, times = np.log([(row.asperities, row.seconds) for row in large]).T
+        return float(np.polyfit(sizes, times, 1)[0])
 
     def summary(self) -> dict[str, Any]:
         """The measurements for JSON; errors are relative to the largest load, times in seconds."""
@@ -145,11 +147,3 @@ def better_than_default(rows: Iterable[Row]) -> list[Row]:
         return points
     limit = default.seconds / (1.0 + NOISE)
     return [row for row in points if row.seconds < limit and row.error <= default.error]
-
-
-def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
-    """The exponent b of the least-squares fit  log cost = a + b log size; nan for one size."""
-    if len(set(sizes)) < 2:
-        return math.nan
-    slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)
-    return float(slope)

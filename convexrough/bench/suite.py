@@ -1,12 +1,16 @@
-"""The list of measurements: tasks, scenes, and time limits."""
+"""The list of measurements: tasks, scenes and time limits; and the machine they are taken on."""
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
-from convexrough.bench.machine import describe_machine
 from convexrough.bench.measure import (
     Attempt,
     measure_attempt,
@@ -21,7 +25,9 @@ from convexrough.errors import InputError, SolverError
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import LOGGER
+from convexrough.run.results import versions
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
+from convexrough.threads import cores
 
 Sizes = tuple[tuple[Family, int], ...]
 
@@ -64,6 +70,9 @@ SWEEPS = ((61, 10_000, 1), (61, 10_000, 2), (700, 500, 1), (700, 500, 2))
 #: A quick run leaves out presses of more than QUICK asperities, compares solvers on three scenes
 #: only, and runs only the first sweep, with 1 / PART of its scenes.
 QUICK, PART = 20_000, 20
+
+#: Variables that limit the threads of linear algebra.
+THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def attempts(quick: bool) -> list[Attempt]:
@@ -133,3 +142,29 @@ def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]
                 if again.outcome == "answered":
                     rows[i] = replace(row, seconds=min(row.seconds, again.seconds))
     return rows
+
+
+def describe_machine() -> dict[str, Any]:
+    """Processor, memory [bytes], threads, versions, date, and current load of the machine."""
+    import psutil
+
+    limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]
+    return {
+        "processor": _processor(),
+        "cores": cores(),
+        "memory": psutil.virtual_memory().total,
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "versions": versions(),
+        "linear_algebra_threads": ", ".join(limits) or "not limited",
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+    }
+
+
+def _processor() -> str:
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"

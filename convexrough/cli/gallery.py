@@ -56,7 +56,8 @@ def gallery(
         cells: list[list[str]] = [list(rows[0])]
         for row, each in zip(rows, found.outcomes, strict=True):
             cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
-            reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
+            outcomes = dict(zip(found.cases, each.tolist(), strict=True))
+            reported.append({**row, "outcomes": outcomes})
         echo({"profile": reported}, aligned(cells, left=1), as_json)
         return DONE
     cases = [wing.case(name) for name in wanted]
