@@ -29,7 +29,7 @@ def paper(
     """
     from convexrough.atomic import write_text
     from convexrough.paper import example
-    from convexrough.paper.figure_data import figure_data
+    from convexrough.paper.figures import figure_data, paper_figures
     from convexrough.paper.states import PaperStates
     from convexrough.run.results import (
         results_folder,
@@ -49,8 +49,6 @@ def paper(
         states = PaperStates.of(contact)
         files = write_tables(new, figure_data(states))
         if not no_figures:
-            from convexrough.paper.figures import paper_figures
-
             files += write_figures(new, paper_figures(contact, states), formats=formats, dpi=dpi)
         if html:
             page = slider_page(found[0])

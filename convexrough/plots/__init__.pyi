@@ -8,8 +8,8 @@ from .gradient import gradient_figures as gradient_figures
 from .load_plane import phase_figures as phase_figures
 from .load_plane import steady_figures as steady_figures
 from .notebook import save as save
+from .path import between as between
 from .path import path_figures as path_figures
-from .points_between import between as between
 from .press import press_figures as press_figures
 from .shakedown import shakedown_figures as shakedown_figures
 from .shear import shear_figures as shear_figures

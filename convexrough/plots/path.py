@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 
 from convexrough.arrays import Array
-from convexrough.friction.path import LoadPath
-from convexrough.plots.asperity_map import (
-    draw_map,
-    map_window,
-    status_handles,
-    status_layers,
-)
+from convexrough.friction.path import LoadPath, history, load_path
+from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.load_plane import draw_path
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.points_between import MOST_POINTS, between
 from convexrough.plots.style import (
     DOUBLE,
     MOST_NUMBERS,
@@ -39,6 +34,12 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
 MOST_MAPS = 8
+
+#: Largest numbers: of points; of asperities times points; of steps between two given points.
+MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
+
+#: Number of segments at varying load up to which points are added; each needs a solution.
+MOST_SEGMENTS = 24
 
 
 def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
@@ -128,10 +129,10 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     places = figure.subplots(rows, columns, squeeze=False)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
-    window = map_window(scene.contact_points, radii[chosen].max(axis=0), scale.length)
+    room = radii[chosen].max(axis=0)
     for axes, k in zip(places.ravel(), chosen, strict=False):
         layers = status_layers(path.status[k], radii[k])
-        draw_map(axes, scene.contact_points, layers, scale.length, window=window)
+        draw_map(axes, scene.contact_points, layers, scale.length, room=room)
         slide = int((path.status[k] == "sliding").sum())
         touch = int((path.asperity_loads[k] > 0).sum())
         axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
@@ -143,3 +144,29 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     if handles:
         legend_outside(figure, handles, "lower center", len(handles))
     return figure
+
+
+def between(path: LoadPath) -> LoadPath:
+    """The path with points added between the given ones, or unchanged if these cost too much.
+
+    Figures call it only if they are not given such a path, because it solves normal problems.
+    """
+    m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
+    each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
+    if not path.load_constant:
+        each = min(each, 8) if m <= MOST_SEGMENTS else 1
+    each = min(each, MOST_BETWEEN)
+    follows_on = path.load_constant or path.start == 0.0  # it does not start from another contact
+    if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
+        return path
+    corners = np.column_stack((path.loads, path.forces))
+    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # denser at the ends
+    pieces = [
+        np.vstack((a + part[:, None] * (b - a), b))
+        for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))
+    ]
+    P, Q = np.concatenate(pieces).T
+    if path.load_constant:
+        return history(path.contact, forces=Q)
+    limit = (path.scene.friction or 1.0) * P
+    return load_path(path.scene, loads=P, forces=np.clip(Q, -limit, limit))

@@ -7,23 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.plots.asperity_map import CROWDED, Layer, Window, draw_contact
+from convexrough.plots.asperity_map import CROWDED, draw_values
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
-    COLOURS,
     DOUBLE,
     ROUGH,
     SINGLE,
     SMOOTH,
     UNSURE,
     abscissae,
-    bar,
     draw_density,
     label,
     legend_above,
@@ -56,50 +53,40 @@ def pressure_figure(scale: Scale) -> Figure:
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     chart.set_anchor("E")
     label(profile, scale.length.label("x"), scale.pressure.label("p"))
-    colours, window = draw_pressure(chart, contact, scale)
+    colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
     crossed = (np.abs(contact.scene.contact_points[:, 1]) < contact.contact_radii).sum()
     touching = np.count_nonzero(contact.loads)
     in_rows = contact.scene.lattice is not None and crossed**2 >= touching
     if touching < CROWDED and (in_rows or crossed == touching):
-        _draw_section(profile, scale, window)
+        _draw_section(profile, scale, chart.get_xlim())
     else:
         _draw_peaks(profile, scale)
     profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
     return figure
 
 
-def draw_pressure(
-    axes: Axes, contact: Contact, scale: Scale | None = None
-) -> tuple[ScalarMappable, Window]:
-    """Draw a map of contact pressures with a colour bar; return the colours and the window.
+def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
+    """Draw a map of contact pressures with a colour bar; return the colours.
 
     The pressure p0 sqrt(1 - (r/a)^2) of a contact is a stack of discs in equal steps of pressure.
     If many asperities touch, it is one disc with the colour of the peak pressure.
     """
     scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))
-    top = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
-    colours = ScalarMappable(Normalize(0.0, top), COLOURS)
     n = np.count_nonzero(contact.loads)
     steps = int(np.clip(1000 // n, 8, 40)) if n < CROWDED else 1
-    layers = [
-        Layer(
-            "_inner discs" if step else "contact discs",
-            contact.contact_radii * np.sqrt(1.0 - (step / steps) ** 2),  # here p = p0 step / steps
-            colours.to_rgba(peaks * ((step + 0.5) / steps if steps > 1 else 1.0)),
-            None,
-        )
-        for step in range(steps)
-    ]
-    window = draw_contact(axes, scale, layers)
+    s = np.arange(steps)[:, None] / steps  # p = p0 s at the rim of a disc
+    values = peaks * (s + 0.5 / steps) if steps > 1 else peaks
     title(axes, census(contact))
-    bar(axes, colours, ("" if steps > 1 else "peak ") + scale.pressure.short("p"), above=True)
-    return colours, window
+    name = ("" if steps > 1 else "peak ") + scale.pressure.short("p")
+    most = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
+    radii = contact.contact_radii * np.sqrt(1.0 - s**2)
+    return draw_values(axes, scale, values, name, radii=radii, most=most)
 
 
-def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
-    contact, (left, right, *_) = scale.contact, window.sides
+def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
+    contact, (left, right) = scale.contact, sides
     edge = max(-left, right) * scale.length.size
     x = abscissae(contact.scene.contact_points, contact.contact_radii, edge)
     rough = scale.pressure.of(fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))))

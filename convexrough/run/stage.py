@@ -261,7 +261,7 @@ class Steps(Result):
     @cached_property
     def fine(self) -> Any:
         """The path of this result with intermediate points, for figures."""
-        from convexrough.plots.points_between import between  # matplotlib: only when it draws
+        from convexrough.plots import between  # matplotlib: only when it draws
 
         return between(self.found[0])
 
