@@ -147,9 +147,9 @@ def slider_page(pressed: Result) -> str:
 
     Raises InputError if the scene has no friction, or another shape than a sphere.
     """
-    from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
+    from convexrough.plots.slider import slider_html  # matplotlib: only when it draws
 
-    return slider_html(Slides.of(pressed.contact), pressed.lines())
+    return slider_html(pressed.contact, pressed.lines())
 
 
 def write_json(path: Path, summary: Summary) -> Path:
