@@ -17,28 +17,14 @@ from convexrough.friction.cycle import Loop
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.paper.states import AMPLITUDES, SHARE, PaperStates
+from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure, ring_colour, smooth_loop
 from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.press import pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
-from convexrough.plots.style import (
-    DASHED,
-    DOTTED,
-    DOUBLE,
-    ROUGH,
-    SMOOTH,
-    TICK,
-    UNSURE,
-    abscissae,
-    label,
-    legend_above,
-    legend_outside,
-    no_contact,
-    title,
-    towards_rim,
-)
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 
@@ -64,7 +50,7 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
     found : the states and paths of the figures, if already computed
     """
     if not contact.loads.any():
-        return no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
+        return style.no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
                           "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
     scale = Scale(contact)
     found = found or PaperStates.of(contact)
@@ -98,7 +84,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
             x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
             chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
-    title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
+    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
 
     rows = np.arange(len(named))
     start = np.array([onsets[ring].min() for ring in named.values()])
@@ -112,11 +98,11 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
     limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
-    label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
-    title(bars, "light: stick in part; dark: slide")
+    style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
+    style.title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
                   textcoords="offset points", xycoords="axes fraction")  # fmt: skip
-    legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
+    style.legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
     return figure
 
 
@@ -126,10 +112,10 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     _draw_tractions(chart, state, scale, unit)
     chart.set_anchor("E")
-    title(chart, f"$Q/(fP)$ = {SHARE:g}")
+    style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
-    x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))
+    x = np.unique(np.concatenate((a * style.towards_rim(), c * style.towards_rim())))
     line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
     if c > 0:
         profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
@@ -137,10 +123,10 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     profile.plot(x / a, fp, ls=DASHED, lw=1.2, color=SMOOTH, label="$fp$")
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
-    title(profile, "central asperity")
+    style.title(profile, "central asperity")
     across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.units.length)})"
-    label(profile, across, unit.label("q"))
-    legend_above(profile)
+    style.label(profile, across, unit.label("q"))
+    style.legend_above(profile)
     return figure
 
 
@@ -167,24 +153,26 @@ def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
     axes = figure.subplots()
     points, radii = contact.scene.contact_points, contact.contact_radii
     edge = 1.06 * max(scale.typical, float((np.hypot(*points.T) + radii)[contact.loads > 0].max()))
-    x = np.union1d(abscissae(points, radii, edge), abscissae(points, state.stick_radii, edge))
+    x = np.union1d(
+        style.abscissae(points, radii, edge), style.abscissae(points, state.stick_radii, edge)
+    )
     line = np.column_stack((x, np.zeros_like(x)))
     f = checks.friction(contact.scene.friction)
     fp, q = unit.of(f * fields.pressure(contact, line)), unit.of(fields.traction(state, line))
     across = scale.length.of(x)
     axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
     axes.fill_between(across, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
-    s = scale.typical * towards_rim()
-    s = np.union1d(s, towards_rim() * sphere.stick_radius(state.force))
+    s = scale.typical * style.towards_rim()
+    s = np.union1d(s, style.towards_rim() * sphere.stick_radius(state.force))
     smooth_fp, smooth_q = f * sphere.pressure(np.abs(s)), sphere.traction(np.abs(s), state.force)
     for values, ls, name in ((smooth_fp, DASHED, "$fp$"), (smooth_q, DOTTED, "$q$")):
         axes.plot(scale.length.of(s), unit.of(values), ls=ls, lw=1.4, color=SMOOTH,
                   label=f"smooth sphere: {name}")  # fmt: skip
     most = max(float(unit.of(f * scale.peak)), float(fp.max()))
     axes.set(xlim=(-scale.length.of(edge), scale.length.of(edge)), ylim=(0.0, 1.05 * most))
-    label(axes, scale.length.label("x"), unit.label("q"))
-    title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
-    legend_above(axes, ncols=4)
+    style.label(axes, scale.length.label("x"), unit.label("q"))
+    style.title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
+    style.legend_above(axes, ncols=4)
     return figure
 
 
@@ -211,10 +199,10 @@ def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
         axes.set(xlim=(0.0, 1.0))
         axes.set_ylim(0.0, 1.04 * float(values.max()))
         _letters(axes, list(firsts), values[-1, list(firsts.values())])
-    label(left, "$Q\\,/\\,(fP)$", "$Q_i\\,/\\,(fP)$  [%]")
-    title(left, "asperity of each ring; dot: slides from here")
-    label(right, "$Q\\,/\\,(fP)$", scale.displacement.short("(X_i + s_i)"))
-    title(right, "with gross slip; dotted: without")
+    style.label(left, "$Q\\,/\\,(fP)$", "$Q_i\\,/\\,(fP)$  [%]")
+    style.title(left, "asperity of each ring; dot: slides from here")
+    style.label(right, "$Q\\,/\\,(fP)$", scale.displacement.short("(X_i + s_i)"))
+    style.title(right, "with gross slip; dotted: without")
     figure.supxlabel(scale.footnote(), fontsize=TICK)
     return figure
 
@@ -263,11 +251,11 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
                    ha="right", va="bottom", fontsize=TICK)  # fmt: skip
     if crossing is not None:
         _mark_crossing(zoom, crossing, float(np.interp(crossing, AMPLITUDES, smooth)))
-    label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
-    label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
+    style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
+    style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
     whole.legend(loc="upper left", fontsize=TICK, frameon=False)
-    title(whole, "energy lost per cycle")
-    title(zoom, "zoom")
+    style.title(whole, "energy lost per cycle")
+    style.title(zoom, "zoom")
     return figure
 
 

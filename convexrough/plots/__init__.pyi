@@ -3,8 +3,6 @@
 from .axes import plot as plot
 from .axes import thumbnail as thumbnail
 from .cycle import cycle_figures as cycle_figures
-from .fretting import fretting_figures as fretting_figures
-from .gradient import gradient_figures as gradient_figures
 from .load_plane import phase_figures as phase_figures
 from .load_plane import steady_figures as steady_figures
 from .notebook import save as save
@@ -15,4 +13,6 @@ from .shakedown import shakedown_figures as shakedown_figures
 from .shear import shear_figures as shear_figures
 from .surface import provability_figure as provability_figure
 from .surface import surface_figures as surface_figures
+from .values import fretting_figures as fretting_figures
+from .values import gradient_figures as gradient_figures
 from .verdict import verdict_figures as verdict_figures

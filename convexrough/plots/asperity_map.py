@@ -15,18 +15,9 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.plots import style
 from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import (
-    COLOURS,
-    DASHED,
-    DOTTED,
-    FAINT,
-    SMOOTH,
-    bar,
-    disc_handle,
-    label,
-    round_ticks,
-)
+from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH
 
 #: From DENSE discs on, vector files contain these as pixels. From CROWDED discs on, a mosaic of
 #: coloured pixels replaces the discs.
@@ -91,9 +82,9 @@ def draw_map(
             draw_discs(axes, points, each)
     draw_outline(axes, outline)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    axes.xaxis.set_major_locator(round_ticks(5))
-    axes.yaxis.set_major_locator(round_ticks(5))
-    label(axes, length.label("x"), length.short("y"))
+    axes.xaxis.set_major_locator(style.round_ticks(5))
+    axes.yaxis.set_major_locator(style.round_ticks(5))
+    style.label(axes, length.label("x"), length.short("y"))
 
 
 def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> None:
@@ -129,7 +120,7 @@ def draw_values(
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
     draw_contact(axes, scale, layers)
-    bar(axes, colours, name, above=not signed)
+    style.bar(axes, colours, name, above=not signed)
     return colours
 
 
@@ -158,12 +149,12 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 
 
 def draw_outline(
-    axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
+    axes: Axes, semi_axes: Sequence[float], dashes: Any = DASHED, colour: str = SMOOTH
 ) -> None:
     """Draw a circle (one semi-axis) or an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
-        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
+        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=colour))
 
 
 def status_layers(
@@ -185,17 +176,17 @@ def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
-    return [disc_handle(*entry) for entry in entries]
+    return [style.disc_handle(*entry) for entry in entries]
 
 
 def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
     """Legend entries for the outlines of the smooth contact and of its stick disc."""
     if scale.sphere is None:
         return []
-    styles = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
+    outlines = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
     return [
-        Line2D([], [], ls=style, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
-        for what, style in styles.items()
+        Line2D([], [], ls=dashes, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
+        for what, dashes in outlines.items()
     ]
 
 

@@ -13,23 +13,12 @@ from matplotlib.colors import ListedColormap, Normalize
 
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
+from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.load_plane import draw_path
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DOUBLE,
-    MOST_NUMBERS,
-    TICK,
-    bar,
-    label,
-    legend_outside,
-    mark_points,
-    no_contact,
-    round_ticks,
-    shades_of,
-    title,
-)
+from convexrough.plots.style import DOUBLE, MOST_NUMBERS, TICK
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
@@ -53,7 +42,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     "path_stick_slip" : which asperities stick and which slide, at some of the points
     """
     if path.load_constant and not path.contact.loads.any():
-        return no_contact("history")
+        return style.no_contact("history")
     scale = Scale(path.contact)
     figure = Figure(figsize=(DOUBLE, 3.0 if path.load_constant else 3.2), layout="constrained")
     *plane, loop, cost = figure.subplots(
@@ -66,7 +55,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)
     if path.load_constant:
-        title(cost, "energy lost since the beginning")
+        style.title(cost, "energy lost since the beginning")
         return Figures({"history": figure})
     return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
 
@@ -83,9 +72,9 @@ def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Draw shear force against displacement."""
     x, q = scale.displacement, scale.force
     _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
-    mark_points(axes, x.of(path.displacements), q.of(path.forces))
+    style.mark_points(axes, x.of(path.displacements), q.of(path.forces))
     axes.margins(0.12)
-    label(axes, x.short("X"), q.short("Q"))
+    style.label(axes, x.short("X"), q.short("Q"))
 
 
 def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
@@ -97,11 +86,11 @@ def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     if m <= MOST_NUMBERS:
         axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color="0.15")
     else:
-        bar(axes, colours, "step", above=True)
+        style.bar(axes, colours, "step", above=True)
     axes.set(xlim=(0, max(1, m)))
     axes.set_ylim(bottom=0.0)
-    axes.xaxis.set_major_locator(round_ticks(8, whole=True))
-    label(axes, "step", energy.label("W"))
+    axes.xaxis.set_major_locator(style.round_ticks(8, whole=True))
+    style.label(axes, "step", energy.label("W"))
 
 
 def _draw_darkening(
@@ -109,7 +98,7 @@ def _draw_darkening(
 ) -> ScalarMappable:
     """Draw a curve that darkens from the origin to its end, and is visible everywhere."""
     steps = max(1, len(path.forces))
-    colours = ScalarMappable(Normalize(0, steps), ListedColormap(shades_of(256, low=0.15)))
+    colours = ScalarMappable(Normalize(0, steps), ListedColormap(style.shades_of(256, low=0.15)))
     points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))
     pieces = list(np.stack((points[:-1], points[1:]), axis=1))
     shades = colours.to_rgba(np.linspace(0, steps, len(pieces) + 1)[1:])
@@ -142,7 +131,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         axes.set_axis_off()
     handles: Any = status_handles(np.unique(path.status[chosen]))
     if handles:
-        legend_outside(figure, handles, "lower center", len(handles))
+        style.legend_outside(figure, handles, "lower center", len(handles))
     return figure
 
 

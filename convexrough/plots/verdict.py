@@ -9,18 +9,11 @@ from matplotlib.lines import Line2D
 from convexrough.arrays import Array
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
+from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DOUBLE,
-    SINGLE,
-    UNSURE,
-    disc_handle,
-    legend_below,
-    title,
-    write_beside,
-)
+from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict
 
@@ -66,16 +59,16 @@ def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
     ]
     draw_map(axes, points, layers, length)
     said = [each.status for each in layers]
-    handles = [disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
+    handles = [style.disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
     marked = list(zip(MARKS, claim.wrong.items(), strict=True))
     for mark, (what, those) in [*marked, ("^", ("undecided", claim.undecided))]:
         if len(those):
             handles.append(_mark(axes, length.of(points[those]), mark, f"{what} ({len(those):,})"))
     for i in claim.suspects[:NUMBERED]:
-        write_beside(axes, str(i), length.of(points[i]))
+        style.write_beside(axes, str(i), length.of(points[i]))
     verdict = "holds" if claim.holds else "does not hold"
-    title(axes, f"{claim.many}: the claim {verdict}")
-    legend_below(axes, handles=handles)
+    style.title(axes, f"{claim.many}: the claim {verdict}")
+    style.legend_below(axes, handles=handles)
 
 
 def _mark(axes: Axes, points: Array, mark: str, what: str) -> Line2D:
