@@ -30,10 +30,11 @@ from convexrough.cli.speech import (
 from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on, file_errors
 
 if TYPE_CHECKING:
+    from convexrough.arrays import Array
+    from convexrough.normal.claims import Claim
     from convexrough.proof import Proof
     from convexrough.run.scene_file import SceneFile
     from convexrough.verdict.claims import Manner
-    from convexrough.verdict.report import Verified
 
 
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
@@ -129,14 +130,15 @@ def verify(
     wrong or not proved, or if --proof finds no proof; 4 if the shear problem could not be solved.
     With --explain nothing is checked, and the status is 0 if the files can be read.
     """
+    import numpy as np
+
     from convexrough.plausibility import cautions_about
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages.normal import describe, judged_loads
     from convexrough.run.summary import headed
     from convexrough.verdict import report
-    from convexrough.verdict.claims import read_loads, read_shear_forces
-    from convexrough.verdict.files import verify_files
+    from convexrough.verdict.claims import judged, read_loads, read_shear_forces
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
@@ -157,49 +159,48 @@ def verify(
         file = read_scene(scene)
         shared = ("x", "y") if shear is not None else ()
         manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
+        read = [read_loads(loads, file.scene, manner)]
+        read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
+        about = report.describe_scene(file.scene)
         if explain:
-            read = [read_loads(loads, file.scene, manner)]
-            read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-            lines = [
-                line
-                for path, each in zip((loads, shear), read, strict=False)
-                for line in (f"{path}:", *each.explained, "")
-            ]
-            lines += report.describe_scene(file.scene)
-            echo({"read": lines}, lines, as_json)
+            lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
+            echo({"read": [*lines, *about]}, [*lines, *about], as_json)
             return DONE
-        inputs: list[str | Path] = [*file.inputs, loads, *([shear] if shear else [])]
+        inputs: list[str | Path] = [*file.inputs, *(each.path for each in read)]
         made = results_folder(out, force=force, reads=inputs) if out is not None else None
         new = stack.enter_context(made) if made else None
         with progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
-            found = verify_files(
-                problem, loads, manner, within=within, shear=shear, force=shear_force
-            )
-        normal = judged_loads(found.verdict.certificate, found.verdict.loads)
-        summary = headed(normal=normal) | report.verdict_summary(found)
-        evidence = proved(partial(_proof, file, found, scene)) if proof else None
-        files = [] if new is None else _written(new, summary, found)
+            total = shear_force or 0.0
+            claims = judged(problem, *read, within=within, floor=manner.floor, force=total)
+        of_loads = claims[0]
+        normal = judged_loads(of_loads.certificate, of_loads.values)
+        summary = headed(normal=normal) | report.verdict_summary(claims)
+        holds = all(claim.holds for claim in claims)
+        claimed = np.where(of_loads.claimed, of_loads.values, 0.0)
+        evidence = proved(partial(_proof, file, claimed, holds, scene)) if proof else None
+        files = [] if new is None else _written(new, summary, claims)
         if evidence is not None:
             evidence.save((new or Path()) / "proof.json")
     if junit is not None:
-        write_text(junit, report.junit(found, names))
-    lines = report.describe_verdict(found)
+        write_text(junit, report.junit(claims, names))
+    lines = [*(each.note for each in read), *about]
+    for claim in claims:
+        lines += ["", *report.describe_claim(claim, ": --json and --out list all")]
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
-    claimed = found.verdict.loads * found.verdict.claimed
     echo(summary, lines, as_json, cautions_about(file.scene, claimed))
-    for claim in found.claims:
+    for claim in claims:
         for hint in claim.hints():
             say_aside("hint", hint)
-    if not found.holds:
-        reasons = filter(None, map(report.reason, found.claims))
+    if not holds:
+        reasons = filter(None, map(report.reason, claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")
     if evidence is not None:
         place = (out or Path()) / "proof.json"
         click.echo(f"{evidence.proved}\nwritten  {place}", err=as_json)
-    return DONE if found.holds and (evidence is not None or not proof) else NOT_CERTIFIED
+    return DONE if holds and (evidence is not None or not proof) else NOT_CERTIFIED
 
 
 @contextmanager
@@ -215,29 +216,25 @@ def _reported(path: Path | None, files: str) -> Iterator[None]:
         raise
 
 
-def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Path]:
+def _written(folder: Path, summary: dict[str, Any], claims: Sequence[Claim]) -> list[Path]:
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
     from convexrough.run.results import write_figures, write_json, write_tables
     from convexrough.verdict.report import asperity_columns
 
-    figures = verdict_figures(found.verdict, found.sheared)
     return [
         write_json(folder / "verdict.json", summary),
-        *write_tables(folder, {"verdict": asperity_columns(found)}),
-        *write_figures(folder, figures),
+        *write_tables(folder, {"verdict": asperity_columns(claims)}),
+        *write_figures(folder, verdict_figures(*claims)),
     ]
 
 
-def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
+def _proof(file: SceneFile, loads: Array, holds: bool, scene: Path) -> Proof:
     """The proof from the claimed loads, or if the claim holds, from the solution near them."""
-    import numpy as np
-
     from convexrough.contact import solve
     from convexrough.proof import prove
 
-    loads = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        if found.holds:  # loads may be too inaccurate for a proof in exact arithmetic
+        if holds:  # loads may be too inaccurate for a proof in exact arithmetic
             loads = solve(file.problem(), start=loads).loads
         return prove(file.scene, loads, **control)

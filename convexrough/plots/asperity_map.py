@@ -73,7 +73,7 @@ def draw_map(
     points, whole = length.of(points), length.of(whole)
     layers = [each._replace(radii=length.of(each.radii)) for each in layers]
     low, high = _square(points, whole if room is None else length.of(room), outline)
-    inside = ((points > low) & (points < high)).all(axis=1)
+    inside: NDArray[np.bool_] = np.all((points > low) & (points < high), axis=1)
     if int(shown.sum()) >= CROWDED:
         _draw_mosaic(axes, points, _blended(layers, whole), shown, inside, low, high)
     else:

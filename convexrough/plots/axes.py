@@ -29,7 +29,7 @@ PICTURES = {
     "PhaseLosses": "load_plane.draw_losses",
     "Shakedown": "shakedown.draw_factors",
     "Gradient": "values.draw_gradient",
-    "Verdict": "verdict.draw_verdict",
+    "Verdict": "verdict.draw_claim",
     "Comparison": "times.draw_times",
     "PathComparison": "times.draw_times",
     "Surface": "surface.draw_surface",

@@ -7,15 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from convexrough.arrays import Array
-from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
-from convexrough.scene.scene import Scene
-from convexrough.verdict import Verdict
 
 #: The indices of at most this many suspects are written, of the likeliest ones.
 NUMBERED = 5
@@ -28,7 +25,7 @@ NAMES = {"partial": "partial slip"}
 MARKS = ["o", "X"]
 
 
-def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Figures:
+def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     """The figure of a verdict.
 
     "verdict" : map of the proved statuses, with marks on wrongly claimed asperities and indices of
@@ -38,19 +35,14 @@ def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Fi
     width = SINGLE if len(claims) == 1 else DOUBLE
     figure = Figure(figsize=(width, 3.9), layout="constrained")
     for axes, claim in zip(figure.subplots(1, len(claims), squeeze=False)[0], claims, strict=True):
-        draw_claim(axes, claim, verdict.scene)
+        draw_claim(axes, claim)
     return Figures({"verdict": figure})
 
 
-def draw_verdict(axes: Axes, verdict: Verdict) -> None:
-    """Draw the map of the claim on loads."""
-    draw_claim(axes, verdict, verdict.scene)
-
-
-def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
+def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim."""
-    status, points = claim.status, scene.asperities.positions
-    length = measure(float(np.ptp(points)), scene.units.length)
+    status, points = claim.status, claim.of.asperities.positions
+    length = measure(float(np.ptp(points)), claim.of.units.length)
     size = even_radii(points, np.ones(len(points), dtype=bool))
     layers = [
         Layer(name, np.where(status == name, size, 0.0), shade)
