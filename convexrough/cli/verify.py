@@ -47,11 +47,10 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
     for name, factor in _pairs("--scale", scale).items():
         try:
             factors[name] = finite("--scale", float(factor))
-        except ValueError as error:
-            found = f"{name}={factor}"
-            raise InputError("--scale", found=found, expected="NAME=FACTOR, a number") from error
+        except ValueError:
+            factors[name] = 0.0
         if name not in names[:-2] or not factors[name]:
-            expected = f"NAME=FACTOR, not 0, where NAME is one of {', '.join(names[:-2])}"
+            expected = f"NAME=FACTOR, a number but 0, where NAME is one of {', '.join(names[:-2])}"
             raise InputError("--scale", found=f"{name}={factor}", expected=expected)
     columns = named_columns("--column", _pairs("--column", column), names)
     return Manner(columns=columns, scales=factors, sign=int(sign), **options)
