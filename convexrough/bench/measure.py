@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -64,13 +64,6 @@ class Attempt:
     most: int = 10**9
 
 
-class Task(NamedTuple):
-    """A function `work` that is timed, and a function `prepare` that makes its argument."""
-
-    prepare: Callable[[Make], Any]
-    work: Callable[[Any], object]
-
-
 def _pressed(scene: Scene) -> Contact:
     return press(scene, approach=APPROACH)
 
@@ -89,18 +82,18 @@ def _along_corners(contact: Contact) -> LoadPath:
     return load_path(contact.scene, loads=contact.load * P, forces=_bearable(contact) * T)
 
 
-#: The tasks that are timed at many sizes, by name.
-TASKS: dict[str, Task] = {
-    "press": Task(lambda make: make(), _pressed),
-    "from nothing": Task(lambda make: make, lambda make: _pressed(make())),
-    "shear": Task(lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * _bearable(it))),
-    "loss curve": Task(
-        lambda make: _pressed(make()), lambda it: cycles(it, _bearable(it) * PARTS_OF_LIMIT)
+#: The tasks that are timed at many sizes, by name: the preparation of an argument, and the function
+#: of this argument that is timed.
+TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
+    "press": (lambda make: make(), _pressed),
+    "from nothing": (lambda make: make, lambda make: _pressed(make())),
+    "shear": (lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * _bearable(it))),
+    "loss curve": (
+        lambda make: _pressed(make()),
+        lambda it: cycles(it, _bearable(it) * PARTS_OF_LIMIT),
     ),
-    "load path": Task(lambda make: _pressed(make()), _along_corners),
-    "gradient": Task(
-        lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")
-    ),
+    "load path": (lambda make: _pressed(make()), _along_corners),
+    "gradient": (lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")),
 }
 
 
@@ -149,9 +142,9 @@ def measure_attempt(
 
 def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
     """The row of the task `name` of `TASKS`, on a scene with about `size` asperities."""
-    make, task = partial(scene, family, REFINEMENTS[size]), TASKS[name]
+    make, (prepare, work) = partial(scene, family, REFINEMENTS[size]), TASKS[name]
     row = Row(name, family, len(make()), product=plain_product(make()))
-    row, found = _timed(row, lambda: task.prepare(make), task.work, patience)
+    row, found = _timed(row, lambda: prepare(make), work, patience)
     if isinstance(found, Contact):
         touching, largest = int(np.count_nonzero(found.loads)), float(found.loads.max())
         row = replace(row, touching=touching, bound=found.certificate.load_error / largest)

@@ -46,7 +46,7 @@ def paper(
             result.prepare(figures=False)
         contact = found[0].contact
         comparison = example.compare(found)
-        states = PaperStates.of(contact)
+        states = PaperStates(contact)
         files = write_tables(new, figure_data(states))
         if not no_figures:
             files += write_figures(new, paper_figures(contact, states), formats=formats, dpi=dpi)

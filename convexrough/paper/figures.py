@@ -53,7 +53,7 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
         return style.no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
                           "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
     scale = Scale(contact)
-    found = found or PaperStates.of(contact)
+    found = found or PaperStates(contact)
     some = evenly_chosen(list(found.named), MOST_ASPERITIES)
     firsts = [int(found.named[name][0]) for name in some]
     pressure = contact.scene.units.pressure
