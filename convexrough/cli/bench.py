@@ -23,15 +23,14 @@ def bench(
     replaces the text of the page FILE between the markers "bench: begin" and "bench: end", and the
     figures of the page in the folder "figures" next to FILE.
     """
-    from convexrough.bench import page as pages
-    from convexrough.bench import suite
+    from convexrough.bench import rows, suite
     from convexrough.run.results import results_folder
 
     if page is not None:
-        pages.split_page(page)  # a page without markers is refused before anything is computed
+        rows.split_page(page)  # a page without markers is refused before anything is computed
     folder = out or Path("bench-results")
     with results_folder(folder, force=force) as new, progress("measuring"):
         found = suite.run(quick=quick)
-        files = pages.write_bench(new, found, figures=not no_figures, page=page)
-    echo(found.summary(), [*pages.describe(found), *written(folder, files)], as_json)
+        files = rows.write_bench(new, found, figures=not no_figures, page=page)
+    echo(found.summary(), [*rows.describe(found), *written(folder, files)], as_json)
     return DONE
