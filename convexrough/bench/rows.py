@@ -247,14 +247,14 @@ def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None)
         return written
     from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
 
-    drawn = bench_figures(bench)
+    both = bench_figures(bench)
     if figures:
-        written += write_figures(folder, drawn)
+        written += write_figures(folder, both)
     if page is not None:
         before, after = split_page(page)
-        with file_errors(beside := page.parent / "figures", "be made"):
-            beside.mkdir(exist_ok=True)
-        written += write_figures(beside, drawn)
+        with file_errors(pictures := page.parent / "figures", "be made"):
+            pictures.mkdir(exist_ok=True)
+        written += write_figures(pictures, both)
         block = [before + BEGIN, "", *page_block(bench), "", END + after]
         written.append(write_text(page, "\n".join(block)))
     return written
