@@ -176,28 +176,20 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
 def _timed(
     row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
 ) -> tuple[Row, Any]:
-    memory = MemoryRise()
+    """The row with the time [s] of the fastest run, and what the first run found."""
+    memory, times = MemoryRise(), list[float]()
     try:
         found = work(prepare())
         risen = memory.risen()
-        seconds, runs = least(prepare, work, patience)
+        while len(times) < LEAST_RUNS or (sum(times) < patience and len(times) < MOST_RUNS):
+            given = prepare()
+            began = time.perf_counter()
+            work(given)
+            times.append(time.perf_counter() - began)
     except (InputError, SolverError) as error:
         outcome: Any = "refused" if isinstance(error, InputError) else "failed"
         return replace(row, outcome=outcome, message=str(error)), None
-    return replace(row, seconds=seconds, runs=runs, memory=risen), found
-
-
-def least(
-    prepare: Callable[[], Any], work: Callable[[Any], object], patience: float
-) -> tuple[float, int]:
-    """The time [s] of the fastest run, and the number of runs."""
-    times: list[float] = []
-    while len(times) < LEAST_RUNS or (sum(times) < patience and len(times) < MOST_RUNS):
-        given = prepare()
-        began = time.perf_counter()
-        work(given)
-        times.append(time.perf_counter() - began)
-    return min(times), len(times)
+    return replace(row, seconds=min(times), runs=len(times), memory=risen), found
 
 
 def plain_product(scene: Scene) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -235,19 +235,20 @@ def _negative(
         yield mistake(int(i), found)
 
 
-def _claims(table: ReadTable) -> list[tuple[str, str]]:
-    """The columns that say which asperities touch, each with its header."""
-    return [(name, bare(table.called[name]).lower()) for name in CLAIMS if name in table.columns]
+def _statuses(table: ReadTable) -> Iterator[tuple[str, NDArray[np.str_], Mapping[str, str]]]:
+    """For each column that says which asperities touch its header, entries and `CLAIMS`."""
+    for name, known in CLAIMS.items():
+        if name in table.columns:
+            yield bare(table.called[name]).lower(), np.char.strip(table.columns[name]), known
 
 
 def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]:
     """A message for each row whose status or flag contradicts its load."""
-    touches = loads > floor
-    for name, header in _claims(table):
-        found = np.char.lower(np.char.strip(table.columns[name]))
-        said = np.array([CLAIMS[name].get(each, "") for each in found])
-        for i in np.flatnonzero(said == np.where(touches, "open", "contact")):
-            right = next(each for each, it in CLAIMS[name].items()
+    for header, entries, known in _statuses(table):
+        found = np.char.lower(entries)
+        said = np.array([known.get(each, "") for each in found])
+        for i in np.flatnonzero(said == np.where(loads > floor, "open", "contact")):
+            right = next(each for each, it in known.items()
                          if it != said[i] and (each in FLAGS) == (found[i] in FLAGS))  # fmt: skip
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
             yield table.mistake(int(i), f', column {header}: found "{found[i]}", {expected}')
@@ -255,11 +256,10 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
 
 def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
     """A note on each column of statuses: the unknown words of rows with and without a load."""
-    for name, header in _claims(table):
-        found = np.array([each.strip() for each in table.columns[name]], dtype=str)
-        other = np.array([each.lower() not in (*CLAIMS[name], "", "undecided") for each in found])
+    for header, entries, known in _statuses(table):
+        other = ~np.isin(np.char.lower(entries), (*known, "", "undecided"))
         if other.any():
-            here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
+            here, there = (sorted(set(entries[other & rows]))[:MOST] for rows in (loaded, ~loaded))
             with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
             yield f"column {header} not compared ({with_load} with a load, {without} without)"
 
