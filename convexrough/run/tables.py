@@ -34,8 +34,8 @@ def read_text(path: Path, most: int) -> str:
 
 
 def unknown(column: str) -> bool:
-    """True if a column with this header may contain the heights."""
-    return bare(column).lower() not in (*INDEX, *RESULTS)
+    """True if a column with this header (not a number, its name without one) may be heights."""
+    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
 
 
 def read_summits(

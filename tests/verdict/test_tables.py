@@ -14,6 +14,7 @@ from scenes import rough
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
 from convexrough.run.tables import read_summits
+from convexrough.tabular.table import Reading
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with
 
@@ -273,6 +274,12 @@ def test_summits(tmp_path: Path) -> None:
     assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
     assert asperities.tip_radii.tolist() == [0.1, 0.2]
     assert asperities.heights.tolist() == [1e-3, -1e-3]
+
+
+def test_summits_without_a_header(tmp_path: Path) -> None:
+    """Columns that were chosen by number leave out others, such as an index."""
+    path, how = tmp_path / put(tmp_path, "7,0,0.5\n8,1,2\n"), Reading(columns={"x": "2", "y": "3"})
+    assert read_summits(path, tip_radius=1.0, how=how).positions.tolist() == [[0, 0.5], [1, 2]]
 
 
 @pytest.mark.sample(8)
