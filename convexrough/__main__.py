@@ -22,6 +22,8 @@ def main() -> int:
         from convexrough.cli import main as run
 
         status = run()
+        if status == INTERRUPTED:
+            os._exit(status)  # compiled code that was interrupted can abort when Python ends
         import signal
 
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the exit is left

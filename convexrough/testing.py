@@ -51,7 +51,7 @@ def assert_certified(
     verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
-    _check(verdict, scene)
+    _check(verdict)
     return verdict.certificate
 
 
@@ -75,7 +75,7 @@ def assert_shear_certified(
     """
     __tracebackhide__ = True
     verdict = _asked(verify_shear, contact, forces, force=force, within=within, sliding=sliding)
-    _check(verdict, contact.scene)
+    _check(verdict)
     return verdict.certificate
 
 
@@ -167,9 +167,9 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
         )
 
 
-def _check(claim: Claim, scene: Scene) -> None:
+def _check(claim: Claim) -> None:
     __tracebackhide__ = True
     if not claim.holds:
         hints = (f"hint: {each}" for each in claim.hints())
-        lines = [reason(claim), *describe_claim(claim, scene), *hints]
+        lines = [reason(claim), *describe_claim(claim), *hints]
         raise AssertionError("\n".join(lines))

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -64,13 +64,6 @@ class Attempt:
     most: int = 10**9
 
 
-class Task(NamedTuple):
-    """A function `work` that is timed, and a function `prepare` that makes its argument."""
-
-    prepare: Callable[[Make], Any]
-    work: Callable[[Any], object]
-
-
 def _pressed(scene: Scene) -> Contact:
     return press(scene, approach=APPROACH)
 
@@ -89,46 +82,43 @@ def _along_corners(contact: Contact) -> LoadPath:
     return load_path(contact.scene, loads=contact.load * P, forces=_bearable(contact) * T)
 
 
-#: The tasks that are timed at many sizes, by name.
-TASKS: dict[str, Task] = {
-    "press": Task(lambda make: make(), _pressed),
-    "from nothing": Task(lambda make: make, lambda make: _pressed(make())),
-    "shear": Task(lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * _bearable(it))),
-    "loss curve": Task(
-        lambda make: _pressed(make()), lambda it: cycles(it, _bearable(it) * PARTS_OF_LIMIT)
+#: The tasks that are timed at many sizes, by name: the preparation of an argument, and the function
+#: of this argument that is timed.
+TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
+    "press": (lambda make: make(), _pressed),
+    "from nothing": (lambda make: make, lambda make: _pressed(make())),
+    "shear": (lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * _bearable(it))),
+    "loss curve": (
+        lambda make: _pressed(make()),
+        lambda it: cycles(it, _bearable(it) * PARTS_OF_LIMIT),
     ),
-    "load path": Task(lambda make: _pressed(make()), _along_corners),
-    "gradient": Task(
-        lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")
-    ),
+    "load path": (lambda make: _pressed(make()), _along_corners),
+    "gradient": (lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")),
 }
 
 
-class Reference(NamedTuple):
-    """Reference loads (n,) [force], with a proved bound on their errors over the largest load."""
-
-    loads: Array
-    bound: float
-
-    def error(self, loads: Array) -> float:
-        """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
-        return float(np.abs(loads - self.loads).max() / self.loads.max())
-
-
-def reference(scene: Scene, approach: float) -> Reference:
-    """Accurate loads at an approach. Raises SolverError if they are not proved accurate."""
+def reference(scene: Scene, approach: float) -> Array:
+    """(n,) [force] accurate loads. Raises SolverError if they are not proved accurate."""
     contact = press(scene, approach=approach)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
         advice = "another approach, or asperities further apart"
         raise SolverError(f"loads proved to {bound:.2g} only", solver="reference", advice=advice)
-    return Reference(contact.loads, bound)
+    return contact.loads
+
+
+def relative_error(loads: Array, right: Array) -> float:
+    """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
+    return float(np.abs(loads - right).max() / right.max())
 
 
 def measure_attempt(
-    family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
+    family: Family, scene: Scene, attempt: Attempt, right: Array | None, patience: float
 ) -> Row:
-    """The row of an attempt: the least time to assemble and solve, in runs for `patience` [s]."""
+    """The row of an attempt: the least time to assemble and solve, in runs for `patience` [s].
+
+    right : (n,) [force] reference loads; None leaves the error unknown
+    """
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
@@ -146,15 +136,15 @@ def measure_attempt(
         row,
         touching=int(np.count_nonzero(loads)),
         iterations=solution.iterations,
-        error=math.nan if reference is None else reference.error(loads),
+        error=math.nan if right is None else relative_error(loads, right),
     )
 
 
 def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
     """The row of the task `name` of `TASKS`, on a scene with about `size` asperities."""
-    make, task = partial(scene, family, REFINEMENTS[size]), TASKS[name]
+    make, (prepare, work) = partial(scene, family, REFINEMENTS[size]), TASKS[name]
     row = Row(name, family, len(make()), product=plain_product(make()))
-    row, found = _timed(row, lambda: task.prepare(make), task.work, patience)
+    row, found = _timed(row, lambda: prepare(make), work, patience)
     if isinstance(found, Contact):
         touching, largest = int(np.count_nonzero(found.loads)), float(found.loads.max())
         row = replace(row, touching=touching, bound=found.certificate.load_error / largest)
@@ -186,28 +176,20 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
 def _timed(
     row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
 ) -> tuple[Row, Any]:
-    memory = MemoryRise()
+    """The row with the time [s] of the fastest run, and what the first run found."""
+    memory, times = MemoryRise(), list[float]()
     try:
         found = work(prepare())
         risen = memory.risen()
-        seconds, runs = least(prepare, work, patience)
+        while len(times) < LEAST_RUNS or (sum(times) < patience and len(times) < MOST_RUNS):
+            given = prepare()
+            began = time.perf_counter()
+            work(given)
+            times.append(time.perf_counter() - began)
     except (InputError, SolverError) as error:
         outcome: Any = "refused" if isinstance(error, InputError) else "failed"
         return replace(row, outcome=outcome, message=str(error)), None
-    return replace(row, seconds=seconds, runs=runs, memory=risen), found
-
-
-def least(
-    prepare: Callable[[], Any], work: Callable[[Any], object], patience: float
-) -> tuple[float, int]:
-    """The time [s] of the fastest run, and the number of runs."""
-    times: list[float] = []
-    while len(times) < LEAST_RUNS or (sum(times) < patience and len(times) < MOST_RUNS):
-        given = prepare()
-        began = time.perf_counter()
-        work(given)
-        times.append(time.perf_counter() - began)
-    return min(times), len(times)
+    return replace(row, seconds=min(times), runs=len(times), memory=risen), found
 
 
 def plain_product(scene: Scene) -> float:

@@ -2,50 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array
 from convexrough.compare import compare, every_solver
-from convexrough.frames import Variables
 from convexrough.gallery.cases import case, names
 from convexrough.plots.notebook import Figure
 from convexrough.plots.style import SINGLE, TICK, label
 from convexrough.progress import LOGGER
-from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
 #: `Profile.rows` reports the parts of cases solved within these multiples of the least time.
 FACTORS = (1, 2, 5, 10, 100)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Profile(Table):
+@dataclass(frozen=True, eq=False)
+class Profile:
     """Times of k solvers on m hard cases, after Dolan and More (Math. Program. 91 (2002) 201).
 
-    solvers : (k,) names;  cases : (m,) names
+    solvers : names;  cases : names
     seconds : (k, m) [s] time of each right answer; infinite where a solver gave none
     outcomes : (k, m) "right", "wrong", "refused" or "failed"
     sets : (k, m) True where exactly the asperities that touch have a load
     """
 
-    solvers: tuple[str, ...]
-    cases: tuple[str, ...]
+    solvers: list[str]
+    cases: Sequence[str]
     seconds: Array
-    outcomes: tuple[tuple[str, ...], ...]
+    outcomes: NDArray[np.str_]
     sets: NDArray[np.bool_]
 
     @property
     def ratios(self) -> Array:
         """(k, m) `seconds`, divided by the time of the fastest right answer to the case."""
         least = self.seconds.min(axis=0)
-        none = np.full_like(self.seconds, np.inf)
-        ratios: Array = np.divide(self.seconds, least, where=np.isfinite(least), out=none)
-        return ratios
+        return self.seconds / np.where(np.isfinite(least), least, 1.0)
 
     def part(self, factor: float) -> Array:
         """(k,) part of the cases answered correctly within this factor of the least time."""
@@ -54,16 +50,15 @@ class Profile(Table):
 
     def rows(self) -> list[dict[str, str | int | float]]:
         """For each solver the numbers of outcomes and right sets, and its `part` for `FACTORS`."""
-        parts = np.array([self.part(factor) for factor in FACTORS]).T
-        return [
-            {"solver": solver}
-            | {outcome: said.count(outcome) for outcome in ("right", "wrong", "refused", "failed")}
-            | {"contact set right": int(sets.sum())}
-            | {f"within {factor}x": float(p) for factor, p in zip(FACTORS, row, strict=True)}
-            for solver, said, sets, row in zip(
-                self.solvers, self.outcomes, self.sets, parts, strict=True
-            )
-        ]
+        rows = []
+        for i, solver in enumerate(self.solvers):
+            row: dict[str, str | int | float] = {"solver": solver}
+            for outcome in ("right", "wrong", "refused", "failed"):
+                row[outcome] = int((self.outcomes[i] == outcome).sum())
+            row["contact set right"] = int(self.sets[i].sum())
+            row |= {f"within {factor}x": float(self.part(factor)[i]) for factor in FACTORS}
+            rows.append(row)
+        return rows
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Plot the part of the cases answered right against time / least time; return the axes."""
@@ -79,22 +74,6 @@ class Profile(Table):
         label(axes, "time over that of the fastest", "part of the cases")
         return axes
 
-    def _rows(self) -> Iterator[tuple[str, str]]:
-        yield "cases", f"{len(self.cases):,}"
-        for row in self.rows():
-            known = f"{row['right']} right, {row['within 2x']:.0%} within 2x of the fastest"
-            yield str(row["solver"]), known
-
-    def _variables(self) -> Variables:
-        both = ("solver", "case")
-        return {
-            "solver": (("solver",), np.array(self.solvers)),
-            "case": (("case",), np.array(self.cases)),
-            "seconds": (both, self.seconds),
-            "outcome": (both, np.array(self.outcomes)),
-            "set_right": (both, self.sets),
-        }
-
 
 def profile_of(
     solvers: Sequence[Solver] | None = None,
@@ -108,27 +87,20 @@ def profile_of(
     cases   : names of cases or families; default: all
     within  : largest error of correct loads, over the largest load
     """
-    others = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
+    tried = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)
-    seconds = np.full((len(others), len(wanted)), np.inf)
-    outcomes = [[""] * len(wanted) for _ in others]
+    seconds = np.full((len(tried), len(wanted)), np.inf)
+    outcomes = np.full(seconds.shape, "", dtype="U8")
     sets = np.zeros(seconds.shape, dtype=bool)
     for column, name in enumerate(wanted):
         LOGGER.info(name)
         hard = case(name)
-        entries = compare(hard.scene, **hard.control, solvers=others).entries
-        for row, entry in enumerate(entries):
-            outcomes[row][column] = entry.outcome
-            if (found := entry.contact) is not None:
-                checked = hard.check(found.loads, within=within)
-                near = checked.error <= within
-                sets[row, column] = len(checked.wrongly_open) + len(checked.wrongly_loaded) == 0
-                outcomes[row][column] = "right" if near else "wrong"
-                seconds[row, column] = found.seconds if near else np.inf
-    return Profile(
-        solvers=tuple(each.name for each in others),
-        cases=wanted,
-        seconds=frozen(seconds),
-        outcomes=tuple(map(tuple, outcomes)),
-        sets=frozen(sets),
-    )
+        for row, entry in enumerate(compare(hard.scene, **hard.control, solvers=tried).entries):
+            outcomes[row, column] = entry.outcome
+            if entry.contact is not None:
+                checked = hard.check(entry.contact.loads, within=within)
+                sets[row, column] = not (len(checked.wrongly_open) or len(checked.wrongly_loaded))
+                outcomes[row, column] = "right" if checked.error <= within else "wrong"
+                if checked.error <= within:
+                    seconds[row, column] = entry.contact.seconds
+    return Profile([each.name for each in tried], wanted, seconds, outcomes, sets)

@@ -1,16 +1,25 @@
-"""The measurements, one in each row, and the conclusions from them."""
+"""The measurements, one in each row; the conclusions, and the page that shows them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from convexrough.bench.scenes import FAMILIES, Family
+from convexrough.errors import FileError, file_errors
+from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
+
+#: Markers of the block of a page that `suite.write_bench` replaces.
+BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
+
+#: Tasks that have no plain column of seconds in the table of sizes.
+NOT_OTHER = ("solve", "press", "from nothing", "sweep")
 
 #: Times count as equal up to this relative difference.
 NOISE = 0.1
@@ -27,7 +36,8 @@ class Row:
         `setting` describes), "sweep", or a name in `convexrough.bench.measure.TASKS`
     outcome : "refused" means that the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
-    product : [s] the unit of `products`, from `measure.plain_product`; nan without a lattice
+    product : [s] time of a plain product of the same size, from `measure.plain_product`; nan
+        without a lattice
     error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
     memory  : [bytes] largest increase of the memory of the process; None where unknown
     """
@@ -52,11 +62,6 @@ class Row:
     def default(self) -> bool:
         """True for the default solver with its default settings."""
         return (self.solver, self.setting) == ("newton", "default")
-
-    @property
-    def products(self) -> float:
-        """The time divided by that of a plain product of the same size."""
-        return self.seconds / self.product
 
     @property
     def known(self) -> bool:
@@ -88,9 +93,15 @@ class Bench:
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes."""
+        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes.
+
+        It is that of the least-squares fit  log time = a + b log n.
+        """
         large = self.presses(family, FITTED_FROM)
-        return exponent([row.asperities for row in large], [row.seconds for row in large])
+        if len({row.asperities for row in large}) < 2:
+            return math.nan
+        sizes, times = np.log([(row.asperities, row.seconds) for row in large]).T
+        return float(np.polyfit(sizes, times, 1)[0])
 
     def summary(self) -> dict[str, Any]:
         """The measurements for JSON; errors are relative to the largest load, times in seconds."""
@@ -147,9 +158,95 @@ def better_than_default(rows: Iterable[Row]) -> list[Row]:
     return [row for row in points if row.seconds < limit and row.error <= default.error]
 
 
-def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
-    """The exponent b of the least-squares fit  log cost = a + b log size; nan for one size."""
-    if len(set(sizes)) < 2:
-        return math.nan
-    slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)
-    return float(slope)
+def describe(bench: Bench) -> list[str]:
+    """The measurements as aligned lines for the terminal."""
+    lines = [machine_line(bench)]
+    for (family, n), rows in bench.panels().items():
+        table = [["solver", "setting", "error", "seconds", "iterations", ""]]
+        best = frontier(rows)
+        for row in rows:
+            error = f"{row.error:.1e}" if row.known else row.outcome
+            mark = "frontier" if row in best else ""
+            cells = [row.solver, row.setting, error, _seconds(row), str(row.iterations), mark]
+            table.append(cells)
+        lines += ["", f"{n:,} asperities ({family})", *aligned(table, left=2)]
+    return [*lines, "", *aligned(size_table(bench), left=1), "", *_messages(bench)]
+
+
+def page_block(bench: Bench) -> list[str]:
+    """Lines of Markdown: the machine, a figure, a table of sizes, and the conclusions."""
+    return [
+        machine_line(bench),
+        "",
+        "![Time against error, every solver, at each size](figures/work-precision.png)",
+        "",
+        *markdown(size_table(bench), left=1),
+        "",
+        *(f"- {line}" for line in _messages(bench)),
+    ]
+
+
+def machine_line(bench: Bench) -> str:
+    """A line about the machine and its load."""
+    on = bench.machine
+    versions = ", ".join(f"{name} {number}" for name, number in on["versions"].items())
+    load = on["load_average"] or 0.0
+    busy = "; other work was running, so times are high" if load > 0.3 else ""
+    return (
+        f"{'Quick' if bench.quick else 'Full'} run of {bench.seconds / 60:.1f} min, {on['date']}, "
+        f"on {on['cores']} cores ({on['processor']}, {on['memory'] / 2**30:.0f} GiB, "
+        f"{on['system']}): convexrough {__version__}, Python {on['python']}, {versions}. Threads "
+        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {load:.1f}"
+        f"{busy}."
+    )
+
+
+def size_table(bench: Bench) -> list[list[str]]:
+    """A heading, and a row for each scene: the times [s] of tasks; a press also in products."""
+    on = f"in products on {bench.machine['cores']} cores"
+    other = [it for it in dict.fromkeys(row.task for row in bench.rows) if it not in NOT_OTHER]
+    heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *other]
+    table = [[*heading, "MB", "proved error"]]
+    for row in bench.rows:
+        if row.task == "press" and row.outcome == "answered":
+            scene = (row.family, row.asperities)
+            found = {it.task: it for it in bench.rows if (it.family, it.asperities) == scene}
+            cells = [row.family, f"{row.asperities:,}", f"{row.touching:,}"]
+            for one in (row, found["from nothing"]):
+                counted = one.seconds / one.product  # nan without a lattice
+                cells += [_seconds(one), f"{counted:.0f}" if math.isfinite(counted) else "-"]
+            memory = "-" if row.memory is None else f"{row.memory / 1e6:.0f}"
+            seconds = [_seconds(found.get(task)) for task in other]
+            table.append([*cells, *seconds, memory, f"{row.bound:.0e}"])
+    return table
+
+
+def _messages(bench: Bench) -> list[str]:
+    lines = bench.verdicts()
+    for row in bench.rows:
+        if row.task == "sweep":
+            lines.append(f"A scene of about {row.asperities:,} with a cycle in a sweep "
+                         f"({row.message}): {1e3 * row.seconds:.2f} ms.")  # fmt: skip
+        elif row.task != "solve" and row.outcome != "answered":
+            place = f"{row.task}, {row.asperities:,} asperities ({row.family})"
+            lines.append(f"{place}: {row.outcome}, {row.message}")
+    return lines
+
+
+def split_page(page: Path) -> tuple[str, str]:
+    """The text before and after the block of a page. Raises FileError unless it has one block."""
+    with file_errors(page, "be read"):
+        text = page.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end or BEGIN in after or END in after or END in before:
+        raise FileError(f"{page}: expected one line {BEGIN} and below it one line {END}")
+    return before, after
+
+
+def _seconds(row: Row | None) -> str:
+    if row is None or row.outcome != "answered":
+        return "-"
+    if row.seconds < 1e-3:
+        return f"{1e6 * row.seconds:.0f}e-6"
+    return f"{row.seconds:.2g}" if row.seconds < 100 else f"{row.seconds:.0f}"

@@ -1,12 +1,17 @@
-"""The list of measurements: tasks, scenes, and time limits."""
+"""The measurements to make, the machine they are made on, and the files with their results."""
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
-from convexrough.bench.machine import describe_machine
+from convexrough.atomic import write_text
 from convexrough.bench.measure import (
     Attempt,
     measure_attempt,
@@ -14,14 +19,24 @@ from convexrough.bench.measure import (
     measure_task,
     reference,
 )
-from convexrough.bench.rows import Bench, Row, better_than_default
+from convexrough.bench.rows import (
+    BEGIN,
+    END,
+    Bench,
+    Row,
+    better_than_default,
+    page_block,
+    split_page,
+)
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import press
-from convexrough.errors import InputError, SolverError
+from convexrough.errors import InputError, SolverError, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import LOGGER
+from convexrough.run.results import Writer, versions
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
+from convexrough.threads import cores
 
 Sizes = tuple[tuple[Family, int], ...]
 
@@ -64,6 +79,9 @@ SWEEPS = ((61, 10_000, 1), (61, 10_000, 2), (700, 500, 1), (700, 500, 2))
 #: A quick run leaves out presses of more than QUICK asperities, compares solvers on three scenes
 #: only, and runs only the first sweep, with 1 / PART of its scenes.
 QUICK, PART = 20_000, 20
+
+#: Variables that limit the threads of linear algebra.
+THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def attempts(quick: bool) -> list[Attempt]:
@@ -133,3 +151,54 @@ def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]
                 if again.outcome == "answered":
                     rows[i] = replace(row, seconds=min(row.seconds, again.seconds))
     return rows
+
+
+def describe_machine() -> dict[str, Any]:
+    """Processor, memory [bytes], threads, versions, date, and current load of the machine."""
+    import psutil
+
+    limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]
+    return {
+        "processor": _processor(),
+        "cores": cores(),
+        "memory": psutil.virtual_memory().total,
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "versions": versions(),
+        "linear_algebra_threads": ", ".join(limits) or "not limited",
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+    }
+
+
+def _processor() -> str:
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
+
+
+def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) -> None:
+    """Write bench.json, rows.csv, the figures and, if given, the page.
+
+    Raises FileError; files already written remain.
+    """
+    new.summary("bench.json", bench.summary())
+    new.tables({"rows": {it.name: [getattr(row, it.name) for row in bench.rows]
+                         for it in fields(Row)}})  # fmt: skip
+    if not figures and page is None:
+        return
+    from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
+
+    both = bench_figures(bench)
+    if figures:
+        new.figures(both)
+    if page is not None:
+        before, after = split_page(page)
+        with file_errors(pictures := page.parent / "figures", "be made"):
+            pictures.mkdir(exist_ok=True)
+        pictured = Writer(pictures, pictures, ("png",), 200)
+        pictured.figures(both)
+        block = [before + BEGIN, "", *page_block(bench), "", END + after]
+        new.files += [*pictured.files, write_text(page, "\n".join(block))]

@@ -164,7 +164,8 @@ def gallery(
         cells: list[list[str]] = [list(rows[0])]
         for row, each in zip(rows, found.outcomes, strict=True):
             cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
-            reported.append({**row, "outcomes": dict(zip(found.cases, each, strict=True))})
+            outcomes = dict(zip(found.cases, each.tolist(), strict=True))
+            reported.append({**row, "outcomes": outcomes})
         output.say({"profile": reported}, aligned(cells, left=1))
         return DONE
     cases = [wing.case(name) for name in wanted]
@@ -197,15 +198,14 @@ def bench(output: Output, quick: bool, page: Path | None) -> int:
     replaces the text of the page FILE between the markers "bench: begin" and "bench: end", and the
     figures of the page in the folder "figures" next to FILE.
     """
-    from convexrough.bench import page as pages
-    from convexrough.bench import suite
+    from convexrough.bench import rows, suite
 
     if page is not None:
-        pages.split_page(page)  # a page without markers is refused before anything is computed
+        rows.split_page(page)  # a page without markers is refused before anything is computed
     with output.folder(Path("bench-results")) as new, progress("measuring"):
         found = suite.run(quick=quick)
-        pages.write_bench(new, found, figures=not output.no_figures, page=page)
-    output.say(found.summary(), [*pages.describe(found), *written(new)])
+        suite.write_bench(new, found, figures=not output.no_figures, page=page)
+    output.say(found.summary(), [*rows.describe(found), *written(new)])
     return DONE
 
 
@@ -218,7 +218,7 @@ def paper(output: Output, html: bool) -> int:
     Tables and figures go to the folder paper-results unless --out names another.
     """
     from convexrough.paper import example
-    from convexrough.paper.figure_data import figure_data
+    from convexrough.paper.figures import figure_data, paper_figures
     from convexrough.paper.states import PaperStates
     from convexrough.run.results import slider_page
 
@@ -226,11 +226,9 @@ def paper(output: Output, html: bool) -> int:
         found = example.results()
         contact = found[0].contact
         comparison = example.compare(found)
-        states = PaperStates.of(contact)
+        states = PaperStates(contact)
         new.tables(figure_data(states))
         if not output.no_figures:
-            from convexrough.paper.figures import paper_figures
-
             new.figures(paper_figures(contact, states))
         if html:
             new.text("slider.html", slider_page(found[0]))

@@ -26,11 +26,12 @@ from convexrough.cli.output import (
 from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on, file_errors
 
 if TYPE_CHECKING:
+    from convexrough.arrays import Array
+    from convexrough.normal.claims import Claim
     from convexrough.proof import Proof
     from convexrough.run.results import Writer
     from convexrough.run.scene_file import SceneFile
     from convexrough.verdict.claims import Manner
-    from convexrough.verdict.report import Verified
 
 
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
@@ -38,20 +39,29 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
     from convexrough.tabular.table import named_columns
     from convexrough.verdict.claims import Manner
 
-    names = ("load", "pressure", "area", "x", "y", "force", "status")
+    names = ("load", "pressure", "area", "x", "y", "force", "status", "index")
     factors = {}
-    for each in scale:
-        name, _, factor = each.partition("=")
+    for name, factor in _pairs("--scale", scale).items():
         try:
             factors[name] = finite("--scale", float(factor))
-        except ValueError as error:
-            raise InputError("--scale", found=each, expected="NAME=FACTOR, a number") from error
-        if name not in names[:-1] or not factors[name]:
-            expected = f"NAME=FACTOR, not 0, where NAME is one of {', '.join(names[:-1])}"
-            raise InputError("--scale", found=each, expected=expected)
-    pairs = dict(each.partition("=")[::2] for each in column)
-    columns = named_columns("--column", pairs, names)
+        except ValueError:
+            factors[name] = 0.0
+        if name not in names[:-2] or not factors[name]:
+            expected = f"NAME=FACTOR, a number but 0, where NAME is one of {', '.join(names[:-2])}"
+            raise InputError("--scale", found=f"{name}={factor}", expected=expected)
+    columns = named_columns("--column", _pairs("--column", column), names)
     return Manner(columns=columns, scales=factors, sign=int(sign), **options)
+
+
+def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """The parts before and after the equals sign of each value of an option."""
+    pairs: dict[str, str] = {}
+    for each in given:
+        name, _, value = each.partition("=")
+        if name in pairs:
+            raise InputError(option, found=f"{name} twice", expected=f"one {option} {name}")
+        pairs[name] = value
+    return pairs
 
 
 @click.command()
@@ -67,7 +77,7 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
               help="Largest distance of a position from its asperity; default 1 % of the smallest "
               "spacing.")  # fmt: skip
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Read NAME (load, x, y, ...) from this column: a header, or a number from 1."
+              help="Read NAME (load, x, index, ...) from this column: a header, or a number from 1."
               )  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
               help="Multiply the numbers of a column by FACTOR.")  # fmt: skip
@@ -112,13 +122,14 @@ def verify(
     wrong or not proved, or if --proof finds no proof; 4 if the shear problem could not be solved.
     With --explain nothing is checked, and the status is 0 if the files can be read.
     """
+    import numpy as np
+
     from convexrough.plausibility import cautions_about
     from convexrough.run.results import headed
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages.normal import describe, judged_loads
     from convexrough.verdict import report
-    from convexrough.verdict.claims import read_loads, read_shear_forces
-    from convexrough.verdict.files import verify_files
+    from convexrough.verdict.claims import judged, read_loads, read_shear_forces
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
@@ -139,48 +150,47 @@ def verify(
         file = read_scene(scene)
         shared = ("x", "y") if shear is not None else ()
         manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
+        read = [read_loads(loads, file.scene, manner)]
+        read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
+        about = report.describe_scene(file.scene)
         if explain:
-            read = [read_loads(loads, file.scene, manner)]
-            read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-            lines = [
-                line
-                for path, each in zip((loads, shear), read, strict=False)
-                for line in (f"{path}:", *each.explained, "")
-            ]
-            lines += report.describe_scene(file.scene)
-            output.say({"read": lines}, lines)
+            lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
+            output.say({"read": [*lines, *about]}, [*lines, *about])
             return DONE
-        inputs: list[str | Path] = [*file.inputs, loads, *([shear] if shear else [])]
+        inputs: list[str | Path] = [*file.inputs, *(each.path for each in read)]
         new = stack.enter_context(output.folder(output.out, reads=inputs)) if output.out else None
         with progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
-            found = verify_files(
-                problem, loads, manner, within=within, shear=shear, force=shear_force
-            )
-        normal = judged_loads(found.verdict.certificate, found.verdict.loads)
-        summary = headed(normal=normal) | report.verdict_summary(found)
-        evidence = proved(partial(_proof, file, found, scene)) if proof else None
+            total = shear_force or 0.0
+            claims = judged(problem, *read, within=within, floor=manner.floor, force=total)
+        of_loads = claims[0]
+        normal = judged_loads(of_loads.certificate, of_loads.values)
+        summary = headed(normal=normal) | report.verdict_summary(claims)
+        holds = all(claim.holds for claim in claims)
+        claimed = np.where(of_loads.claimed, of_loads.values, 0.0)
+        evidence = proved(partial(_proof, file, claimed, holds, scene)) if proof else None
         if new is not None:
-            _write(new, summary, found)
+            _write(new, summary, claims)
         if evidence is not None:
             evidence.save((new.path if new else Path()) / "proof.json")
     if junit is not None:
-        write_text(junit, report.junit(found, names))
-    lines = report.describe_verdict(found)
+        write_text(junit, report.junit(claims, names))
+    lines = [*(each.note for each in read), *about]
+    for claim in claims:
+        lines += ["", *report.describe_claim(claim, ": --json and --out list all")]
     lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(new) if new else []
-    claimed = found.verdict.loads * found.verdict.claimed
     output.say(summary, lines, cautions_about(file.scene, claimed))
-    for claim in found.claims:
+    for claim in claims:
         for hint in claim.hints():
             say_aside("hint", hint)
-    if not found.holds:
-        reasons = filter(None, map(report.reason, found.claims))
+    if not holds:
+        reasons = filter(None, map(report.reason, claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")
     if evidence is not None:
         output.say_proof(evidence, output.out or Path())
-    return DONE if found.holds and (evidence is not None or not proof) else NOT_CERTIFIED
+    return DONE if holds and (evidence is not None or not proof) else NOT_CERTIFIED
 
 
 @contextmanager
@@ -196,25 +206,22 @@ def _reported(path: Path | None, files: str) -> Iterator[None]:
         raise
 
 
-def _write(new: Writer, summary: dict[str, Any], found: Verified) -> None:
+def _write(new: Writer, summary: dict[str, Any], claims: Sequence[Claim]) -> None:
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
     from convexrough.verdict.report import asperity_columns
 
     new.summary("verdict.json", summary)
-    new.tables({"verdict": asperity_columns(found)})
-    new.figures(verdict_figures(found.verdict, found.sheared))
+    new.tables({"verdict": asperity_columns(claims)})
+    new.figures(verdict_figures(*claims))
 
 
-def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
+def _proof(file: SceneFile, loads: Array, holds: bool, scene: Path) -> Proof:
     """The proof from the claimed loads, or if the claim holds, from the solution near them."""
-    import numpy as np
-
     from convexrough.contact import solve
     from convexrough.proof import prove
 
-    loads = np.where(found.verdict.claimed, found.verdict.loads, 0.0)
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        if found.holds:  # loads may be too inaccurate for a proof in exact arithmetic
+        if holds:  # loads may be too inaccurate for a proof in exact arithmetic
             loads = solve(file.problem(), start=loads).loads
         return prove(file.scene, loads, **control)

@@ -152,7 +152,7 @@ def names(*wanted: str) -> tuple[str, ...]:
     >>> cr.gallery.names("few", "clustered")
     ('one', 'one-under-load', 'two-equal', 'clustered')
     """
-    families = {name: stored["family"] for name, stored in _cases().items()}
+    families = {name: data["family"] for name, data in stored().items()}
     for each in wanted:
         if each not in families and each not in families.values():
             valid = [*families, *sorted(set(families.values()))]
@@ -169,38 +169,36 @@ def case(name: str) -> HardCase:
     >>> cr.gallery.case("one").why
     'one contact: no neighbours, no shells, an answer in closed form'
     """
-    if name not in _cases():
-        expected = f"the name of a case; {checks.nearest(str(name), _cases())}"
+    if name not in stored():
+        expected = f"the name of a case; {checks.nearest(str(name), stored())}"
         raise InputError("name", found=repr(name), expected=expected)
-    stored = _cases()[name]
-    answer = stored["answer"]
+    data = stored()[name]
+    answer = data["answer"]
     return HardCase(
         name=name,
-        family=stored["family"],
-        why=stored["why"],
+        family=data["family"],
+        why=data["why"],
         scene=Scene(
-            stored["sphere_radius"],
-            Asperities(stored["positions"], stored["tip_radii"], stored["heights"]),
-            Material(stored["contact_modulus"], stored["poisson_ratio"]),
-            stored["friction"],
-            stored["geometry"],
+            data["sphere_radius"],
+            Asperities(data["positions"], data["tip_radii"], data["heights"]),
+            Material(data["contact_modulus"], data["poisson_ratio"]),
+            data["friction"],
+            data["geometry"],
         ),
-        approach=stored["prescribed"].get("approach"),
-        load=stored["prescribed"].get("load"),
-        loads=tuple(answer["loads"]),
-        gaps=tuple(answer["gaps"]),
+        approach=data["prescribed"].get("approach"),
+        load=data["prescribed"].get("load"),
         exact_approach=answer["approach"],
         exact_load=answer["load"],
-        shear_force=stored["shear_force"],
-        history=frozen(np.array(_reversals(stored["reversals"])) * stored["shear_force"]),
-        forces=tuple(answer["forces"]),
-        slips=tuple(answer["slips"]),
         displacement=answer["displacement"],
+        shear_force=data["shear_force"],
+        history=frozen(np.array(_reversals(data["reversals"])) * data["shear_force"]),
+        **{each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")},
     )
 
 
 @cache
-def _cases() -> dict[str, Any]:
+def stored() -> dict[str, Any]:
+    """The scenes and answers of the file `DATA`, by name."""
     text = files("convexrough.gallery").joinpath(DATA).read_text(encoding="utf-8")
     found: dict[str, Any] = json.loads(text)
     return found

@@ -1,16 +1,29 @@
-"""The gallery as a folder: index.md, index.json, and the files of each case."""
+"""The gallery as a folder: index.md, index.json, and the optimisation programs of each case."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from convexrough import gallery
+import numpy as np
+
+from convexrough.arrays import Array
 from convexrough.atomic import to_json
-from convexrough.gallery.pack import packed
+from convexrough.errors import ConvexroughError
+from convexrough.gallery.cases import HardCase, case, stored
+from convexrough.normal.certificate import certify
+from convexrough.normal.problem import NormalProblem
+from convexrough.programs.program import WRITERS, Form, scaled_eigenvalues, stated
 from convexrough.progress import LOGGER
 from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
+
+#: Number of bristles (springs) of each asperity; its smallest value; and the number of variables
+#: above which fewer bristles are used. These heuristics keep files small.
+BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
+
+#: Largest number of asperities of a cone program that is also written as CBF.
+SMALL = 20
 
 HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
 HEADING += ["spread", "proved"]
@@ -31,21 +44,84 @@ smallest load / largest load. proved: scope of the proof that the answer is the 
 """
 
 
+#: What the index contains of a stored case, in this order.
+SCENE = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "geometry", "positions",
+         "tip_radii", "heights")  # fmt: skip
+
+#: The entry of a case in the index.
+About = dict[str, Any]
+
+
 def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
     """Pairs of the name and contents of each file of these cases; last index.md and index.json."""
-    index: dict[str, Any] = {}
+    index: dict[str, About] = {}
     for name in names:
         LOGGER.info(name)
-        about, files = packed(gallery.case(name))
+        index[name], files = _packed(case(name))
         yield from files.items()
-        index[name] = about
     document = {"schema": 1, "version": __version__, "cases": index}
     table = [HEADING, *(_row(name, about) for name, about in index.items())]
     yield "index.md", "\n".join([INTRODUCTION, *markdown(table, left=3), ""]).encode()
     yield "index.json", f"{to_json(document)}\n".encode()
 
 
-def _row(name: str, about: dict[str, Any]) -> list[str]:
+def _packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
+    """The entry of a case in the index, with reasons for missing programs; its files by name."""
+    problem = NormalProblem.assemble(case.scene, **case.control, influence="dense")
+    loads = np.array([float(digits) for digits in case.loads])
+    own = loads[problem.candidates] / problem.units.force
+    proof, data = certify(case.scene, loads, **case.control), stored()[case.name]
+    bound = float(proof.load_errors.max())
+    answer = {name: data["answer"][name] for name in ("approach", "load", "loads", "gaps")}
+    about: About = {
+        "family": case.family,
+        "why": case.why,
+        "scene": {name: data[name] for name in SCENE},
+        "prescribed": case.control,
+        **_hardness(problem, own),
+        "certificate": {
+            "scope": proof.scope,
+            "convexity_number": proof.convexity_number,
+            "load_error": bound if np.isfinite(bound) else None,
+            "undecided": np.flatnonzero(proof.status == "undecided").tolist(),
+        },
+        "answer": answer
+        | {"shear_force": case.shear_force, "shear_forces": list(case.forces)}
+        | {"slips": list(case.slips), "displacement": case.displacement},
+        "programs": {},
+        "left_out": {},
+    }
+    bristles = int(np.clip(VARIABLES // len(problem) - 1, FEWEST_BRISTLES, BRISTLES))
+    files: dict[str, bytes] = {}
+    kinds: dict[Form, list[str]] = {"cones": ["json"], "bristles": ["npz"]}
+    for form, endings in kinds.items():
+        try:
+            program = stated(problem, own, form, bristles)
+        except ConvexroughError as error:
+            about["left_out"][form] = str(error)
+            continue
+        if form == "cones" and len(program.asperities) <= SMALL:
+            endings.append("cbf")
+        for ending in endings:
+            name = f"{case.name}.{ending if ending == 'cbf' else f'{form}.{ending}'}"
+            about["programs"][name] = program.about()
+            files[name] = WRITERS[form][ending](program.data)
+    return about, files
+
+
+def _hardness(problem: NormalProblem, own: Array) -> About:
+    """The condition number of the scaled Hessian, and the smallest load over the largest load."""
+    eigenvalues = scaled_eigenvalues(problem, own)
+    positive = eigenvalues[0] > 0
+    return {
+        "asperities": len(problem.scene),
+        "touching": int(np.count_nonzero(own)),
+        "condition": float(eigenvalues[-1] / eigenvalues[0]) if positive else None,
+        "spread": float(own[own > 0].min() / own.max()),
+    }
+
+
+def _row(name: str, about: About) -> list[str]:
     programs = about["programs"]
     condition = about["condition"]
     variables = dict.fromkeys(str(each["variables"]) for each in programs.values())

@@ -16,7 +16,6 @@ Nothing here is certified. Displacements and energies are for both bodies, twice
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough import checks, fields
 from convexrough.arrays import Array, frozen
@@ -39,7 +38,8 @@ def slips(state: ShearState) -> Array:
 
     If all asperities slide, the largest displacement replaces the mean.
     """
-    u, adhered, sliding = displacements(state), _adhered(state), _sliding(state)
+    u, adhered = displacements(state), state.stick_radii > 0
+    sliding = (state.contact.loads > 0) & ~adhered
     slips = np.zeros(len(u))
     if sliding.any():
         furthest = u[sliding][np.argmax(np.abs(u[sliding]))]
@@ -49,7 +49,7 @@ def slips(state: ShearState) -> Array:
 
 def scatter(state: ShearState) -> float:
     """Standard deviation over mean of u at adhered asperities, in theory 0; nan if undefined."""
-    u = displacements(state)[_adhered(state)]
+    u = displacements(state)[state.stick_radii > 0]
     return float(u.std() / abs(u.mean())) if u.any() else float("nan")
 
 
@@ -72,11 +72,3 @@ def energies(state: ShearState) -> Array:
 def cycle_energy(contact: Contact, maximum: float) -> float:
     """[force length] energy lost per steady cycle between `maximum` and -`maximum` [force]."""
     return float(energies(shear(contact, force=maximum)).sum())
-
-
-def _adhered(state: ShearState) -> NDArray[np.bool_]:
-    return state.stick_radii > 0
-
-
-def _sliding(state: ShearState) -> NDArray[np.bool_]:
-    return (state.contact.loads > 0) & ~_adhered(state)

@@ -1,4 +1,4 @@
-"""Figures like Figs. 3 to 9 of the source paper (Dini and Hills 2009)."""
+"""Figures like Figs. 3 to 9 of the source paper (Dini and Hills 2009), and their numbers."""
 
 from __future__ import annotations
 
@@ -6,40 +6,30 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
 from convexrough import checks, fields
+from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.friction.cycle import Loop
+from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
-from convexrough.paper.curves import forces_figure, loss_figure
-from convexrough.paper.states import SHARE, PaperStates
-from convexrough.plots.asperity_map import SLIDING, STICK, Layer, draw_contact
-from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure
+from convexrough.paper.states import AMPLITUDES, SHARE, PaperStates
+from convexrough.plots import style
+from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
+from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure, ring_colour, smooth_loop
 from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.press import pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
-from convexrough.plots.style import (
-    COLOURS,
-    DASHED,
-    DOTTED,
-    DOUBLE,
-    ROUGH,
-    SMOOTH,
-    TICK,
-    abscissae,
-    bar,
-    label,
-    legend_above,
-    legend_outside,
-    no_contact,
-    title,
-    towards_rim,
-)
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
+
+#: Amplitude Q / (f P) at which, by the paper, the curves of its Fig. 9 cross.
+READ_CROSSING = 0.37
 
 
 def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures:
@@ -60,10 +50,10 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
     found : the states and paths of the figures, if already computed
     """
     if not contact.loads.any():
-        return no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
+        return style.no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
                           "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
     scale = Scale(contact)
-    found = found or PaperStates.of(contact)
+    found = found or PaperStates(contact)
     some = evenly_chosen(list(found.named), MOST_ASPERITIES)
     firsts = [int(found.named[name][0]) for name in some]
     pressure = contact.scene.units.pressure
@@ -74,9 +64,9 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
         fig4_rings=_rings_figure(found, scale),
         fig5_traction=_traction_figure(found.half, firsts[0], scale, traction),
         fig6_section=_section_figure(found.half, scale, traction),
-        fig7_asperities=forces_figure(found, scale),
+        fig7_asperities=_forces_figure(found, scale),
         fig8_loops=loops_figure([found.steady], firsts, some, "ring", scale, [found.loop]),
-        fig9_energy=loss_figure(found, scale),
+        fig9_energy=_loss_figure(found, scale),
     )
 
 
@@ -94,7 +84,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
             x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
             chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
-    title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
+    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
 
     rows = np.arange(len(named))
     start = np.array([onsets[ring].min() for ring in named.values()])
@@ -108,11 +98,11 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
     limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
-    label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
-    title(bars, "light: stick in part; dark: slide")
+    style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
+    style.title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
                   textcoords="offset points", xycoords="axes fraction")  # fmt: skip
-    legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
+    style.legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
     return figure
 
 
@@ -122,10 +112,10 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     _draw_tractions(chart, state, scale, unit)
     chart.set_anchor("E")
-    title(chart, f"$Q/(fP)$ = {SHARE:g}")
+    style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
-    x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))
+    x = np.unique(np.concatenate((a * style.towards_rim(), c * style.towards_rim())))
     line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
     if c > 0:
         profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
@@ -133,10 +123,10 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     profile.plot(x / a, fp, ls=DASHED, lw=1.2, color=SMOOTH, label="$fp$")
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
-    title(profile, "central asperity")
+    style.title(profile, "central asperity")
     across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.units.length)})"
-    label(profile, across, unit.label("q"))
-    legend_above(profile)
+    style.label(profile, across, unit.label("q"))
+    style.legend_above(profile)
     return figure
 
 
@@ -153,14 +143,8 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 
     s = np.arange(steps)[:, None] / steps
     middle = radii(s + 0.5 / steps)[..., None] * (1.0, 0.0) + contact.scene.contact_points
-    tractions = unit.of(np.abs(fields.traction(state, middle)))
-    colours = ScalarMappable(Normalize(0.0, float(tractions[:, touching].max())), COLOURS)
-    layers = [
-        Layer("contact discs", np.where(touching, outer, 0.0), shades, None)
-        for outer, shades in zip(radii(s), colours.to_rgba(tractions), strict=True)
-    ]
-    draw_contact(axes, scale, layers)
-    bar(axes, colours, unit.short("q"), above=True)
+    tractions = np.where(touching, unit.of(np.abs(fields.traction(state, middle))), 0.0)
+    draw_values(axes, scale, tractions, unit.short("q"), radii=np.where(touching, radii(s), 0.0))
 
 
 def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
@@ -169,22 +153,203 @@ def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
     axes = figure.subplots()
     points, radii = contact.scene.contact_points, contact.contact_radii
     edge = 1.06 * max(scale.typical, float((np.hypot(*points.T) + radii)[contact.loads > 0].max()))
-    x = np.union1d(abscissae(points, radii, edge), abscissae(points, state.stick_radii, edge))
+    x = np.union1d(
+        style.abscissae(points, radii, edge), style.abscissae(points, state.stick_radii, edge)
+    )
     line = np.column_stack((x, np.zeros_like(x)))
     f = checks.friction(contact.scene.friction)
     fp, q = unit.of(f * fields.pressure(contact, line)), unit.of(fields.traction(state, line))
     across = scale.length.of(x)
     axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
     axes.fill_between(across, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
-    s = scale.typical * towards_rim()
-    s = np.union1d(s, towards_rim() * sphere.stick_radius(state.force))
+    s = scale.typical * style.towards_rim()
+    s = np.union1d(s, style.towards_rim() * sphere.stick_radius(state.force))
     smooth_fp, smooth_q = f * sphere.pressure(np.abs(s)), sphere.traction(np.abs(s), state.force)
     for values, ls, name in ((smooth_fp, DASHED, "$fp$"), (smooth_q, DOTTED, "$q$")):
         axes.plot(scale.length.of(s), unit.of(values), ls=ls, lw=1.4, color=SMOOTH,
                   label=f"smooth sphere: {name}")  # fmt: skip
     most = max(float(unit.of(f * scale.peak)), float(fp.max()))
     axes.set(xlim=(-scale.length.of(edge), scale.length.of(edge)), ylim=(0.0, 1.05 * most))
-    label(axes, scale.length.label("x"), unit.label("q"))
-    title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
-    legend_above(axes, ncols=4)
+    style.label(axes, scale.length.label("x"), unit.label("q"))
+    style.title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
+    style.legend_above(axes, ncols=4)
     return figure
+
+
+def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
+    """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
+    figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
+    left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    firsts = {name: int(ring[0]) for name, ring in found.named.items()}
+    path, share = found.path, found.fractions
+    force = 100.0 * path.asperity_forces / found.limit
+    moved = scale.displacement.of(path.asperity_displacements)
+    own = moved - scale.displacement.of(path.slips)
+    for order, i in enumerate(firsts.values()):
+        start = min(found.onsets[i], 1.0)
+        look: dict[str, Any] = {"color": ring_colour(order, len(firsts)), "lw": 1.2}
+        slid = np.searchsorted(share, start)
+        left.plot(share, force[:, i], **look)
+        right.plot(share, moved[:, i], **look)
+        right.plot(share[slid:], own[slid:, i], **(look | {"lw": 0.9, "ls": DOTTED}))
+        for axes, values in ((left, force), (right, moved)):
+            axes.plot(start, values[slid, i], "o", ms=4, mec=SMOOTH, mew=0.4, mfc=look["color"],
+                      clip_on=False, zorder=3, label="_onset")  # fmt: skip
+    for axes, values in ((left, force), (right, moved)):
+        axes.set(xlim=(0.0, 1.0))
+        axes.set_ylim(0.0, 1.04 * float(values.max()))
+        _letters(axes, list(firsts), values[-1, list(firsts.values())])
+    style.label(left, "$Q\\,/\\,(fP)$", "$Q_i\\,/\\,(fP)$  [%]")
+    style.title(left, "asperity of each ring; dot: slides from here")
+    style.label(right, "$Q\\,/\\,(fP)$", scale.displacement.short("(X_i + s_i)"))
+    style.title(right, "with gross slip; dotted: without")
+    figure.supxlabel(scale.footnote(), fontsize=TICK)
+    return figure
+
+
+def _letters(axes: Axes, names: list[str], heights: Array) -> None:
+    """Write the name of each curve right of its end, without overlaps."""
+    low, high = axes.get_ylim()
+    apart = 0.055 * (high - low)
+    order = np.argsort(heights)
+    placed = heights[order].astype(float)
+    for _ in range(100):
+        close = np.maximum(apart - np.diff(placed), 0.0)
+        if not (close > 1e-9 * apart).any():
+            break
+        placed[:-1] -= close / 2
+        placed[1:] += close / 2
+    for k, y in zip(order, placed, strict=True):
+        where: dict[str, Any] = {"textcoords": "offset points", "xytext": (6, 0)}
+        axes.annotate(
+            names[k], (1.0, y), fontsize=TICK, va="center", annotation_clip=False, **where
+        )
+
+
+def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
+    """The figure of energy per cycle against amplitude, rough and smooth, with a zoom."""
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    energy = scale.energy(max(each.loss for each in found.cycles))
+    rough = np.array([energy.of(each.loss) for each in found.cycles])
+    smooth = energy.of(scale.work) * np.array([each.smooth_normalised for each in found.cycles])
+    for axes in (whole, zoom):
+        axes.plot(AMPLITUDES, rough, lw=1.3, color=ROUGH, label="asperities")
+        axes.plot(AMPLITUDES, smooth, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
+    crossing = _cross(AMPLITUDES, rough, smooth)
+    middle = READ_CROSSING if crossing is None else crossing
+    window = np.clip(middle, 0.07, 0.93) + np.array([-0.07, 0.07])
+    inside = (window[0] <= AMPLITUDES) & (window[1] >= AMPLITUDES)
+    energies = np.concatenate((rough[inside], smooth[inside]))
+    margin = 0.04 * float(np.ptp(energies))
+    low, high = float(energies.min()) - margin, float(energies.max()) + margin
+    whole.set(xlim=(0.0, 1.0), ylim=(0.0, 1.04 * float(max(rough.max(), smooth.max()))))
+    zoom.set(xlim=tuple(window), ylim=(low, high))
+    box = Rectangle((window[0], low), np.ptp(window), high - low, fill=False, ec=SMOOTH, lw=0.8)
+    whole.add_patch(box)
+    whole.annotate("zoom", (float(window[1]), high), xytext=(-2, 3), textcoords="offset points",
+                   ha="right", va="bottom", fontsize=TICK)  # fmt: skip
+    if crossing is not None:
+        _mark_crossing(zoom, crossing, float(np.interp(crossing, AMPLITUDES, smooth)))
+    style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
+    style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
+    whole.legend(loc="upper left", fontsize=TICK, frameon=False)
+    style.title(whole, "energy lost per cycle")
+    style.title(zoom, "zoom")
+    return figure
+
+
+def _cross(amplitude: Array, rough: Array, smooth: Array) -> float | None:
+    """The first amplitude at which the two plotted curves cross; None if they do not."""
+    ratio = rough[1:] / smooth[1:] - 1.0
+    (before,) = np.nonzero(ratio[:-1] * ratio[1:] < 0)
+    if len(before) == 0:
+        return None
+    i = before[0]
+    part = ratio[i] / (ratio[i] - ratio[i + 1])
+    return float(amplitude[i + 1] + part * (amplitude[i + 2] - amplitude[i + 1]))
+
+
+def _mark_crossing(axes: Axes, crossing: float, height: float) -> None:
+    axes.axvline(READ_CROSSING, ls=DOTTED, lw=1.0, color=SMOOTH, label="_read")
+    axes.plot(crossing, height, "o", ms=5, mfc="white", mec=UNSURE, mew=1.3, label="_crossing")
+    axes.annotate(f"curves cross at {crossing:.3f}", (crossing, height), xytext=(10, -14),
+                  textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
+    said = f"read off the paper's\ngraph: about {READ_CROSSING:g}"
+    axes.annotate(said, (READ_CROSSING, axes.get_ylim()[0]), xytext=(4, 4), fontsize=TICK,
+                  textcoords="offset points", va="bottom")  # fmt: skip
+
+
+Columns = dict[str, NDArray[Any]]
+
+
+def figure_data(found: PaperStates) -> dict[str, Columns]:
+    """The numbers behind the paper's Figs. 3 to 9: names of tables, with their columns."""
+    contact, half, path, loop = found.contact, found.half, found.path, found.loop
+    sphere = smooth(contact.scene, load=contact.load)
+    x = np.linspace(-1.3, 1.3, 2001) * sphere.contact_radius
+    line = np.column_stack((x, np.zeros_like(x)))
+    close = np.linspace(0.0, 1.2, 241) * contact.contact_radii[0]
+    radial = np.column_stack((close, np.zeros_like(close)))
+    x_i, y_i = contact.scene.asperities.positions.T
+    letters = np.full(len(x_i), "", dtype="<U1")
+    for name, ring in found.named.items():
+        letters[ring] = name
+
+    def of_each_ring(states: LoadPath | Loop) -> Columns:
+        """Forces and displacements of the first asperity of each ring."""
+        firsts = {name: ring[0] for name, ring in found.named.items()}
+        forces, moved = states.asperity_forces, states.asperity_displacements
+        columns = {f"force_{name}": forces[:, i] for name, i in firsts.items()}
+        return columns | {f"displacement_{name}": moved[:, i] for name, i in firsts.items()}
+
+    return {
+        "fig3_pressure": {
+            "x": x,
+            "pressure": fields.pressure(contact, line),
+            "smooth_pressure": sphere.pressure(np.abs(x)),
+        },
+        "fig4_rings": {
+            "x": x_i,
+            "y": y_i,
+            "ring": letters,
+            "load": contact.loads,
+            "status_at_half": half.status,
+        },
+        "fig5_traction": {
+            "x": x_i,
+            "y": y_i,
+            "contact_radius": contact.contact_radii,
+            "stick_radius": half.stick_radii,
+            "load": contact.loads,
+            "force": half.forces,
+        },
+        "fig5_centre": {
+            "r": close,
+            "friction_limit": SHARE * fields.pressure(contact, radial),
+            "traction": fields.traction(half, radial),
+        },
+        "fig6_section": {
+            "x": x,
+            "friction_limit": SHARE * fields.pressure(contact, line),
+            "traction": fields.traction(half, line),
+            "smooth_traction": sphere.traction(np.abs(x), half.force),
+        },
+        "fig7_asperities": {
+            "fraction": found.fractions,
+            "displacement": path.displacements,
+            **of_each_ring(path),
+        },
+        "fig8_loops": {
+            "force": loop.forces,
+            "displacement": loop.displacements,
+            "smooth_displacement": smooth_loop(sphere, loop.forces),
+            **of_each_ring(loop),
+        },
+        "fig9_energy": {
+            "fraction": AMPLITUDES,
+            "loss": np.array([cycle.loss_normalised for cycle in found.cycles]),
+            "smooth_loss": np.array([cycle.smooth_normalised for cycle in found.cycles]),
+            "balance_defect": np.array([cycle.balance_defect for cycle in found.cycles]),
+        },
+    }

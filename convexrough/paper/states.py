@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 import convexrough as cr
@@ -22,9 +20,8 @@ AMPLITUDES = np.union1d(
 )
 
 
-@dataclass(frozen=True, eq=False)
 class PaperStates:
-    """The results that the figures and their tables show.
+    """The results that the figures and their tables show, for a pressed contact with friction.
 
     limit  : [force] friction limit f P
     named  : touching asperities by ring, from the axis outwards; the last ring is A
@@ -34,38 +31,18 @@ class PaperStates:
     cycles : steady cycles at `AMPLITUDES`
     """
 
-    contact: cr.Contact
-    limit: float
-    named: dict[str, Indices]
-    onsets: Array
-    half: cr.ShearState
-    steady: cr.Cycle
-    loop: cr.Loop
-    fractions: Array
-    path: cr.LoadPath
-    cycles: list[cr.Cycle]
-
-    @classmethod
-    def of(cls, contact: cr.Contact) -> PaperStates:
-        """The results for a pressed contact with friction."""
-        limit = checks.friction(contact.scene.friction) * contact.load
-        named = lettered(contact)
-        onsets = cr.onset_of_sliding(contact) / limit
-        firsts = [ring[0] for ring in named.values()]
-        fractions = np.minimum(np.union1d(FRACTIONS, onsets[firsts]), 1.0)
-        steady = cr.cycle(contact, maximum=SHARE * limit)
-        return cls(
-            contact=contact,
-            limit=limit,
-            named=named,
-            onsets=onsets,
-            half=cr.shear(contact, force=SHARE * limit),
-            steady=steady,
-            loop=steady.loop(400),
-            fractions=fractions,
-            path=cr.history(contact, forces=fractions * limit),
-            cycles=cr.cycles(contact, AMPLITUDES * limit),
-        )
+    def __init__(self, contact: cr.Contact) -> None:
+        self.contact = contact
+        self.limit = limit = checks.friction(contact.scene.friction) * contact.load
+        self.named = lettered(contact)
+        self.onsets: Array = cr.onset_of_sliding(contact) / limit
+        self.half = cr.shear(contact, force=SHARE * limit)
+        self.steady = cr.cycle(contact, maximum=SHARE * limit)
+        self.loop = self.steady.loop(400)
+        firsts = [ring[0] for ring in self.named.values()]
+        self.fractions = np.minimum(np.union1d(FRACTIONS, self.onsets[firsts]), 1.0)
+        self.path = cr.history(contact, forces=self.fractions * limit)
+        self.cycles = cr.cycles(contact, AMPLITUDES * limit)
 
 
 def lettered(contact: cr.Contact) -> dict[str, Indices]:

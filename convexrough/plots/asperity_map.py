@@ -15,18 +15,9 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.plots import style
 from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import (
-    COLOURS,
-    DASHED,
-    DOTTED,
-    FAINT,
-    SMOOTH,
-    bar,
-    disc_handle,
-    label,
-    round_ticks,
-)
+from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH
 
 #: From DENSE discs on, vector files contain these as pixels. From CROWDED discs on, a mosaic of
 #: coloured pixels replaces the discs.
@@ -59,24 +50,6 @@ class Layer(NamedTuple):
     rim: str | None = SMOOTH
 
 
-class Window(NamedTuple):
-    """A square part of the plane, in the length unit of the axes."""
-
-    x: float
-    y: float
-    half: float
-
-    @property
-    def sides(self) -> tuple[float, float, float, float]:
-        """The abscissae of the left and right side, the ordinates of the bottom and the top."""
-        return self.x - self.half, self.x + self.half, self.y - self.half, self.y + self.half
-
-    def holds(self, points: Array) -> NDArray[np.bool_]:
-        """(n,) True where a point lies inside."""
-        away: Array = np.abs(points - (self.x, self.y)).max(axis=1)
-        return away < self.half
-
-
 def draw_map(
     axes: Axes,
     points: Array,
@@ -84,55 +57,71 @@ def draw_map(
     length: Measure,
     *,
     smooth: Sequence[float] = (),
-    window: Window | None = None,
-) -> Window:
-    """Draw a disc at each point with a radius and a faint dot at others; return the part shown.
+    room: Array | None = None,
+) -> None:
+    """Draw a disc at each point with a radius and a faint dot at others, in a square with a margin.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
-    window : part of the plane to show; default `map_window`
+    room   : (n,) [length] radii of the discs for which the square has room; default: those drawn
 
     From `CROWDED` discs on, a mosaic replaces them: a pixel has the mean colour of the asperities
     inside it, or the colour of the nearest one if there is none. Asperities without disc are white.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
-    shown, window = whole > 0, window or map_window(points, whole, length, smooth)
+    shown, outline = whole > 0, [length.of(axis) for axis in smooth]
     points, whole = length.of(points), length.of(whole)
     layers = [each._replace(radii=length.of(each.radii)) for each in layers]
+    low, high = _square(points, whole if room is None else length.of(room), outline)
+    inside: NDArray[np.bool_] = np.all((points > low) & (points < high), axis=1)
     if int(shown.sum()) >= CROWDED:
-        _draw_mosaic(axes, points, _blended(layers, whole), shown, window)
+        _draw_mosaic(axes, points, _blended(layers, whole), shown, inside, low, high)
     else:
-        _draw_open(axes, points[~shown & window.holds(points)])
+        _draw_open(axes, points[~shown & inside])
         for each in layers:
             draw_discs(axes, points, each)
-    draw_outline(axes, [length.of(axis) for axis in smooth])
-    left, right, bottom, top = window.sides
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
-    axes.xaxis.set_major_locator(round_ticks(5))
-    axes.yaxis.set_major_locator(round_ticks(5))
-    label(axes, length.label("x"), length.short("y"))
-    return window
+    draw_outline(axes, outline)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.xaxis.set_major_locator(style.round_ticks(5))
+    axes.yaxis.set_major_locator(style.round_ticks(5))
+    style.label(axes, length.label("x"), length.short("y"))
 
 
-def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
+def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> None:
     """Draw the map of a contact, with the outline of the smooth contact under the same load."""
     points = scale.contact.scene.contact_points
-    return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
+    draw_map(axes, points, layers, scale.length, smooth=scale.axes)
 
 
 def draw_values(
-    axes: Axes, scale: Scale, values: Array, name: str, *, signed: bool = False
-) -> None:
-    """Draw the discs of a contact in the colours of `values`, and a named colour bar.
+    axes: Axes,
+    scale: Scale,
+    values: Array,
+    name: str,
+    *,
+    radii: Array | None = None,
+    most: float | None = None,
+    signed: bool = False,
+) -> ScalarMappable:
+    """Draw discs in the colours of `values`, and a named colour bar; return the colours.
 
+    values : (n,), of the contact discs; or (k, n), of discs above one another
+    radii  : (k, n) [length] radii of these discs, the largest first
+    most   : the value of the darkest colour; default: the largest
     signed : the colours run from dark for negative values to light for positive ones
     """
-    most = float(np.abs(values).max()) or 1.0
+    most = float(np.abs(values).max()) or 1.0 if most is None else most
     spread = Normalize(-most if signed else 0.0, most)
     colours = ScalarMappable(spread, "viridis" if signed else COLOURS)
-    radii = scale.contact.contact_radii
-    draw_contact(axes, scale, [Layer("contact discs", radii, colours.to_rgba(values))])
-    bar(axes, colours, name, above=not signed)
+    rim = SMOOTH if radii is None else None
+    sizes = np.atleast_2d(scale.contact.contact_radii if radii is None else radii)
+    layers = [
+        Layer("_inner discs" if k else "contact discs", radius, colours.to_rgba(each), rim)
+        for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
+    ]
+    draw_contact(axes, scale, layers)
+    style.bar(axes, colours, name, above=not signed)
+    return colours
 
 
 def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
@@ -160,12 +149,12 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 
 
 def draw_outline(
-    axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
+    axes: Axes, semi_axes: Sequence[float], dashes: Any = DASHED, colour: str = SMOOTH
 ) -> None:
     """Draw a circle (one semi-axis) or an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
-        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
+        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=colour))
 
 
 def status_layers(
@@ -187,17 +176,17 @@ def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
-    return [disc_handle(*entry) for entry in entries]
+    return [style.disc_handle(*entry) for entry in entries]
 
 
 def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
     """Legend entries for the outlines of the smooth contact and of its stick disc."""
     if scale.sphere is None:
         return []
-    styles = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
+    outlines = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
     return [
-        Line2D([], [], ls=style, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
-        for what, style in styles.items()
+        Line2D([], [], ls=dashes, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
+        for what, dashes in outlines.items()
     ]
 
 
@@ -213,19 +202,15 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
     return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
 
 
-def map_window(
-    points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
-) -> Window:
-    """The square about the discs (or all points if there are none) and outlines, with a margin."""
-    points, radii = length.of(points), length.of(radii)
-    outline = [length.of(axis) for axis in smooth]
+def _square(points: Array, radii: Array, outline: Sequence[float]) -> tuple[Array, Array]:
+    """Two corners of the square about the discs (or all points without discs) and the outline."""
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
     ends = [points[there] - radii[there, None], points[there] + radii[there, None]]
     if outline:
         ends += [-np.array([outline]), np.array([outline])]
     low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
-    x, y = (low + high) / 2
-    return Window(float(x), float(y), 0.53 * (float((high - low).max()) or 1.0))
+    middle, half = (low + high) / 2, 0.53 * (float((high - low).max()) or 1.0)
+    return middle - half, middle + half
 
 
 def _draw_open(axes: Axes, points: Array) -> None:
@@ -245,23 +230,29 @@ def _blended(layers: Sequence[Layer], whole: Array) -> Array:
 
 
 def _draw_mosaic(
-    axes: Axes, points: Array, shades: Array, shown: NDArray[np.bool_], window: Window
+    axes: Axes,
+    points: Array,
+    shades: Array,
+    shown: NDArray[np.bool_],
+    inside: NDArray[np.bool_],
+    low: Array,
+    high: Array,
 ) -> None:
-    """Draw the mosaic that `draw_map` describes."""
+    """Draw the mosaic that `draw_map` describes, in the square with the corners `low`, `high`."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
-    left, right, bottom, top = window.sides
-    steps = 2.0 * window.half * (np.arange(PIXELS) + 0.5) / PIXELS
-    places = np.stack(np.meshgrid(left + steps, bottom + steps), axis=-1)
-    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # larger distances are outside
+    width = high[0] - low[0]
+    steps = width * (np.arange(PIXELS) + 0.5) / PIXELS
+    places = np.stack(np.meshgrid(low[0] + steps, low[1] + steps), axis=-1)
+    cell = width / np.sqrt(np.count_nonzero(shown))  # larger distances are outside
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
     visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
     image = np.vstack((visible, np.zeros(4)))[nearest]
-    inside = window.holds(points)
-    column, row = ((points[inside] - (left, bottom)) / (2 * window.half) * PIXELS).astype(int).T
+    column, row = ((points[inside] - low) / width * PIXELS).astype(int).T
     place: Indices = row * PIXELS + column
     several = np.bincount(place, minlength=PIXELS**2)
     mean = np.stack([np.bincount(place, part, PIXELS**2) for part in visible[inside].T], axis=1)
     crowded = several > 1
     image.reshape(-1, 4)[crowded] = mean[crowded] / several[crowded, None]
-    axes.imshow(image, origin="lower", extent=(left, right, bottom, top), interpolation="nearest")
+    extent = (low[0], high[0], low[1], high[1])
+    axes.imshow(image, origin="lower", extent=extent, interpolation="nearest")

@@ -13,24 +13,11 @@ from matplotlib.patheffects import withStroke
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
+from convexrough.plots import style
 from convexrough.plots.load_plane import draw_closed
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DASHED,
-    DOUBLE,
-    FAINT,
-    ROUGH,
-    SMOOTH,
-    TICK,
-    few_ticks,
-    label,
-    legend_outside,
-    no_contact,
-    round_ticks,
-    say_nothing,
-    title,
-)
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
@@ -63,7 +50,7 @@ def cycle_figures(
     contact = cycles[0].contact
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
-        return no_contact("hysteresis", *(["loss"] if several else []))
+        return style.no_contact("hysteresis", *(["loss"] if several else []))
     scale = Scale(contact)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
     r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
@@ -119,24 +106,24 @@ def loops_figure(
         upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
                          textcoords="offset points", fontsize=7, va="center",
                          path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
-    label(whole, x.short("X"), q.short("Q"))
-    label(upright, x.short("X - Q/k") if x.said and not x.symbol
+    style.label(whole, x.short("X"), q.short("Q"))
+    style.label(upright, x.short("X - Q/k") if x.said and not x.symbol
           else f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$", "")  # fmt: skip
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     which = f": {len(cycles)} of {count}" if count > len(cycles) else ""
-    title(whole, f"whole contact{which}")
-    title(upright, "less an elastic part")
+    style.title(whole, f"whole contact{which}")
+    style.title(upright, "less an elastic part")
     _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)
-    title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
+    style.title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
     single.legend(title=meaning, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=TICK,
                   title_fontsize=TICK, frameon=False, handlelength=2.4, handletextpad=0.5,
                   borderpad=0.2)  # fmt: skip
     for axes in (whole, upright, single):
-        axes.xaxis.set_major_locator(round_ticks(4))
+        axes.xaxis.set_major_locator(style.round_ticks(4))
     handles = {line.get_label(): line for line in reversed(whole.lines)}
-    legend_outside(figure, list(handles.values())[::-1], "upper left", 2)
+    style.legend_outside(figure, list(handles.values())[::-1], "upper left", 2)
     elastic = ",   $k = 3fP/(2X_0)$" if x.said and not x.symbol else ""
     figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
     return figure
@@ -152,7 +139,7 @@ def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     if scale.sphere is not None:
         draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
     axes.legend(fontsize=TICK, frameon=False, loc="upper left")
-    return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
+    return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
 def draw_loop(
@@ -197,7 +184,7 @@ def _draw_asperity_loops(
         axes.plot(moved, loop.asperity_forces[:, at] / limits[i], lw=1.1, label=name,
                   ls=DASHES[order % len(DASHES)],
                   color=ring_colour(order, len(asperities)))  # fmt: skip
-    label(axes, scale.displacement.short("(X_i + s_i)"), "$Q_i\\,/\\,(fP_i)$")
+    style.label(axes, scale.displacement.short("(X_i + s_i)"), "$Q_i\\,/\\,(fP_i)$")
     for limit in (-1.0, 1.0):
         axes.axhline(limit, lw=0.5, color=FAINT, zorder=0.5)
 
@@ -232,18 +219,18 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     loss.plot(q.of(amplitude), w.of(rough), label="asperities", **marks)
     ends = q.of(scale.limit)
     loss.set(xscale="log", yscale="log", xlim=(ends * t[0], ends))
-    few_ticks(loss.xaxis)
-    few_ticks(loss.yaxis)
-    label(loss, "amplitude of " + q.label("Q"), w.label("W"))
+    style.few_ticks(loss.xaxis)
+    style.few_ticks(loss.yaxis)
+    style.label(loss, "amplitude of " + q.label("Q"), w.label("W"))
     loss.legend(loc="upper left", fontsize=TICK, frameon=False)
-    title(loss, "energy lost per cycle")
+    style.title(loss, "energy lost per cycle")
     if scale.sphere is None:
-        say_nothing(ratio, "no smooth reference")
+        style.say_nothing(ratio, "no smooth reference")
         return figure
     ratio.axhline(1.0, ls=DASHED, lw=1.1, color=SMOOTH)
     smooth = np.array([each.smooth_normalised for each in some]) * scale.work
     ratio.plot(q.of(amplitude), rough / smooth, **marks)
     ratio.set(xlim=(0.0, ends))
-    label(ratio, "amplitude of " + q.short("Q"), "$W\\,/\\,W_\\mathrm{smooth}$")
-    title(ratio, f"the same, over the {scale.name}'s")
+    style.label(ratio, "amplitude of " + q.short("Q"), "$W\\,/\\,W_\\mathrm{smooth}$")
+    style.title(ratio, f"the same, over the {scale.name}'s")
     return figure

@@ -10,25 +10,11 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath
 from convexrough.friction.phases import PhaseLosses
+from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DASHED,
-    DOUBLE,
-    FAINT,
-    ROUGH,
-    SINGLE,
-    SMOOTH,
-    TICK,
-    UNSURE,
-    label,
-    legend_below,
-    legend_outside,
-    mark_points,
-    shades_of,
-    title,
-)
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE
 from convexrough.scene.rings import evenly_chosen
 
 MOST_CURVES = 4
@@ -53,9 +39,9 @@ def steady_figures(found: Cycle) -> Figures:
     layers = status_layers(found.status, found.contact.contact_radii)
     draw_map(place, found.scene.contact_points, layers, length)
     if handles := status_handles(np.unique(found.status)):
-        legend_outside(figure, handles, "lower center", len(handles))
+        style.legend_outside(figure, handles, "lower center", len(handles))
     lost = quantity(found.loss, found.scene.units.work)
-    title(place, f"each cycle after the first loses {lost}")
+    style.title(place, f"each cycle after the first loses {lost}")
     return Figures({"steady": figure})
 
 
@@ -75,7 +61,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
     unit = measure(most, found.scene.units.work, "W_m")
-    for size, shade, pattern in zip(sizes, shades_of(len(sizes)), PATTERNS, strict=False):
+    for size, shade, pattern in zip(sizes, style.shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]
         turns = np.degrees(found.phases[those])
@@ -83,9 +69,9 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
         axes.plot(turns, rough, color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
         axes.plot(turns, smooth, color=SMOOTH, lw=0.7, ls=pattern)
     axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
-    legend_below(axes, 3, title="factor", title_fontsize=TICK)
+    style.legend_below(axes, 3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)
-    label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
+    style.label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
 
 
 def draw_path(axes: Axes, path: LoadPath) -> None:
@@ -95,11 +81,11 @@ def draw_path(axes: Axes, path: LoadPath) -> None:
     P, T = unit.of(path.loads), unit.of(path.forces / f)
     axes.plot(np.append(unit.of(path.start), P), np.append(0.0, T), color=FAINT, lw=0.9)
     chosen = evenly_chosen(range(len(P)), MOST_CURVES)
-    for k, shade, pattern in zip(chosen, shades_of(len(chosen)), PATTERNS, strict=False):
+    for k, shade, pattern in zip(chosen, style.shades_of(len(chosen)), PATTERNS, strict=False):
         s, heights = _vertices(path.curves[k], unit)
         axes.plot(s, heights, color=shade, lw=1.5, ls=pattern, label=f"memory at {k + 1}")
-    mark_points(axes, P, T)
-    legend_below(axes, handlelength=2.2)
+    style.mark_points(axes, P, T)
+    style.legend_below(axes, handlelength=2.2)
 
 
 def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
@@ -128,7 +114,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
                   ls=DASHED)  # fmt: skip
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
     axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
-    title(axes, "dot: $(L^*, T^*)$, never changes")
+    style.title(axes, "dot: $(L^*, T^*)$, never changes")
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
@@ -137,11 +123,12 @@ def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
     for sign in (1.0, -1.0):
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,
                   ls=DASHED)  # fmt: skip
-    label(axes, unit.label("P"), unit.short("T = Q/f" if unit.said and not unit.symbol else "T"))
+    style.label(
+        axes, unit.label("P"), unit.short("T = Q/f" if unit.said and not unit.symbol else "T")
+    )
     return unit
 
 
 def _vertices(curve: MemoryCurve, unit: Measure) -> tuple[Array, Array]:
-    pair = ([float(each) for each in values] for values in (curve.levels, curve.heights))
-    levels, heights = (unit.of(np.array(each)) for each in pair)
-    return levels, heights
+    levels, heights = (np.array(each, dtype=float) for each in (curve.levels, curve.heights))
+    return unit.of(levels), unit.of(heights)

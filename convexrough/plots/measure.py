@@ -60,8 +60,10 @@ def measure(size: float, unit: str, symbol: str = "") -> Measure:
     """The unit of an axis of values up to `size`: SI with prefix, or another `unit`, or `size`."""
     if known := _metric(unit):
         name, exponent = known
-        step = _step(abs(size) * 10.0**exponent)
-        return Measure(10.0 ** (3 * step - exponent), "", _prefixed(step, name))
+        si, step = abs(size) * 10.0**exponent, 0  # a power of a thousand scales it to 1 to 1000
+        if si and math.isfinite(si):
+            step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
+        return Measure(10.0 ** (3 * step - exponent), "", f"{PREFIXES[step + 5]}{name}")
     if unit or not symbol:
         return Measure(1.0, "", unit)
     return Measure(size or 1.0, symbol, quantity(size, ""))
@@ -69,10 +71,9 @@ def measure(size: float, unit: str, symbol: str = "") -> Measure:
 
 def quantity(value: float, unit: str) -> str:
     """The value to three digits with its unit, such as 4.12 µm (SI) or 4.12 × 10^-3 in."""
-    if (known := _metric(unit)) and value:
-        name, exponent = known
-        step = _step(abs(float(f"{value:.3g}")) * 10.0**exponent)
-        return f"{value * 10.0 ** (exponent - 3 * step):.3g} {_prefixed(step, name)}"
+    if value and _metric(unit):
+        prefixed = measure(float(f"{value:.3g}"), unit)
+        return f"{prefixed.of(value):.3g} {prefixed.said}"
     digits, _, power = f"{value:.2e}".partition("e")
     plain = value == 0 or -3 < int(power) < 3
     number = f"{value:.3g}" if plain else f"${digits}\\times 10^{{{int(power)}}}$"
@@ -91,17 +92,6 @@ def _metric(unit: str) -> tuple[str, int] | None:
     power = round(math.log10(known.size))
     name = SYMBOLS.get((known.length, known.force))
     return (name, power) if name and known.size * 10 ** (-power) == 1 else None
-
-
-def _step(size: float) -> int:
-    """The power of a thousand that scales the size to 1 to 1000, at least -5 and at most 4."""
-    if not size or not math.isfinite(size):
-        return 0
-    return int(np.clip(math.floor(math.log10(size * (1 + 1e-12)) / 3), -5, 4))
-
-
-def _prefixed(step: int, name: str) -> str:
-    return f"{PREFIXES[step + 5]}{name}"
 
 
 class Scale:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,34 +12,23 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 
 from convexrough.arrays import Array
-from convexrough.friction.path import LoadPath
-from convexrough.plots.asperity_map import (
-    draw_map,
-    map_window,
-    status_handles,
-    status_layers,
-)
+from convexrough.friction.path import LoadPath, history, load_path
+from convexrough.plots import style
+from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.load_plane import draw_path
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.points_between import MOST_POINTS, between
-from convexrough.plots.style import (
-    DOUBLE,
-    MOST_NUMBERS,
-    TICK,
-    bar,
-    label,
-    legend_outside,
-    mark_points,
-    no_contact,
-    round_ticks,
-    shades_of,
-    title,
-)
+from convexrough.plots.style import DOUBLE, MOST_NUMBERS, TICK
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
 MOST_MAPS = 8
+
+#: Largest numbers: of points; of asperities times points; of steps between two given points.
+MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
+
+#: Number of segments at varying load up to which points are added; each needs a solution.
+MOST_SEGMENTS = 24
 
 
 def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
@@ -52,7 +42,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     "path_stick_slip" : which asperities stick and which slide, at some of the points
     """
     if path.load_constant and not path.contact.loads.any():
-        return no_contact("history")
+        return style.no_contact("history")
     scale = Scale(path.contact)
     figure = Figure(figsize=(DOUBLE, 3.0 if path.load_constant else 3.2), layout="constrained")
     *plane, loop, cost = figure.subplots(
@@ -65,7 +55,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)
     if path.load_constant:
-        title(cost, "energy lost since the beginning")
+        style.title(cost, "energy lost since the beginning")
         return Figures({"history": figure})
     return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
 
@@ -82,9 +72,9 @@ def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Draw shear force against displacement."""
     x, q = scale.displacement, scale.force
     _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
-    mark_points(axes, x.of(path.displacements), q.of(path.forces))
+    style.mark_points(axes, x.of(path.displacements), q.of(path.forces))
     axes.margins(0.12)
-    label(axes, x.short("X"), q.short("Q"))
+    style.label(axes, x.short("X"), q.short("Q"))
 
 
 def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
@@ -96,11 +86,11 @@ def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     if m <= MOST_NUMBERS:
         axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color="0.15")
     else:
-        bar(axes, colours, "step", above=True)
+        style.bar(axes, colours, "step", above=True)
     axes.set(xlim=(0, max(1, m)))
     axes.set_ylim(bottom=0.0)
-    axes.xaxis.set_major_locator(round_ticks(8, whole=True))
-    label(axes, "step", energy.label("W"))
+    axes.xaxis.set_major_locator(style.round_ticks(8, whole=True))
+    style.label(axes, "step", energy.label("W"))
 
 
 def _draw_darkening(
@@ -108,7 +98,7 @@ def _draw_darkening(
 ) -> ScalarMappable:
     """Draw a curve that darkens from the origin to its end, and is visible everywhere."""
     steps = max(1, len(path.forces))
-    colours = ScalarMappable(Normalize(0, steps), ListedColormap(shades_of(256, low=0.15)))
+    colours = ScalarMappable(Normalize(0, steps), ListedColormap(style.shades_of(256, low=0.15)))
     points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))
     pieces = list(np.stack((points[:-1], points[1:]), axis=1))
     shades = colours.to_rgba(np.linspace(0, steps, len(pieces) + 1)[1:])
@@ -128,10 +118,10 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     places = figure.subplots(rows, columns, squeeze=False)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
-    window = map_window(scene.contact_points, radii[chosen].max(axis=0), scale.length)
+    room = radii[chosen].max(axis=0)
     for axes, k in zip(places.ravel(), chosen, strict=False):
         layers = status_layers(path.status[k], radii[k])
-        draw_map(axes, scene.contact_points, layers, scale.length, window=window)
+        draw_map(axes, scene.contact_points, layers, scale.length, room=room)
         slide = int((path.status[k] == "sliding").sum())
         touch = int((path.asperity_loads[k] > 0).sum())
         axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
@@ -141,5 +131,31 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         axes.set_axis_off()
     handles: Any = status_handles(np.unique(path.status[chosen]))
     if handles:
-        legend_outside(figure, handles, "lower center", len(handles))
+        style.legend_outside(figure, handles, "lower center", len(handles))
     return figure
+
+
+def between(path: LoadPath) -> LoadPath:
+    """The path with points added between the given ones, or unchanged if these cost too much.
+
+    Figures call it only if they are not given such a path, because it solves normal problems.
+    """
+    m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
+    each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
+    if not path.load_constant:
+        each = min(each, 8) if m <= MOST_SEGMENTS else 1
+    each = min(each, MOST_BETWEEN)
+    follows_on = path.load_constant or path.start == 0.0  # it does not start from another contact
+    if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
+        return path
+    corners = np.column_stack((path.loads, path.forces))
+    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # denser at the ends
+    pieces = [
+        np.vstack((a + part[:, None] * (b - a), b))
+        for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))
+    ]
+    P, Q = np.concatenate(pieces).T
+    if path.load_constant:
+        return history(path.contact, forces=Q)
+    limit = (path.scene.friction or 1.0) * P
+    return load_path(path.scene, loads=P, forces=np.clip(Q, -limit, limit))

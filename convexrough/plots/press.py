@@ -7,31 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.plots.asperity_map import CROWDED, Layer, Window, draw_contact
+from convexrough.plots import style
+from convexrough.plots.asperity_map import CROWDED, draw_values
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    COLOURS,
-    DOUBLE,
-    ROUGH,
-    SINGLE,
-    SMOOTH,
-    UNSURE,
-    abscissae,
-    bar,
-    draw_density,
-    label,
-    legend_above,
-    no_contact,
-    not_proved,
-    title,
-    towards_rim,
-)
+from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE
 from convexrough.sphere import hertz
 
 
@@ -44,7 +28,7 @@ def press_figures(contact: Contact) -> Figures:
     "loads"    : load of each touching asperity against the distance from the centre
     """
     if not contact.loads.any():
-        return no_contact("pressure", "loads")
+        return style.no_contact("pressure", "loads")
     scale = Scale(contact)
     return Figures({"pressure": pressure_figure(scale), "loads": _loads_figure(scale)})
 
@@ -55,60 +39,50 @@ def pressure_figure(scale: Scale) -> Figure:
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     chart.set_anchor("E")
-    label(profile, scale.length.label("x"), scale.pressure.label("p"))
-    colours, window = draw_pressure(chart, contact, scale)
+    style.label(profile, scale.length.label("x"), scale.pressure.label("p"))
+    colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
     crossed = (np.abs(contact.scene.contact_points[:, 1]) < contact.contact_radii).sum()
     touching = np.count_nonzero(contact.loads)
     in_rows = contact.scene.lattice is not None and crossed**2 >= touching
     if touching < CROWDED and (in_rows or crossed == touching):
-        _draw_section(profile, scale, window)
+        _draw_section(profile, scale, chart.get_xlim())
     else:
         _draw_peaks(profile, scale)
     profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
     return figure
 
 
-def draw_pressure(
-    axes: Axes, contact: Contact, scale: Scale | None = None
-) -> tuple[ScalarMappable, Window]:
-    """Draw a map of contact pressures with a colour bar; return the colours and the window.
+def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
+    """Draw a map of contact pressures with a colour bar; return the colours.
 
     The pressure p0 sqrt(1 - (r/a)^2) of a contact is a stack of discs in equal steps of pressure.
     If many asperities touch, it is one disc with the colour of the peak pressure.
     """
     scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))
-    top = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
-    colours = ScalarMappable(Normalize(0.0, top), COLOURS)
     n = np.count_nonzero(contact.loads)
     steps = int(np.clip(1000 // n, 8, 40)) if n < CROWDED else 1
-    layers = [
-        Layer(
-            "_inner discs" if step else "contact discs",
-            contact.contact_radii * np.sqrt(1.0 - (step / steps) ** 2),  # here p = p0 step / steps
-            colours.to_rgba(peaks * ((step + 0.5) / steps if steps > 1 else 1.0)),
-            None,
-        )
-        for step in range(steps)
-    ]
-    window = draw_contact(axes, scale, layers)
-    title(axes, census(contact))
-    bar(axes, colours, ("" if steps > 1 else "peak ") + scale.pressure.short("p"), above=True)
-    return colours, window
+    s = np.arange(steps)[:, None] / steps  # p = p0 s at the rim of a disc
+    values = peaks * (s + 0.5 / steps) if steps > 1 else peaks
+    style.title(axes, census(contact))
+    name = ("" if steps > 1 else "peak ") + scale.pressure.short("p")
+    most = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
+    radii = contact.contact_radii * np.sqrt(1.0 - s**2)
+    return draw_values(axes, scale, values, name, radii=radii, most=most)
 
 
-def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
-    contact, (left, right, *_) = scale.contact, window.sides
+def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
+    contact, (left, right) = scale.contact, sides
     edge = max(-left, right) * scale.length.size
-    x = abscissae(contact.scene.contact_points, contact.contact_radii, edge)
+    x = style.abscissae(contact.scene.contact_points, contact.contact_radii, edge)
     rough = scale.pressure.of(fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))))
     axes.fill_between(scale.length.of(x), rough, facecolor=(ROUGH, 0.2), edgecolor=ROUGH,
                       lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
                       label="asperities, $y=0$")  # fmt: skip
-    _draw_smooth(axes, scale, scale.axes[:1], towards_rim())
+    _draw_smooth(axes, scale, scale.axes[:1], style.towards_rim())
     axes.set_xlim(left, right)
-    legend_above(axes)
+    style.legend_above(axes)
 
 
 def _draw_peaks(axes: Axes, scale: Scale) -> None:
@@ -116,11 +90,11 @@ def _draw_peaks(axes: Axes, scale: Scale) -> None:
     r = distances(scale)[touching]
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
     _draw_points(axes, r, peaks, float(peaks.max()), "peaks of all")
-    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(towards_rim()[40:]))
+    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(style.towards_rim()[40:]))
     reach = max([scale.typical, *scale.axes])
     axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
-    label(axes, scale.length.label("r"), scale.pressure.label("p"))
-    legend_above(axes)
+    style.label(axes, scale.length.label("r"), scale.pressure.label("p"))
+    style.legend_above(axes)
 
 
 def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array) -> None:
@@ -137,19 +111,19 @@ def distances(scale: Scale) -> Array:
     return away / scale.length.size
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
+def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
     """Draw a dot for each point; if there are many, their density and median."""
     if len(x) >= CROWDED:
-        draw_density(axes, x, y, top, label)
+        style.draw_density(axes, x, y, top, name)
     else:
         size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
-        axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=label, clip_on=False, zorder=3)
+        axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=name, clip_on=False, zorder=3)
 
 
 def census(contact: Contact) -> str:
     """A line that says how many asperities touch, and for how many this is proved."""
     text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
-    return text + not_proved(contact.certificate.scope, contact.status)
+    return text + style.not_proved(contact.certificate.scope, contact.status)
 
 
 def _loads_figure(scale: Scale) -> Figure:
@@ -172,8 +146,8 @@ def _loads_figure(scale: Scale) -> Figure:
     reach = max(float(r[touching | unsure].max()), scale.length.of(scale.typical))
     axes.set_xlim(0.0, 1.05 * reach)
     axes.set_ylim(0.0, 1.06 * (axes.dataLim.ymax or 1.0))
-    label(axes, scale.length.label("r"), "asperity load  [% of total]")
-    legend_above(axes, ncols=2)
+    style.label(axes, scale.length.label("r"), "asperity load  [% of total]")
+    style.legend_above(axes, ncols=2)
     return figure
 
 
@@ -187,7 +161,7 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:
         return
-    s = towards_rim()[40:]
+    s = style.towards_rim()[40:]
     share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
     axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=SMOOTH,
               label="smooth $p(r)$ × cell area")  # fmt: skip

@@ -11,20 +11,11 @@ from matplotlib.colors import Normalize
 
 from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
+from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    COLOURS,
-    DASHED,
-    FAINT,
-    SINGLE,
-    SMOOTH,
-    UNSURE,
-    bar,
-    label,
-    title,
-)
+from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
 #: Number of points of the map along each axis.
 FINE = 240
@@ -62,10 +53,10 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
     ]
     draw_map(axes, points, layers, measure(float(np.ptp(points)), found.scene.units.length))
     ringed = "\nringed: the first to keep sliding" if first.any() else ""
-    title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
+    style.title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:
         what = "slip in the mechanism [1]" if vector else "factor up to which sliding dies out"
-        bar(axes, colours, what)
+        style.bar(axes, colours, what)
 
 
 def _onsets(found: Shakedown) -> Array:
@@ -116,8 +107,8 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     at = unit_p * found.factor if varies else float(found.force) / (f * found.load)
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
-    bar(axes, filled, "asperities that keep sliding, or open")
+    style.bar(axes, filled, "asperities that keep sliding, or open")
     across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
-    label(axes, across_label, "shear amplitude / $(fP_0)$")
-    title(axes, "hatched: gross sliding\nline: the limit; dot: of this path")
+    style.label(axes, across_label, "shear amplitude / $(fP_0)$")
+    style.title(axes, "hatched: gross sliding\nline: the limit; dot: of this path")
     return figure

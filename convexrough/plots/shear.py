@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from convexrough.friction.shear import ShearState
+from convexrough.plots import style
 from convexrough.plots.asperity_map import (
     CROWDED,
     draw_contact,
@@ -21,20 +22,7 @@ from convexrough.plots.asperity_map import (
 )
 from convexrough.plots.measure import Scale, quantity
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DOTTED,
-    DOUBLE,
-    FAINT,
-    LABEL,
-    SINGLE,
-    SMOOTH,
-    TICK,
-    legend_below,
-    legend_outside,
-    no_contact,
-    not_proved,
-    round_ticks,
-)
+from convexrough.plots.style import DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, TICK
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -53,12 +41,12 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
         return Figures()
     scale = Scale(states[0].contact)
     if not states[0].contact.loads.any():
-        return no_contact("stick_slip")
+        return style.no_contact("stick_slip")
     shown = evenly_chosen(states, MOST_PANELS)
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)
     width = SINGLE if columns == 1 else DOUBLE
-    doubted = any(not_proved(state.certificate.scope, state.status) for state in shown)
+    doubted = any(style.not_proved(state.certificate.scope, state.status) for state in shown)
     above = 0.17 * (1 + (columns == 4) + doubted)
     height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -68,7 +56,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
         axes.set_title(state_title(state, scale, narrow=columns == 4), fontsize=TICK)
         axes.set(xlabel="", ylabel="")
         if columns == 4:
-            axes.xaxis.set_major_locator(round_ticks(4))
+            axes.xaxis.set_major_locator(style.round_ticks(4))
     for axes in panels[len(shown) :]:
         axes.remove()
     for axes in panels[len(shown) - columns : len(shown)]:
@@ -76,7 +64,9 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
-    legend_outside(figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4)
+    style.legend_outside(
+        figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4
+    )
     return Figures({"stick_slip": figure})
 
 
@@ -85,7 +75,7 @@ def draw_one_state(axes: Axes, state: State) -> None:
     scale = Scale(state.contact)
     draw_state(axes, state, scale)
     axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
-    legend_below(axes, handles=legend_handles([state], scale))
+    style.legend_below(axes, handles=legend_handles([state], scale))
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
@@ -127,7 +117,7 @@ def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
     share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
     sliding = f"{slide:,} of {int(touching.sum()):,} slide"
-    unsure = not_proved(state.certificate.scope, state.status)
+    unsure = style.not_proved(state.certificate.scope, state.status)
     return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{sliding}" + unsure.replace(
         " ", "\n", 1
     )

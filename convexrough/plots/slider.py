@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle, cycles
-from convexrough.friction.path import LoadPath, history
+from convexrough.friction.path import history
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
@@ -35,64 +34,43 @@ FEWEST_FORCES = 21
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
-@dataclass(frozen=True)
-class Slides:
-    """The states of the page: loading to fractions of the friction limit, and steady cycles."""
+def slider_html(contact: Contact, proved: Sequence[str]) -> str:
+    """The page as text; `proved` are lines that say what is proved of the contact.
 
-    contact: Contact
-    fractions: Array
-    steady: list[Cycle]
-    loading: LoadPath
-
-    @classmethod
-    def of(cls, contact: Contact) -> Slides:
-        """The states of a contact. Raises InputError without a load, a sphere or friction."""
-        sphere_radius(contact.scene.sphere_radius, "slider page")
-        if contact.load == 0:
-            raise InputError("slider page", found="no asperity that touches", expected="a contact")
-        limit = checks.friction(contact.scene.friction) * contact.load
-        fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
-        steady = cycles(contact, fractions * limit)
-        loading = history(contact, forces=fractions * limit)
-        return cls(contact, fractions, steady, loading)
-
-
-def slider_html(slides: Slides, proved: Sequence[str]) -> str:
-    """The page as text; `proved` are lines that say what is proved of the contact."""
-    found = json.dumps(slider_data(slides, proved), separators=(",", ":"))
+    Raises InputError without a load, a sphere or friction.
+    """
+    found = json.dumps(slider_data(contact, proved), separators=(",", ":"))
     template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
 
 
-def slider_data(slides: Slides, proved: Sequence[str]) -> dict[str, Any]:
-    """The data of the page, with five digits.
+def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
+    """The data of the page, with five digits: first loading, and steady cycles.
 
     Lengths are in a_H, forces in f P, displacements in X0 of `plots.measure`. `stick` has a row per
     force and a column per disc: the stick radius in thousandths of the contact radius, 0 where
     sliding, -1 where undecided.
     """
-    contact, fractions, steady, loading = (
-        slides.contact, slides.fractions, slides.steady, slides.loading
-    )  # fmt: skip
-    limit = checks.friction(contact.scene.friction) * contact.load
-    touching = np.flatnonzero(contact.loads)
-    # Avoid a division by 0 where no asperity touches.
-    sphere = smooth(contact.scene, load=contact.load) if contact.load else None
-    a_H = sphere.contact_radius if sphere else 1.0
-    X0 = float(sphere.displacement(limit)) if sphere else 1.0
+    sphere_radius(contact.scene.sphere_radius, "slider page")
+    if contact.load == 0:
+        raise InputError("slider page", found="no asperity that touches", expected="a contact")
+    f, touching = checks.friction(contact.scene.friction), np.flatnonzero(contact.loads)
+    limit = f * contact.load
+    count = next((n for most, n in FORCES.items() if len(touching) <= most), FEWEST_FORCES)
+    fractions = np.linspace(0.0, 1.0, count)
+    steady = cycles(contact, fractions * limit)
+    loading = history(contact, forces=fractions * limit)
+    sphere = smooth(contact.scene, load=contact.load)
+    a_H, X0 = sphere.contact_radius, float(sphere.displacement(limit))
     shown = _some(touching, MOST_DRAWN)
     away = np.argsort(contact.scene.asperities.distances[shown], kind="stable")
     followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
-    x, y = (contact.scene.contact_points / a_H).T
-    points, radii = (
-        contact.scene.contact_points[shown] / a_H,
-        contact.contact_radii[shown] / a_H,
-    )
-    radii *= np.sqrt(len(touching) / max(1, len(shown)))  # together they cover the same area
-    reach = np.hypot(*points.T) + radii
+    points, radii = contact.scene.contact_points / a_H, contact.contact_radii[shown] / a_H
+    radii *= np.sqrt(len(touching) / len(shown))  # together they cover the same area
+    edge = 1.06 * max(1.0, float((np.hypot(*points[shown].T) + radii).max()))
     empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
-    edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
-    empty = empty[np.maximum(np.abs(x[empty]), np.abs(y[empty])) < edge]
+    empty = empty[np.abs(points[empty]).max(axis=1) < edge]
+    shares = loading.asperity_forces[:, shown] / (f * contact.loads[shown])
     return {
         "units": contact.scene.units._asdict(),
         "touching": len(touching),
@@ -101,16 +79,18 @@ def slider_data(slides: Slides, proved: Sequence[str]) -> dict[str, Any]:
         "letters": _letters(limit, a_H, X0, *contact.scene.units),
         "left_out": _left_out(len(touching), len(shown), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
-        "discs": {"index": shown.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
-                  "radius": _digits(radii)},
-        "stick": _stick(contact, loading, steady, shown),
-        "open": {"x": _digits(x[empty]), "y": _digits(y[empty])},
-        "followed": {"disc": followed.tolist()} | _followed(contact, loading, shown[followed], X0),
+        "discs": {"index": shown.tolist(), "x": _digits(points[shown, 0]),
+                  "y": _digits(points[shown, 1]), "radius": _digits(radii)},
+        "stick": _stick(shares, np.array([each.status[shown] for each in steady])),
+        "open": {"x": _digits(points[empty, 0]), "y": _digits(points[empty, 1])},
+        "followed": {
+            "disc": followed.tolist(),
+            **_followed(contact, shown[followed]),
+            "share": [_digits(curve) for curve in shares[:, followed].T],
+            "moved": [_digits(curve) for curve in
+                      loading.asperity_displacements[:, shown[followed]].T / X0],
+        },
     }  # fmt: skip
-
-
-def _forces(touching: int) -> int:
-    return next((count for most, count in FORCES.items() if touching <= most), FEWEST_FORCES)
 
 
 def _some(which: Indices, most: int) -> Indices:
@@ -139,25 +119,15 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
     }
 
 
-def _stick(
-    contact: Contact, loading: LoadPath, steady: list[Cycle], shown: Indices
-) -> list[list[int]]:
-    """`stick` of `slider_data`: a row for each force, with an entry for each disc."""
-    left = np.maximum(1.0 - _shares(contact, loading, shown), 0.0)
-    rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
-    statuses = np.array([each.status[shown] for each in steady])
+def _stick(shares: Array, statuses: NDArray[np.str_]) -> list[list[int]]:
+    """`stick` of `slider_data`, from (m, k) shear forces over friction limits, and statuses."""
+    rows = np.maximum(np.rint(1000.0 * np.cbrt(np.maximum(1.0 - shares, 0.0))), 1.0).astype(int)
     rows[statuses == "sliding"] = 0
     rows[statuses == "undecided"] = -1
     return [row.tolist() for row in rows]
 
 
-def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
-    """(m, k) shear forces of k asperities at m forces, over the friction limit of each."""
-    limits = checks.friction(contact.scene.friction) * contact.loads[which]
-    return np.asarray(loading.asperity_forces[:, which] / limits)
-
-
-def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) -> dict[str, Any]:
+def _followed(contact: Contact, which: Indices) -> dict[str, Any]:
     x, y = contact.scene.asperities.positions[which].T
     certificate = contact.certificate
     return {
@@ -166,8 +136,6 @@ def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) ->
         "status": certificate.status[which].tolist(),
         "load": _digits(contact.loads[which]),
         "load_error": [bound(error) for error in certificate.load_errors[which]],
-        "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
-        "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
     }
 
 

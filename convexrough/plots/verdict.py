@@ -7,22 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from convexrough.arrays import Array
-from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
+from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import (
-    DOUBLE,
-    SINGLE,
-    UNSURE,
-    disc_handle,
-    legend_below,
-    title,
-    write_beside,
-)
-from convexrough.scene.scene import Scene
-from convexrough.verdict import Verdict
+from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
 
 #: The indices of at most this many suspects are written, of the likeliest ones.
 NUMBERED = 5
@@ -35,7 +25,7 @@ NAMES = {"partial": "partial slip"}
 MARKS = ["o", "X"]
 
 
-def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Figures:
+def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     """The figure of a verdict.
 
     "verdict" : map of the proved statuses, with marks on wrongly claimed asperities and indices of
@@ -45,19 +35,14 @@ def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Fi
     width = SINGLE if len(claims) == 1 else DOUBLE
     figure = Figure(figsize=(width, 3.9), layout="constrained")
     for axes, claim in zip(figure.subplots(1, len(claims), squeeze=False)[0], claims, strict=True):
-        draw_claim(axes, claim, verdict.scene)
+        draw_claim(axes, claim)
     return Figures({"verdict": figure})
 
 
-def draw_verdict(axes: Axes, verdict: Verdict) -> None:
-    """Draw the map of the claim on loads."""
-    draw_claim(axes, verdict, verdict.scene)
-
-
-def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
+def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim."""
-    status, points = claim.status, scene.asperities.positions
-    length = measure(float(np.ptp(points)), scene.units.length)
+    status, points = claim.status, claim.of.asperities.positions
+    length = measure(float(np.ptp(points)), claim.of.units.length)
     size = even_radii(points, np.ones(len(points), dtype=bool))
     layers = [
         Layer(name, np.where(status == name, size, 0.0), shade)
@@ -66,16 +51,16 @@ def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
     ]
     draw_map(axes, points, layers, length)
     said = [each.status for each in layers]
-    handles = [disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
+    handles = [style.disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
     marked = list(zip(MARKS, claim.wrong.items(), strict=True))
     for mark, (what, those) in [*marked, ("^", ("undecided", claim.undecided))]:
         if len(those):
             handles.append(_mark(axes, length.of(points[those]), mark, f"{what} ({len(those):,})"))
     for i in claim.suspects[:NUMBERED]:
-        write_beside(axes, str(i), length.of(points[i]))
+        style.write_beside(axes, str(i), length.of(points[i]))
     verdict = "holds" if claim.holds else "does not hold"
-    title(axes, f"{claim.many}: the claim {verdict}")
-    legend_below(axes, handles=handles)
+    style.title(axes, f"{claim.many}: the claim {verdict}")
+    style.legend_below(axes, handles=handles)
 
 
 def _mark(axes: Axes, points: Array, mark: str, what: str) -> Line2D:

@@ -139,12 +139,12 @@ class Writer:
         Everything is computed before the first file is written.
         """
         tables = [result.tables() for result in results]
-        drawn = [result.figures() for result in results] if figures else []
+        plotted = [result.figures() for result in results] if figures else []
         self.summary("summary.json", summarise(results) | dict(more or {}))
         for result, each in zip(results, tables, strict=True):
             LOGGER.info(f"writing {result.name}")
             self.tables(each)
-        for result, some in zip(results, drawn, strict=False):
+        for result, some in zip(results, plotted, strict=False):
             LOGGER.info(f"drawing {result.name}")
             self.figures(some)
 
@@ -234,9 +234,9 @@ def slider_page(pressed: Result) -> str:
 
     Raises InputError if the scene has no friction, or another shape than a sphere.
     """
-    from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
+    from convexrough.plots.slider import slider_html  # matplotlib: only when it draws
 
-    return slider_html(Slides.of(pressed.contact), pressed.lines())
+    return slider_html(pressed.contact, pressed.lines())
 
 
 def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> Path:

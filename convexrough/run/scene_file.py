@@ -59,8 +59,8 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 
 def unknown(column: str) -> bool:
-    """True if a column with this header may contain the heights."""
-    return bare(column).lower() not in (*INDEX, *RESULTS)
+    """True if a column with this header (not a number, its name without one) may be heights."""
+    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
 
 
 def read_summits(

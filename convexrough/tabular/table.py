@@ -43,6 +43,7 @@ COLUMNS = {
     "status": Column(""),
     "contact": Column("", also=("touching", "in_contact")),
     "no_contact": Column("", also=("open",)),
+    "index": Column(""),
 }
 
 #: Names of columns with row numbers.
@@ -108,7 +109,8 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the columns that were not read, by header, which may be empty; text if a cell is none
+    others  : the columns that were not read, by header, which may be empty, or by number without
+        headers; one that `Reading.columns` calls the index is "index"; text if a cell is none
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -147,6 +149,7 @@ def read_table(
     instead: Mapping[str, Sequence[str]] = MappingProxyType({}),
     holes: Sequence[str] = (),
     unnamed: Sequence[Sequence[str]] = (),
+    line: int = 0,
     how: Reading = AS_IT_IS,
     table: TextTable | None = None,
 ) -> ReadTable:
@@ -156,19 +159,23 @@ def read_table(
     instead : columns that replace a required one if the file has the first of them
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
+    line : a single line of this many numbers without a header, or of more than 3, is one column
     table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
-    wanted = (*required, *optional, *(each for names in instead.values() for each in names))
+    wanted = [*required, *optional, *(each for names in instead.values() for each in names)]
+    wanted += ["index"] if "index" in how.columns else []
     called = [each.lower() for each in how.columns.values()]
     known = [*wanted, *INDEX[:-1], *called]
     with reading(path):
         sheet = [*required, *(names[0] for names in instead.values()), *called]
         source = _source(path, known, sheet) if table is None else _text_source(table)
-    if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
+    alone = source.header is None and len(source.rows) == 1 and not how.columns
+    if unnamed and alone and (len(source.columns) > 3 or len(source.columns) == line):
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
+    index = places.pop("index", None)
     for name, others in instead.items():
         if name not in places and others[0] in places:
             required = [each for each in required if each != name]
@@ -179,7 +186,7 @@ def read_table(
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
-    other = others[0] if short else "NAME"
+    other = others[0] if short else "NAME" if source.header else "NUMBER"
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
         + (f"; --column {each}={other} names another" if how.scalable else "")
@@ -193,7 +200,7 @@ def read_table(
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
-    names = source.header or [""] * len(source.columns)
+    names = [*(source.header or map(str, range(1, len(source.columns) + 1)))]
     units = {name: said for name, place in places.items() if (said := unit(names[place]))}
     factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
     mistakes += wrong
@@ -207,7 +214,10 @@ def read_table(
             read[name] = numbers * factors.get(name, 1.0)
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
-    rest = [i for i in range(len(names)) if i not in places.values()]
+    rest = [i for i in range(len(names)) if i not in (index, *places.values())]
+    unread = {names[i]: _numbers_or_text(source, i) for i in rest}
+    if index is not None:
+        unread["index"] = _numbers_or_text(source, index)
     return ReadTable(
         read,
         source.rows,
@@ -215,7 +225,7 @@ def read_table(
         units,
         source.style,
         {name: names[place] or str(place + 1) for name, place in places.items()},
-        {names[i]: _numbers_or_text(source, i) for i in rest} if source.header else {},
+        unread,
         factors,
     )
 

@@ -1,9 +1,9 @@
-"""Claimed forces from a file, one per asperity of a scene, in the scene's order."""
+"""Claimed forces from files, one per asperity of a scene, and the verdicts on them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.errors import InputError, TableError
+from convexrough.contact import Contact, solve
+from convexrough.errors import InputError, TableError, blamed_on
+from convexrough.friction.verdict import claims_sliding, verify_shear
+from convexrough.normal.claims import Claim, tolerance
+from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.reading import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare, unit
 from convexrough.verdict.placing import Placing, unused
-from convexrough.verdict.verdict import rounded_up
+from convexrough.verdict.verdict import rounded_up, verify_on
 
 #: Negative loads up to this fraction of the largest load may be noise.
 SMALL = 1e-3
@@ -48,6 +52,11 @@ MOST = 3
 OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
 
 
+#: The statuses accepted in a file of shear forces. An asperity with "undecided" is claimed to slide
+#: or to stick according to its force.
+STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Manner(Reading):
     """How a file of forces is read.
@@ -72,12 +81,13 @@ class Manner(Reading):
 
 
 class Claimed(NamedTuple):
-    """Forces in the order of the scene's asperities.
+    """Forces of a file in the order of the scene's asperities.
 
     status : (n,) the statuses in the file, None without them
     note   : how the file was read, on one line;  explained : how each column was read
     """
 
+    path: Path
     values: Array
     status: NDArray[np.str_] | None
     note: str
@@ -101,6 +111,51 @@ def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
     return _read(path, scene, "force", how, np.inf)
 
 
+def judged(
+    problem: NormalProblem,
+    loads: Claimed,
+    forces: Claimed | None = None,
+    *,
+    within: float,
+    floor: float = 0.0,
+    force: float = 0.0,
+) -> list[Claim]:
+    """The verdicts on loads, and on shear forces if there are any. Errors name the file.
+
+    within : largest error allowed, as a fraction of the largest load or shear force
+    force  : [force] the prescribed total of the shear forces
+    """
+    tolerance("--within", within)
+    with blamed_on(loads.path):
+        verdict = verify_on(problem, loads.values, within=within, floor=floor)
+    if forces is None:
+        return [verdict]
+    contact = verdict.solution
+    if contact is None:
+        contact = solve(problem, start=np.where(verdict.claimed, verdict.loads, 0.0))
+    sliding = _claimed_to_slide(forces, contact)
+    with blamed_on("--shear-force"):
+        sheared = verify_shear(contact, forces.values, force=force, within=within, sliding=sliding)
+    return [verdict, sheared]
+
+
+def _claimed_to_slide(forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
+    if forces.status is None:
+        return None
+    said, mistakes = np.char.lower(np.char.strip(forces.status)), list[str]()
+    for each in np.unique(said[~np.isin(said, STATUSES)])[:10]:
+        mistakes.append(f"column status: found {str(each)!r}, expected {', '.join(STATUSES)}")
+    wrong = (contact.status == "contact") & (said == "open")
+    wrong |= (contact.status == "open") & ~np.isin(said, ("open", "undecided"))
+    for i in np.flatnonzero(wrong) if not mistakes else ():
+        found = f'found "{said[i]}" at asperity {i}, which is proved {contact.status[i]}'
+        mistakes.append(f"column status: {found}")
+    if mistakes:
+        raise TableError(str(forces.path), few(mistakes))
+    by_force = claims_sliding(contact, forces.values)
+    return np.where(said == "undecided", by_force, said == "sliding")
+
+
 def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Claimed:
     table = read_table(
         path,
@@ -108,6 +163,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         optional=("x", "y", *CLAIMS),
         instead={"load": ("pressure", "area")},
         unnamed=((name,), ("x", "y", name)),
+        line=0 if how.missing_open else len(scene),
         how=how,
     )
     columns, mistakes = table.columns, list[str]()
@@ -151,7 +207,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     read_how = [*(_not_compared(table, values > floor) if name == "load" else ()), place.how]
     read_how += () if summed else _of_another_scene(table, scene, owners)
     note = ", ".join(filter(None, [table.style, *units, *read_how]))
-    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
+    return Claimed(path, frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
 
 
 def _negative(
@@ -179,19 +235,20 @@ def _negative(
         yield mistake(int(i), found)
 
 
-def _claims(table: ReadTable) -> list[tuple[str, str]]:
-    """The columns that say which asperities touch, each with its header."""
-    return [(name, bare(table.called[name]).lower()) for name in CLAIMS if name in table.columns]
+def _statuses(table: ReadTable) -> Iterator[tuple[str, NDArray[np.str_], Mapping[str, str]]]:
+    """For each column that says which asperities touch its header, entries and `CLAIMS`."""
+    for name, known in CLAIMS.items():
+        if name in table.columns:
+            yield bare(table.called[name]).lower(), np.char.strip(table.columns[name]), known
 
 
 def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]:
     """A message for each row whose status or flag contradicts its load."""
-    touches = loads > floor
-    for name, header in _claims(table):
-        found = np.char.lower(np.char.strip(table.columns[name]))
-        said = np.array([CLAIMS[name].get(each, "") for each in found])
-        for i in np.flatnonzero(said == np.where(touches, "open", "contact")):
-            right = next(each for each, it in CLAIMS[name].items()
+    for header, entries, known in _statuses(table):
+        found = np.char.lower(entries)
+        said = np.array([known.get(each, "") for each in found])
+        for i in np.flatnonzero(said == np.where(loads > floor, "open", "contact")):
+            right = next(each for each, it in known.items()
                          if it != said[i] and (each in FLAGS) == (found[i] in FLAGS))  # fmt: skip
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
             yield table.mistake(int(i), f', column {header}: found "{found[i]}", {expected}')
@@ -199,11 +256,10 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
 
 def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
     """A note on each column of statuses: the unknown words of rows with and without a load."""
-    for name, header in _claims(table):
-        found = np.array([each.strip() for each in table.columns[name]], dtype=str)
-        other = np.array([each.lower() not in (*CLAIMS[name], "", "undecided") for each in found])
+    for header, entries, known in _statuses(table):
+        other = ~np.isin(np.char.lower(entries), (*known, "", "undecided"))
         if other.any():
-            here, there = (sorted(set(found[other & rows]))[:MOST] for rows in (loaded, ~loaded))
+            here, there = (sorted(set(entries[other & rows]))[:MOST] for rows in (loaded, ~loaded))
             with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
             yield f"column {header} not compared ({with_load} with a load, {without} without)"
 

@@ -98,6 +98,9 @@ class Placing:
         if rows == count + 1 and (total := self._total()):
             self.mistakes = [total]
             return found
+        if several := self._several_tables():
+            self.mistakes = [several]
+            return found
         advice = "" if by else unused(self.table)
         if rows < count and (by or self._indices()):
             advice = "; --missing-open takes the others for open"
@@ -161,6 +164,8 @@ class Placing:
             if (numbered := self._numbered(name, index)) is not None:
                 return numbered, True
         rows = len(self.table.rows)
+        if nameless := [name for name in self.table.others if name.isdecimal()]:
+            self.how += f" (not used: columns {', '.join(nameless)})"
         if not self.mistakes and rows == len(self.scene):
             self.mistakes += self._unread_positions()
         return np.arange(rows), False
@@ -202,10 +207,8 @@ class Placing:
             where = " and ".join(self.table.rows[i] for i in np.flatnonzero(index == twice)[:2])
             wrong = f"{twice} in {where}, expected each asperity once"
         elif least > 0 and most < count:
-            question = (
-                f"from 0 or from 1? Expected x and y, or a row {count} if from 1, 0 if from 0"
-            )
-            wrong = f"numbers from {least} to {most}: {question}"
+            more = f"a row 0 if they count from 0, a row {count} if they count from 1"
+            wrong = f"numbers from {least} to {most}, expected columns x and y, or also {more}"
         elif most - (first := min(least, 1)) >= count:
             wrong = f"{most}, expected at most {count - 1 + first}, the last asperity, or x and y"
         else:
@@ -232,6 +235,17 @@ class Placing:
                     found = f"found {what} in another order than the scene's"
                     yield f"columns {a}, {b}: {found}, expected {expected}"
                 return
+
+    def _several_tables(self) -> str:
+        """A message if a column tells several tables apart that stand in one file; else ""."""
+        count = len(self.scene)
+        for name, cells in self.table.others.items():
+            values, times = np.unique(cells, return_counts=True)
+            if len(values) > 1 and (times == count).all():
+                some = ", ".join(map(str, values[:3].tolist())) + ", ..." * (len(values) > 3)
+                found = f"found {len(values)} values ({some}) in {count} rows each"
+                return f"column {name}: {found}, expected the rows of one value"
+        return ""
 
     def _total(self) -> str:
         """A message if the last row holds the sum of all other rows; else ""."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 from convexrough.arrays import Indices
 from convexrough.compare import joined
 from convexrough.errors import ConvexroughError
-from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
 from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
-from convexrough.verdict.verdict import Verdict
 
 #: Relative errors above this are printed in per cent.
 PERCENT = 1e-4
@@ -28,48 +26,29 @@ PERCENT = 1e-4
 MOST_LISTED = 10
 
 
-class Verified(NamedTuple):
-    """The verdicts on the claims of files; `notes` say how the files were read.
-
-    sheared : the verdict on shear forces; None if no file claims any
-    """
-
-    verdict: Verdict
-    sheared: ShearVerdict | None
-    notes: list[str]
-
-    @property
-    def claims(self) -> list[Claim]:
-        """The claim on loads, and the one on shear forces if there is one."""
-        return [self.verdict, *([] if self.sheared is None else [self.sheared])]
-
-    @property
-    def holds(self) -> bool:
-        return all(claim.holds for claim in self.claims)
-
-
-def verdict_summary(found: Verified) -> dict[str, Any]:
+def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
     """The verdicts and a row for each asperity, as `--json` prints them, in the scene's units."""
-    summary: dict[str, Any] = {"verdict": _claim_summary(found.verdict)}
-    if found.sheared is not None:
-        summary["shear_verdict"] = _claim_summary(found.sheared)
-    return summary | {"asperities": rows_of(asperity_columns(found))}
+    summary: dict[str, Any] = {}
+    for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
+        names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
+                 "total_prescribed", "within")  # fmt: skip
+        found = {name: getattr(claim, name) for name in names}
+        summary[key] = {
+            name: it.tolist() if isinstance(it, np.ndarray) else it for name, it in found.items()
+        }
+    return summary | {"asperities": rows_of(asperity_columns(claims))}
 
 
-def _claim_summary(claim: Claim) -> dict[str, Any]:
-    names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
-             "total_prescribed", "within")  # fmt: skip
-    found = {name: getattr(claim, name) for name in names}
-    return {name: it.tolist() if isinstance(it, np.ndarray) else it for name, it in found.items()}
+def asperity_columns(claims: Sequence[Claim]) -> dict[str, NDArray[Any]]:
+    """Columns by name, with an entry for each asperity: what is claimed, and what is proved.
 
-
-def asperity_columns(found: Verified) -> dict[str, NDArray[Any]]:
-    """Columns by name, with an entry for each asperity: what is claimed, and what is proved."""
-    x, y = found.verdict.scene.asperities.positions.T
-    columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(found.verdict)}
-    if found.sheared is not None:
-        for name, values in _columns(found.sheared).items():
-            columns[name if name.startswith("force") else f"shear_{name}"] = values
+    claims : the claim on loads, and the one on shear forces if there is one
+    """
+    loads, *sheared = claims
+    x, y = loads.of.asperities.positions.T
+    columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(loads)}
+    for name, values in (each for claim in sheared for each in _columns(claim).items()):
+        columns[name if name.startswith("force") else f"shear_{name}"] = values
     return columns
 
 
@@ -81,15 +60,6 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
     if (nearby := claim.nearby()) is not None:
         columns["solution"] = nearby[0]
     return columns
-
-
-def describe_verdict(found: Verified) -> list[str]:
-    """The lines of the printed report on the scene and on each claim (of loads or shear forces)."""
-    lines = [*found.notes, *describe_scene(found.verdict.scene)]
-    for claim in found.claims:
-        others = ": --json and --out list all"
-        lines += ["", *describe_claim(claim, found.verdict.scene, others)]
-    return lines
 
 
 def describe_scene(scene: Scene) -> list[str]:
@@ -115,14 +85,14 @@ def _size(claim: Claim) -> str:
     return f"{f'{bound(100 * claim.error)} %' if per_cent else bound(claim.error)} of the largest"
 
 
-def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
+def describe_claim(claim: Claim, others: str = "") -> list[str]:
     """Aligned lines on one claim: wrong, undecided and inaccurate asperities, and the total.
 
     others : text to print after the number of rows that a table leaves out
     """
 
     def table(which: Indices) -> list[str]:
-        lines = _table(claim, scene, which[:MOST_LISTED])
+        lines = _table(claim, which[:MOST_LISTED])
         more = len(which) - MOST_LISTED
         return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
 
@@ -139,7 +109,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
     lines += table(claim.undecided)
     lines += labelled([(f"{claim.one} error", _off(claim))])
     lines += table(claim.off) if math.isfinite(claim.error) else []
-    lines += labelled([(f"total {claim.one}", _total(claim, scene.units.force))])
+    lines += labelled([(f"total {claim.one}", _total(claim, claim.of.units.force))])
     if len(claim.suspects):
         lines += [*labelled([("suspects", "most likely first")]), *table(claim.suspects)]
     return lines
@@ -155,17 +125,18 @@ def reason(claim: Claim) -> str:
     return ", ".join(parts)
 
 
-def junit(found: Verified | ConvexroughError, files: str) -> bytes:
+def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
     """JUnit XML: a test case for each check of each claim, or one case with the error.
 
     files : the names of the files, for the names of the suite and of its cases
     """
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
-    if isinstance(found, Verified):
-        kind, cases = "failure", list(_cases(found))
+    if isinstance(found, ConvexroughError):
+        kind, cases = "error", {"input": str(found)}
     else:
-        kind, cases = "error", [("input", str(found))]
-    for name, text in cases:
+        kind, cases = "failure", {f"{it.many}: {name}": text for it in found
+                                  for name, text in _findings(it).items()}  # fmt: skip
+    for name, text in cases.items():
         case = ElementTree.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name)
         if text:
             ElementTree.SubElement(case, kind, message=name).text = text
@@ -178,33 +149,29 @@ def junit(found: Verified | ConvexroughError, files: str) -> bytes:
     return written
 
 
-def _cases(found: Verified) -> Iterator[tuple[str, str]]:
-    for claim in found.claims:
-        wrong = {what: which for what, which in claim.wrong.items() if len(which)}
-        asked = {
-            claim.proved: "; ".join(
-                f"{what}: {_named(found.verdict.scene, which)}" for what, which in wrong.items()
-            ),
-            "undecided": _named(found.verdict.scene, claim.undecided),
-            "off": "" if claim.near_enough else _off(claim),
-            "total": "" if claim.total_holds else _total(claim, ""),
-        }
-        for name, text in asked.items():
-            yield f"{claim.many}: {name}", text
+def _findings(claim: Claim) -> dict[str, str]:
+    """What is wrong, by the name of each check; "" where nothing is."""
+    points = claim.of.asperities.positions
+
+    def named(which: Indices) -> str:
+        return joined(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
+
+    wrong = (f"{what}: {named(which)}" for what, which in claim.wrong.items() if len(which))
+    return {
+        claim.proved: "; ".join(wrong),
+        "undecided": named(claim.undecided),
+        "off": "" if claim.near_enough else _off(claim),
+        "total": "" if claim.total_holds else _total(claim, ""),
+    }
 
 
-def _named(scene: Scene, which: Indices) -> str:
-    points = scene.asperities.positions
-    return joined(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
-
-
-def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
+def _table(claim: Claim, which: Indices) -> list[str]:
     if len(which) == 0:
         return []
-    length, force = scene.units
+    length, force = claim.of.units
     names = {"x": length, "y": length, claim.one: force}
     named = [f"{each} [{unit}]" if unit else each for each, unit in names.items()]
-    nearby, points = claim.nearby(), scene.asperities.positions.tolist()
+    nearby, points = claim.nearby(), claim.of.asperities.positions.tolist()
     rows = [
         (i, *points[i], float(claim.values[i]), None if nearby is None else float(nearby[0][i]),
          bound(float(claim.errors[i])), claim.status[i])

@@ -183,6 +183,14 @@ READ: dict[str, tuple[Any, ...]] = {
     "loaded nodes by index": (
         lambda case: {"index": np.flatnonzero(case.loads), "load": case.loads[case.loads > 0]},
         "a.csv", "--missing-open"),
+    "no header, an index": (
+        lambda case: matrix(shuffled(case, 1)), "a.npy", "--column index=1 --column load=2"),
+    "no header, loaded nodes by index": (
+        lambda case: np.column_stack((np.flatnonzero(case.loads), case.loads[case.loads > 0])),
+        "a.npy", "--missing-open --column index=1 --column load=2"),
+    "an index of another name": (
+        lambda case: shuffled(case, 0, "place") | {"index": np.arange(COUNT)}, "a.csv",
+        "--column index=place"),
     "compression is negative": (
         lambda case: case.table(load=-case.loads[case.order]), "a.csv", "--sign -1"),
     "another name": (lambda case: case.table("x y P"), "a.csv", "--column load=P"),
@@ -331,7 +339,19 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
-                                      "from 0 or from 1? Expected x and y, or a row 12 if from"),
+                                      "found numbers from 3 to 5, expected columns x and y, or al",
+                                      "also a row 0 if they count from 0, a row 12 if they cou"),
+    "tables below one another": (
+        lambda case: {name: np.tile(each, 3) for name, each in case.table().items()}
+        | {"fraction": np.repeat([0.1, 0.37, 0.5], COUNT)}, "",
+        "column fraction: found 3 values (0.1, 0.37, 0.5) in 12 rows each, expected the rows of o"),
+    "no header, four columns": (
+        lambda case: matrix(shuffled(case) | case.table()), "a.npy",
+        "found no header and 4 columns, expected a column 'load'; --column load=NUMBER names an"),
+    "an index that is not there": (
+        shuffled, "loads.csv --column index=node", "found index, load, expected a column 'node'"),
+    "two factors": (Case.table, "a.csv --scale load=2 --scale load=1", "--scale: found load twice"),
+    "two columns": (Case.table, "a.csv --column load=x --column load=y", "found load twice"),
     "an index beyond the largest integers": (lambda _: {"index": [1e19, 2], "load": [1, 2]}, "",
                                              "rows: found 2, expected 12, one per asperity of th"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from scenes import rough
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene, read_summits
+from convexrough.tabular.table import Reading
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with
 
@@ -123,6 +125,18 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
     scene = cr.Scene(1.0, row, cr.Material(1.0, 0.3), geometry="summit")
     for name, made in (("a.csv", "1,2,3,4,5.5\n"), ("a.npy", [[1, 2, 3, 4, 5.5]])):
         assert read(tmp_path, made, name, scene).values.tolist() == [1, 2, 3, 4, 5.5]
+    assert read(tmp_path, "1.5,0,2.5e-5\n").values.tolist() == LOADS
+    few = replace(SMALL, asperities=cr.Asperities(PLACES[:2], 0.1))
+    assert read(tmp_path, "0.25,0.5\n", scene=few).values.tolist() == [0.25, 0.5]
+    alone = read_loads(tmp_path / put(tmp_path, "1,0,3\n"), missing_open=True)
+    assert alone.values.tolist() == [0.0, 3.0, 0.0]
+
+
+def test_columns_without_names_that_are_ignored_are_named(tmp_path: Path) -> None:
+    path = tmp_path / put(tmp_path, "0,9,9,1.5\n0,9,9,0\n0,9,9,2.5e-5\n")
+    found = read_loads(path, columns={"load": "4"})
+    assert found.values.tolist() == LOADS
+    assert "in the scene's order (not used: columns 1, 2, 3)" in found.note
 
 
 def test_arrays(tmp_path: Path) -> None:
@@ -259,6 +273,12 @@ def test_summits(tmp_path: Path) -> None:
     assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
     assert asperities.tip_radii.tolist() == [0.1, 0.2]
     assert asperities.heights.tolist() == [1e-3, -1e-3]
+
+
+def test_summits_without_a_header(tmp_path: Path) -> None:
+    """Columns that were chosen by number leave out others, such as an index."""
+    path, how = tmp_path / put(tmp_path, "7,0,0.5\n8,1,2\n"), Reading(columns={"x": "2", "y": "3"})
+    assert read_summits(path, tip_radius=1.0, how=how).positions.tolist() == [[0, 0.5], [1, 2]]
 
 
 @pytest.mark.sample(8)

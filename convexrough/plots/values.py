@@ -1,4 +1,4 @@
-"""Maps of fretting: slip, energy and tractions of each asperity."""
+"""Maps of a value of each asperity: slip, energy and tractions in fretting, and derivatives."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from matplotlib.axes import Axes
 
 from convexrough.arrays import Array
 from convexrough.friction.fretting import Fretting
+from convexrough.gradients.gradient import Gradient
+from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.measure import Measure, Scale, measure
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import DOUBLE, TICK, no_contact, title
+from convexrough.plots.style import DOUBLE, SINGLE, TICK
 
 
 def fretting_figures(worn: Fretting) -> Figures:
@@ -20,7 +22,7 @@ def fretting_figures(worn: Fretting) -> Figures:
         mean and the largest shear traction, both at the largest force
     """
     if not worn.contact.loads.any():
-        return no_contact("fretting")
+        return style.no_contact("fretting")
     scale = Scale(worn.contact)
     figure = Figure(figsize=(DOUBLE, 6.2), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
@@ -54,4 +56,26 @@ def _largest(values: Array) -> float:
 
 def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, symbol: str) -> None:
     draw_values(axes, scale, np.nan_to_num(unit.of(values)), unit.short(symbol))
-    title(axes, name)
+    style.title(axes, name)
+
+
+def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
+    """The map of derivatives with respect to heights.
+
+    "gradient" : contact discs, coloured by D0 / J times dJ / dz, with the approach D0, the number J
+        and the height z of the asperity; open asperities as dots
+    of : symbol of J, as a formula
+    """
+    figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
+    draw_gradient(figure.subplots(), gradient, of)
+    return Figures({"gradient": figure})
+
+
+def draw_gradient(axes: Axes, gradient: Gradient, of: str = "J") -> None:
+    """Draw derivatives with respect to heights: negative ones dark, positive ones light."""
+    parts, per = gradient.heights * gradient.contact.approach, ""
+    if gradient.value:
+        parts, per = parts / gradient.value, f"\\,/\\,{of}"
+    name = f"$D_0\\,\\partial {of}/\\partial z{per}$"
+    draw_values(axes, Scale(gradient.contact), parts, name, signed=True)
+    style.title(axes, f"{gradient.holding} kept constant")
