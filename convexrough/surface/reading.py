@@ -418,8 +418,8 @@ def steps(name: str, values: Array) -> tuple[Indices, float]:
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     span = float(levels[-1] - levels[0])
     digit = _last_digit(levels)
-    # Lines of the grid can be missing. If coordinates are rounded, their differences vary; the error
-    # of each is less than a last digit: half of one, and the rounding of both ends.
+    # Lines of the grid can be missing. If coordinates are rounded, their differences vary; each has
+    # an error below one last digit: half of one, and the rounding of both ends.
     for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
         step = span / count
         lines = (values - levels[0]) / step
