@@ -179,7 +179,7 @@ def cautions_about(scene: Scene, loads: Array) -> list[str]:
 
 def is_array(scene: Scene) -> bool:
     """True if the asperities may be a part of a larger array."""
-    return len(scene) >= (ARRAY if scene.lattice is None else ON_LATTICE)
+    return len(scene) >= ARRAY or (len(scene) >= ON_LATTICE and scene.lattice is not None)
 
 
 def axis_outside(scene: Scene) -> bool:

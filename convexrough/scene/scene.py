@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -146,11 +147,7 @@ class Scene(Record):
             return lattice
         if (radii != radii[0]).any():
             return None
-        tip, shrink = Fraction(float(radii[0])), [Fraction(1), Fraction(1)]
-        for R, axes in self.curved:
-            radius = Fraction(R)
-            shrink[axes] = [radius / (radius + tip)] * len(shrink[axes])
-        return lattice.shrunk(*shrink)
+        return _shrunk(lattice, base.along(self.sphere_radius), float(radii[0]))
 
     @property
     def point_error(self) -> float:
@@ -193,6 +190,14 @@ class Scene(Record):
             height=float(self.asperities.heights.max()),
             geometry=self.geometry,
         )
+
+
+@lru_cache(8)  # scenes that differ only in heights share it
+def _shrunk(lattice: Lattice, radii: tuple[float, float], tip: float) -> Lattice | None:
+    """The lattice of the points x R / (R + tip), with the radii R along x and y."""
+    tip_radius = Fraction(tip)
+    exact = [Fraction(R) if math.isfinite(R) else None for R in radii]
+    return lattice.shrunk(*(Fraction(1) if R is None else R / (R + tip_radius) for R in exact))
 
 
 def reach(
