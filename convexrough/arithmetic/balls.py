@@ -1,4 +1,4 @@
-"""Balls: numbers known to within a radius. A formula computed on balls gives an error bound, too.
+"""Balls: numbers known to within a radius. A formula evaluated on balls also gives an error bound.
 
 The midpoint of a ball is a pair of float64 numbers, the radius a float64 number. Every operation
 returns a ball that contains the result for every choice of numbers in the operands. The radius is
@@ -209,7 +209,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """`function` applied to matching arrays of `values`: arrays, pairs or balls of one type."""
+    """`function` of arrays, or of the matching arrays of which pairs or balls consist."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
@@ -226,7 +226,7 @@ def joined(balls: Sequence[Ball]) -> Ball:
 
 
 def as_ball(value: Ball | Exact) -> Ball:
-    """A ball unchanged, or numbers as balls."""
+    """Balls unchanged; exact numbers as balls of radius 0."""
     return value if isinstance(value, Ball) else Ball.exact(value)
 
 

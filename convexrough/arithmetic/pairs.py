@@ -1,8 +1,8 @@
 """Double-double numbers: unevaluated sums of two float64 numbers, with about 31 decimal digits.
 
-Sums and products without errors are those of Knuth and Dekker (Numer. Math. 18 (1971) 224), without
-fused operations or longer numbers. Error bounds are relative; they hold if nothing underflows or
-overflows (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
+The errors of float64 sums and products are computed as by Knuth and Dekker (Numer. Math. 18 (1971)
+224), without fused operations or longer numbers. Error bounds are relative; they hold if nothing
+underflows or overflows (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class Pair(NamedTuple):
         return Pair(*_settled(root, left / (3.0 * square)))
 
     def two_thirds(self) -> Pair:
-        """x^(2/3) of positive numbers x: c^2 + 2 c d, where c + d is the cube root, d is tiny."""
+        """x^(2/3) of positive numbers x: c^2 + 2 c d, where c + d is the cube root and d tiny."""
         root, square, rest, left = self._cube_root()
         return Pair(*_settled(square, rest + left / (1.5 * root)))
 
@@ -169,7 +169,7 @@ def two_product(a: Number, b: Number) -> tuple[Number, Number]:
 
 
 def two_square(a: Number) -> tuple[Number, Number]:
-    """The rounded square and its error."""
+    """The rounded square, and its error to within one roundoff of this error."""
     total = a * a
     first, second = _halves(a)
     return total, ((first * first - total) + (first + first) * second) + second * second
@@ -195,7 +195,7 @@ def _settled(high: Number, low: Number) -> tuple[Number, Number]:
 
 
 def _halves(a: Number) -> tuple[Number, Number]:
-    """Two parts with the first 26 and the other 27 significant bits."""
+    """Two parts of numbers: the first 26, and the other 27 significant bits."""
     bits = np.asarray(a, dtype=np.float64)
     first = (bits.view(np.int64) & _FIRST_BITS).view(np.float64)
     return first, bits - first

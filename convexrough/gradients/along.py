@@ -28,14 +28,15 @@ from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.gradients.parts import ZERO, Moves, Part
 
 #: The shift of P_k or T_k, and the distance below which levels of the two paths correspond, both
-#: divided by the largest load. SHIFT is less than any difference of two float64 numbers.
+#: divided by the largest load. SHIFT is less than any difference of two
+#: unequal float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: The weights of V, D0 and S at one level in a weighted sum.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: For each segment: index of its end point, weight of its loss, weight of the final displacement.
+#: For each segment: index of its end point, weight of its loss, weight of the displacement there.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
 #: Changes of P or of T at all points of a path, per unit of a parameter.
@@ -54,7 +55,9 @@ class Sums(dict[Fraction, Weights]):
         self[level] = (V + weight * energy, D + weight * approach, S)
 
     def add_loss(self, piece: Piece, weight: Fraction) -> None:
-        """Add the loss (1 - c th) I on a piece (`friction.loss`), multiplied by a weight.
+        """Add the loss (1 - c th) I on a piece, multiplied by a weight; `friction.loss` derives it.
+
+        c is the sign of the piece, th its slope.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
         b = (P0 - P1) / (L0 - L1) and the mean M of D0 over loads from P1 to P0. P is the load, L
@@ -78,7 +81,7 @@ class Along:
 
     known : the normal solutions of the contact
     start : [force] load at which the path begins, without shear
-    steps : the segments and weights
+    steps : the segments and their weights
     loads, heights : [force] P and T at the points
     """
 
@@ -99,7 +102,7 @@ class Along:
 
     @cached_property
     def sums(self) -> tuple[Sums, Sums]:
-        """Weights for all losses / (c_t f^2), and for all displacements / (c_t f)."""
+        """Weights in the sum of losses over c_t f^2, and in that of displacements over c_t f."""
         curve, lost, moved = MemoryCurve.pressed(self.start), Sums(), Sums()
         for point, loss, displacement in self.steps:
             curve, pieces = curve.go(self.loads[point], self.heights[point])
@@ -114,7 +117,7 @@ class Along:
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
         """The parts of the weighted sum of losses, and those of the sum of displacements.
 
-        moves : derivatives of the load of every level, at fixed T
+        moves : derivatives of the total load of every level by parameters, at fixed T
         """
         (lost, moved), at, force = self.sums, self.known.at, self.known.units.force
         unit, travel = self.known.loss_unit, self.known.travel_unit
@@ -127,7 +130,7 @@ class Along:
         ]
 
     def _one_side(self, loads: Shifts, heights: Shifts, sign: int, times: Ball) -> Ball:
-        """`times` the derivative from above (sign 1) or below (-1) for these changes of P and T."""
+        """`times` times the derivative from above (sign 1) or below (-1), along these changes."""
         unit, force = max(self.loads), self.known.units.force
         longest = max(map(abs, (*loads, *heights)))
         by = sign * SHIFT * unit / longest if longest else SHIFT
@@ -177,7 +180,7 @@ def _one(below: Ball, above: Ball) -> Ball:
 def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fraction, Weights]:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
-    unit : the largest load; weights that are small in this unit are neglected
+    unit : the largest load; weights that are tiny in this unit are neglected
     """
     places, found = sorted(base), dict[Fraction, Weights]()
     for sign, weights in ((-1, base), (1, moved)):

@@ -116,7 +116,7 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """The result of `Contact.change`. Raises InputError if the friction or shear force changes."""
+    """The result of `Contact.change`. Raises InputError for a change of friction or shear force."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
@@ -128,7 +128,7 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
 def _pressed(
     contact: Contact, direction: Direction, bent: _Bent
 ) -> tuple[ContactChange, Ball, Response]:
-    """The change of the contact, and those of its load and solution, in scaled units."""
+    """The change of the contact; and in scaled units, those of its load and of its solution."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
@@ -238,7 +238,7 @@ class _Bent:
     def of_level(self, level: Level, total: Ball) -> tuple[Response, Ball]:
         """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total.
 
-        With it the changes (n,) of gaps where open, dA P + A dP - dd - dD0.
+        Also the changes (n,) of the gaps of open asperities, dA P + A dP - dd - dD0.
         """
         problem = level.problem
         raised = self.here.offsets / problem.units.length - self._felt(level)
@@ -258,11 +258,11 @@ class _Bent:
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:
-    """(n, 2) checked changes of positions, from such an array or from one number for all."""
+    """(n, 2) checked changes of positions, from an array (n, 2) or from one number for all."""
     expected = f"({n}, 2) finite numbers: x and y of each asperity"
     moved = checks.numbers("positions", positions, expected)
     if moved.shape not in ((), (n, 2)):
         raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
-    if not (np.abs(moved) <= checks.LARGEST).all():  # nan is not
+    if not (np.abs(moved) <= checks.LARGEST).all():  # False for nan
         raise InputError("positions", found="numbers that are not finite", expected=expected)
     return np.broadcast_to(moved, (n, 2))

@@ -30,7 +30,7 @@ from convexrough.sphere.smooth import smooth_reference
 
 Holding = Literal["load", "approach"]
 
-#: Single numbers by which only some gradients have a derivative.
+#: The parameters of a whole scene or state by which only some gradients have a derivative.
 WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
 
 
@@ -41,8 +41,8 @@ class Number:
     top    : the level of the contact; its problem has n asperities that could touch (candidates)
     value  : J
     parts  : the parts of J that come from levels
-    slopes : derivatives of J by parameters outside the scene's geometry, by name
-    steep  : for each infinite derivative of this kind, a number of the same sign
+    slopes : derivatives of J by parameters at constant offsets d, coefficients k and matrix A
+    steep  : for each of these derivatives that is infinite, a number of the same sign
     sides  : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
     """
 
@@ -77,7 +77,7 @@ class Number:
         return cls(contact, top, value, parts, slopes, steep, sides or {})
 
     def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times a factor; `slopes` are derivatives of the factor, times the number."""
+        """The number times a factor; `slopes` are the number times derivatives of the factor."""
         both = {name: slope * factor for name, slope in self.slopes.items()}
         for name, slope in slopes.items():
             both[name] = both.get(name, ZERO) + slope
@@ -150,7 +150,7 @@ class Number:
 
     @property
     def whole(self) -> dict[str, Ball]:
-        """The number and its derivatives by single numbers, by name."""
+        """The number, and its derivatives by parameters of the whole scene or state, by name."""
         scene, slopes = self.contact.scene, self.slopes
         modulus = (self.local.sum() * -2.0 / 3.0 - self.coupled) / scene.material.contact_modulus
         found = {"value": self.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
@@ -163,9 +163,10 @@ class Number:
 
     @property
     def balance_defect(self) -> float:
-        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = the part of J that scales.
+        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = the terms of J with V and P.
 
-        If the modulus and all loads are multiplied by a number, so are energies and loads in J.
+        If the modulus and all loads are multiplied by one factor, so are these terms
+        (`Part.scaled`).
         """
         bent = self.local.sum() * -2.0 / 3.0
         terms = [bent, -self.coupled, *(part.slopes.load * part.level.load for part in self.parts)]
@@ -187,15 +188,16 @@ class Gradient(Table, Plottable):
     derivative is at constant values of the other parameters named here. So shear forces Q are
     constant, but neither their fractions Q / (f P) nor the displacements are. If instead the
     displacement amplitude X of a symmetric cycle is constant, its loss W changes by
-    dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is the derivative of W by the amplitude of Q, twice
-    that by `maximum`. dX|Q and X_Q, the derivative by `force`, are from the gradient of the `shear`
-    state whose force is the amplitude of the cycle.
+    dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is the derivative of W by the amplitude of Q, which is
+    twice the derivative by `maximum`. X_Q and dX|Q follow from the gradient of X in the `shear`
+    state whose force is the amplitude of the cycle: X_Q is the derivative by `force`, and dX|Q the
+    change at constant Q.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
     contact is not proved at some load that the number depends on. With more than 1,000 loaded
     asperities and no stored matrix, bounds for positions are also infinite, and in the geometry
-    "closest" bounds for radii, too. An infinite derivative, in gross sliding, has the error 0.
+    "closest" those for radii, too. An infinite derivative, in gross sliding, has the error 0.
 
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant

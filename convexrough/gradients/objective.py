@@ -244,7 +244,7 @@ class Objective(Record):
 def gradient_of(
     contact: Contact, of: str, force: float | None, holding: Holding | None = None
 ) -> Gradient:
-    """The gradient of a result of `NUMBERS`, of the cycle between -force and force for a loss."""
+    """The gradient of one of `NUMBERS`; a loss is that of the cycle between -force and force."""
     if of == "loss":
         return cycle(contact, maximum=force).gradient(holding=holding)
     if of == "displacement":
@@ -255,7 +255,7 @@ def gradient_of(
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter; by `force` it is twice that by the maximum of the cycle."""
+    """The derivative by a parameter; for a loss by `force`, twice that by the cycle's maximum."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

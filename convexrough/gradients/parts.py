@@ -1,10 +1,10 @@
-"""The parts of a number that come from load levels, and their derivatives, as balls.
+"""A scalar result as a sum of parts, one for each load level, and the derivatives of the parts.
 
-A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
-indentations n (minus the gap where open), and energy V, in scaled units. It depends on the offsets
-d, the coefficients k of Hertz's law and the compliance matrix A. (1), (2) and (4) of
-docs/theory/gradients.md give its derivatives; the names v, w and lambda in this module are those
-of (4).
+Parts and derivatives are balls (numbers with error bounds). A level is the normal solution at a
+total load L (`normal.level`): loads P, approach D0, indentations n (the negative of the gap where
+open), and energy V, in scaled units. It depends on the offsets d, the coefficients k of Hertz's law
+and the compliance matrix A. (1), (2) and (4) of docs/theory/gradients.md give its derivatives. The
+names v, w and lambda in this module are those of (4).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Moves: TypeAlias = Mapping[str, Ball]
 
 
 class Slopes(NamedTuple):
-    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a `Part`.
+    """The derivative of a `Part`:  offsets^T dd + local^T dlog k + left^T dA P + load dL.
 
     offsets, local, left : (n,) coefficients in this derivative
     load  : coefficient of the change dL of the total load L; for L = 0 without the part due to D0,
@@ -42,12 +42,14 @@ class Slopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a number that comes from one level: a weighted sum of V, D0, P and n.
+    """The part of a result that comes from one level: a weighted sum of V, D0, P and n.
 
     energy, approach : weights of V and D0
     loads, indentations : (n,) weights of P and n
-    All weights turn scaled units of the level into the unit of the number.
-    moves : derivatives of the level's total load by parameters of the number
+    moves : derivatives of the level's total load with respect to the prescribed load and forces and
+        the coefficient of friction, by name
+
+    The weights also convert scaled units of the level into the unit of the result.
     """
 
     level: Level
@@ -59,13 +61,20 @@ class Part:
 
     @property
     def scaled(self) -> Ball:
-        """The energies and loads in the sum, which scale with the modulus and all loads."""
+        """The terms with V and P.
+
+        If the modulus and all prescribed forces are multiplied by one factor, so are these terms.
+        """
         total = self.energy * self.level.energy if self.energy.size > 0.0 else ZERO
         return total if self.loads is None else total + self.loads.dot(self.level.loads)
 
     @property
     def value(self) -> Ball:
-        """The sum; its lengths do not change if the modulus and all loads are scaled."""
+        """The whole sum.
+
+        The terms with D0 and n do not change if the modulus and all prescribed forces are
+        multiplied by one factor.
+        """
         total = self.scaled + self.approach * self.level.approach
         if self.indentations is not None:
             total = total + self.indentations.dot(self.level.indentation)
@@ -73,7 +82,10 @@ class Part:
 
     @property
     def weight(self) -> Ball:
-        """The weight of D0 in the sum, also as a term of the indentations."""
+        """The total weight of D0: `approach` plus the sum of `indentations`.
+
+        The reason is n_i = D0 + d_i - (A P)_i.
+        """
         v = self.indentations
         return self.approach if v is None else self.approach + v.sum()
 
@@ -85,7 +97,11 @@ class Part:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """The derivative of the sum. Raises InputError if it does not exist, at the load 0."""
+        """The derivative of the sum.
+
+        Raises InputError if it does not exist: at the load 0, if several asperities may touch
+        first.
+        """
         level, v, w, weight = self.level, self.indentations, self.loads, self.weight
         zero = Ball.exact(np.zeros(len(level.problem)))
         own, by_load = self.energy * level.loads, self.energy * level.approach
@@ -108,7 +124,7 @@ class Part:
         return Slopes(lifted - own, local, own * 0.5 - lifted, by_load)
 
     def times(self, factor: Ball) -> Part:
-        """This part of a number that consists of energies and approaches, times a factor."""
+        """This part times a factor. Only for parts that have no weights of P and n."""
         return replace(self, energy=factor * self.energy, approach=factor * self.approach)
 
 
@@ -125,7 +141,10 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 
 
 def product(level: Level, weights: Ball) -> Ball:
-    """A times weights, with error bounds: the sum of their radii times the largest entry of A."""
+    """A times weights, as balls.
+
+    The radii of the weights increase the error bounds: by their sum times the largest entry of A.
+    """
     problem = level.problem
     coupled = problem.product(weights.mid)
     if weights.radius.any():

@@ -42,7 +42,7 @@ NEWTON = 3
 
 
 def with_friction(result: ShearState | Cycle | LoadPath) -> FrictionLevels:
-    """The levels of a result. Raises InputError if general steps computed it, or without load."""
+    """The levels of a result. Raises InputError if its order fails, or if there is no load."""
     if result.order == "fails":
         expected = "a result whose indentations do not fall as the load rises"
         raise InputError("order", found='"fails"', expected=expected)
@@ -62,12 +62,12 @@ def level_below(
 
 
 def by_load(units: Units) -> Moves:
-    """The derivative of the load P, in scaled units, by itself."""
+    """The derivative of the load P in scaled units by the load P in the scene's units."""
     return {"load": Ball.exact(1.0) / units.force}
 
 
 def by_forces(known: FrictionLevels, height: Ball, /, **shares: float) -> Moves:
-    """Derivatives of L = P - T, T = Q / f, by load, friction and forces.
+    """Derivatives of the level L = P - T, with T = Q / f, by load, friction and forces.
 
     shares : derivative of Q by each force, by name
     """
@@ -85,7 +85,7 @@ def by_ratio(known: FrictionLevels) -> Ball:
 def at_fixed_levels(
     known: FrictionLevels, loss: Ball = ZERO, displacement: Ball = ZERO, force: Ball = ZERO
 ) -> dict[str, Ball]:
-    """Derivatives of a sum of a loss, a displacement and shear forces by f and Poisson's ratio."""
+    """Derivatives of these terms of a sum by f and Poisson's ratio, at fixed levels."""
     return {
         "friction": (loss * 2.0 + displacement + force) / known.coefficient,
         "poisson_ratio": (loss + displacement) * by_ratio(known),
@@ -149,7 +149,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
 
     Raises InputError if the scene has no friction, if the asperity carries no load, or if it is one
     of several that slide last: then there is no derivative. Raises ProofError if it is not proved
-    that the indentation of the asperity rises with the load.
+    that indentations do not fall as the load rises.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
@@ -270,7 +270,7 @@ def _gradient(
 ) -> Gradient:
     """The gradient of a weighted sum along a path.
 
-    paths : True to add the derivatives by the loads of all points
+    paths : True if the load varies: derivatives by the loads of all points are added
     """
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
@@ -296,7 +296,7 @@ def _gradient(
 
 
 def _loss(number: Number, order: Order) -> Number:
-    """The given `Number`, a loss, with infinite error bounds if order is not proved."""
+    """The given sum with losses; its error bounds are infinite unless order is proved."""
     return number if order == "proved" else number.times(Ball.around(1.0, np.inf), {})
 
 
@@ -312,7 +312,7 @@ def _where_open(level: Level, weights: Array) -> Ball:
 
 
 def _wider(level: Level, which: Indices) -> Level:
-    """The same level with the asperities `which` as further, open candidates."""
+    """The same level with the asperities `which` as candidates; the new ones are open."""
     problem = level.problem.widened(which)
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)

@@ -112,7 +112,7 @@ class Geometry:
         return Bending((self.points * flatter).sum() * 0.5, local, outwards)
 
     def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
-        """Changes for given changes of heights, rho (n,), summits (n, 2) and a sphere's radius."""
+        """Changes for those of heights, rho (n,), summits (n, 2) and the radius of a sphere."""
         a, b, sunk = self.by_tip, self.by_radius, (self.points * self.bend * moved).sum()
         return Bending(
             heights - sunk + tips * a.offsets + radius * b.offsets,

@@ -20,7 +20,7 @@ from convexrough.roundoff import ROUNDOFF
 #: passes of radix 2, and one of radix 8 a smaller error than three.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed in groups that take this many bytes of each row, and so fit in the cache.
+#: Columns are transformed in groups with this many bytes in each row, which fit in the cache.
 ROW = 512
 
 #: Rows of a kernel are computed in groups of about this many numbers, which fit in the cache.
@@ -51,10 +51,11 @@ class SiteBox:
 
     @cached_property
     def padded(self) -> tuple[int, int]:
-        """The size of the transforms, in which no two differences of occupied sites coincide.
+        """The size of the transforms.
 
-        Twice the box always suffices. A smaller size suffices if every vector between two periodic
-        images of a site is longer than twice the extent.
+        It is so large that no two differences of occupied sites share an entry of the periodic
+        array. Twice the box always suffices. A smaller size suffices if every vector between two
+        periodic images of a site is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # takes 0.1 s to import, so only if transforms are used
 
@@ -98,7 +99,8 @@ class SiteBox:
     def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
         """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two sites.
 
-        over_cube : 1 / r^3, or the softened 1 / r^3, as a function of squared distances
+        over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
+            small r (`influence.softened`)
         """
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
@@ -142,7 +144,8 @@ class SiteBox:
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
         """Values in some rows of the padded box.
 
-        Where several differences of sites fall on one place, the shortest one is used.
+        If several differences of sites share an entry of the box, the value is that of the
+        shortest.
         """
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
@@ -200,7 +203,10 @@ class SiteBox:
         return x
 
     def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
-        """(rows, padded columns) values (n,) at sites with these flat indices, zeros elsewhere."""
+        """The field (rows, padded columns) with values (n,) at some sites, and zeros elsewhere.
+
+        places : (n,) flat indices of these sites in the field
+        """
         field = np.zeros((self.shape[0], self.padded[1]), dtype=values.dtype)
         field.ravel()[places] = values  # where points coincide, the last value remains
         return field
@@ -221,7 +227,9 @@ class SiteBox:
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        (1) of docs/theory/operators-lattice.md, "Rounding"; `norm` is the 2-norm of the kernel.
+        This is formula (1) of docs/theory/operators-lattice.md, "Rounding".
+
+        norm : 2-norm of the kernel
         """
         return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
@@ -241,10 +249,9 @@ class Kernel:
 def through_waves(
     fields: Iterable[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
 ) -> list[NDArray[Any]]:
-    """The fields (rows, padded columns) whose transforms are what `mix` returns.
+    """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    fields : the fields (rows, columns) whose transforms `mix` gets, after padding with zeros; they
-        are read one by one
+    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one
     """
     from scipy import fft
 
@@ -266,14 +273,14 @@ def through_waves(
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
-    """Slices of columns, each of columns that are transformed together."""
+    """Slices of columns; the columns of one slice are transformed together."""
     width, step = half.shape[1], max(1, ROW // half.itemsize)
     for start in range(0, width, step):
         yield slice(start, min(start + step, width))
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """A padded number of sites: above `length`, at least `sites`; never more than `twice`."""
+    """A padded number of sites: above `length`, at least `sites`, but never above `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -288,7 +295,7 @@ def _pass_roundoffs(length: int) -> int:
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """The differences (i, j) of sites in a box, each after its length, the shortest first.
+    """Triples (length, i, j) for the differences (i, j) of sites in a box, sorted by length.
 
     Of (i, j) and (-i, -j) only one is included.
     """

@@ -19,8 +19,9 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 
-#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. A
-#: difference of coordinates has 1, its square 3, the sum of squares 4, its root 3, the result 8.
+#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. The
+#: error of a difference of coordinates is at most 1, of its square 3, of the sum of squares 4, of
+#: the root 3, and of the result 8.
 ENTRY_ROUNDOFFS = 8
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
@@ -45,7 +46,7 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """A 2-norm of the residual, well below these bounds, at which solvers can stop.
+        """A 2-norm of the residual so far below these bounds that solvers can stop there.
 
         displacement : A P as computed
         """
@@ -79,9 +80,9 @@ class Influence(Coupling, Protocol):
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length] the contact points
     scale  : 1 / (pi E*) with the contact modulus E*, in the units of loads and displacements
-    stored : True if the matrix is stored. If it is not, float32 loads make products cheaper
+    stored : True if the matrix is stored; if not, products with float32 loads are cheaper
     cheap_sums : True if `sums` takes only a few times as long as `apply`. Newton's method then ends
-        early, and `refine` makes the last steps
+        early, and `normal.refine` makes the last steps with these sums
     """
 
     @property
@@ -135,7 +136,7 @@ class Influence(Coupling, Protocol):
         ...
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite; only for lattices."""
+        """True if A + (scale / radius) I is proved positive semidefinite; False off lattices."""
         ...
 
     def sums(self, loads: Pair) -> Ball:

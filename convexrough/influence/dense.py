@@ -106,7 +106,7 @@ class DenseInfluence:
         return len(self.points)
 
     def apply(self, loads: Array) -> Array:
-        """A P, summed in blocks of about sqrt(n) terms, so that rounding grows only as sqrt(n)."""
+        """A P, summed in blocks of sqrt(n) terms (at least 64): rounding grows as sqrt(n)."""
         size = self._block
         if len(self) <= size:
             return np.asarray(self.matrix @ loads)

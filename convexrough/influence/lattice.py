@@ -67,11 +67,12 @@ LEAST_NEGATIVE = 1.386
 class LatticeInfluence:
     """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
-    array       : (N, 2) [length] points; each coordinate has an error of at most `point_error`
+    array       : (N, 2) [length] contact points, with an error of at most `point_error` in each
+        coordinate
     members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact positions of the summits. `array` contains them, rounded, times the
-        factors `lattice.shrink` along x and y: 1 in the geometry "summit", and R / (R + tip radius)
-        in "closest", with the radius R of the sphere
+    layout      : the exact positions of the summits. Multiplied by the factors `lattice.shrink`
+        along x and y, and rounded, they are the points in `array`. The factors are 1 in the
+        geometry "summit", and R / (R + tip radius) in "closest", with the radius R of the sphere
     lattice     : the lattice of the points
     scale       : 1 / (pi E*), which is A_ij r_ij
     """
@@ -101,8 +102,9 @@ class LatticeInfluence:
     def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
         """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
 
-        They are smaller if only asperities near the middle carry loads: the extent is then the
-        largest distance of any asperity from a loaded one. The last ones are cached.
+        The transforms are smaller if only asperities near the middle carry loads: the extent of
+        the box is then the largest distance of any asperity from a loaded one. The last box is
+        cached, with its indices.
         """
         box, loaded, (i, j) = self.box, loads.nonzero()[0], self.cells
         reach = _farthest(i[loaded], j[loaded], box.shape, box.basis)
@@ -280,9 +282,9 @@ class LatticeInfluence:
         return worst
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """The differences (i, j) of `neighbours`, each after a lower bound [length] on distances.
+        """Triples (bound, i, j) for the differences (i, j) of `neighbours`.
 
-        The bound is for the distance of any two points whose sites have this difference.
+        The bound [length] is below the distance of any two points whose sites differ by (i, j).
         """
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
@@ -290,8 +292,8 @@ class LatticeInfluence:
     def semidefinite_with(self, radius: float) -> bool:
         """True if A + (scale / radius) I is proved positive semidefinite.
 
-        A lower bound on the symbol, and so on the eigenvalues of A, proves it
-        (docs/theory/operators-lattice.md, "The symbol").
+        The proof uses a lower bound on the symbol (the Fourier transform of the kernel), which is
+        also a lower bound on the eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
         """
         if radius * LEAST_NEGATIVE > self.spacing:
             return False

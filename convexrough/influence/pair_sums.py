@@ -120,7 +120,7 @@ class NearPairs:
     """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
 
     upper   : (n, n) sparse, the entries for pairs of sorted points i < j
-    own     : the number on the diagonal, -L(0), as a point does not displace itself
+    own     : the number on the diagonal, -L(0), because a point does not displace itself
     terms   : largest number of near neighbours of a point
     nearest : [length] least distance of a near pair that is not 0
     """
@@ -237,7 +237,7 @@ class Product:
 
     splitting, order : the choice of L and of the mesh; the points sorted by blocks of mesh cells
     near, weights : the matrix S, and the interpolation W
-    mesh, kernel : the box of the nodes, and L on it, which multiplies by G
+    mesh, kernel : the box of the nodes, and the transform of L on it, for products with G
     """
 
     splitting: Splitting
@@ -262,8 +262,9 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """(n,) the sums; a second thread computes the product with S, as both parts release the
-        GIL.
+        """(n,) the sums.
+
+        A second thread computes the product with S, because both parts release the GIL.
         """
         ordered = loads[self.order.places]
         with ThreadPoolExecutor(1) as other:
@@ -276,7 +277,7 @@ class Product:
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on the interpolation error of near pairs in sums of `strengths` (n,) >= 0.
 
-        Pairs within the reach plus the `sway` of the stencils count as near. The relative error of
+        Pairs within the reach plus `Softened.sway` count as near. The relative error of
         other pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
@@ -326,8 +327,8 @@ class Product:
     def slopes(self, values: Array) -> Array:
         """(n, 2) the sums over j of (c_i - c_j) v_j / r_ij^3 for points c and `values` v.
 
-        They have no error bounds. The smooth part of the kernel is -grad L, the distance vector
-        times the softened 1 / r^3 whose order is one less.
+        They have no error bounds. The smooth part of the kernel is -grad L, which is the distance
+        vector times the smooth part of 1 / r^3 with the order p - 1.
         """
         ordered = values[self.order.places]
         total = self._near_slopes(ordered)

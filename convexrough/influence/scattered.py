@@ -31,11 +31,11 @@ from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
-#: Largest relative error of a product that is due to interpolation. It is most of the error of
-#: `sums`, which is about 1e-16.
+#: Target of the relative error of a product that is due to interpolation. This is most of the error
+#: of `sums`, which is about 1e-16.
 TOLERANCE = 5e-17
 
-#: Largest relative errors due to interpolation: for loads in single precision, and for `falloff`.
+#: Targets of the relative interpolation errors: for loads in single precision, and for `falloff`.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
 #: Up to this number of asperities `sums` uses a matrix, which has 27 digits; for speed only.
@@ -51,7 +51,8 @@ class ScatteredInfluence:
 
     point_error : [length] bound on the error of each coordinate of the points
     tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
-    tolerance   : largest relative error of a product that is due to interpolation
+    tolerance   : target of the relative error of a product that is due to interpolation; the bounds
+        on the error hold whatever it is
 
     Few points, or points in dense clusters, have no mesh: their products are those of a matrix.
     """

@@ -3,8 +3,8 @@
 For loads P, the smooth part of the sums is W G W^T P: W interpolates from the nodes of a mesh to
 the points, and G is the smooth kernel L between nodes. The product goes from points to the mesh, on
 the mesh, and back to the points. Each step is computed with slices of numbers. First slices have so
-few bits that their products are exact, and the rests are small. The remaining error is mostly due
-to interpolation (docs/theory/operators-mesh.md).
+few bits that sums of their products are exact, and the products with the rests are small. The
+remaining error is mostly due to interpolation (docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -258,7 +258,7 @@ class SoftValues:
 
 
 class MeshSums:
-    """The sums over j of P_j / r_ij for exact points, on the mesh and near pairs of a product."""
+    """The sums over j of P_j / r_ij for exact points, by the mesh and near pairs of a `Product`."""
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
@@ -327,9 +327,9 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W times values on the mesh, as whole numbers (n,) plus rests (n,), in a unit.
+    """W times values on the mesh, in some unit: whole numbers (n,), and rests (n,) to be added.
 
-    Also returned are this unit and a bound on the error, in this unit.
+    The other two results are this unit, and a bound on the error in this unit.
     """
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
@@ -371,7 +371,7 @@ def _weighed(
 
 
 def _met(product: Product) -> int:
-    """The largest number of points whose stencils contain the same node."""
+    """The largest number of points that interpolate from the same node."""
     order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
     np.add.at(counts, tuple(product.order.cells.T), 1)
     for rows in (counts, counts.T):

@@ -154,7 +154,7 @@ class Sliced:
     def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
         """(n,) sums over j of g_ij P_j / unit with the kernel g, plus `change`.
 
-        at     : (n,) flat indices of the loads' sites, in a box with as many columns as transforms
+        at     : (n,) flat indices of the loads' sites, in rows as long as those of the transforms
         change : (n,) values to add; each has an error of at most `error`
         """
         count = len(self.kernels)

@@ -2,8 +2,9 @@
 
 Each entry and each load is divided into a first slice, a second slice and a rest. First slices are
 multiples of one unit for each row and block of columns. They have so few bits that sums of their
-products stay below 2^53 units and are exact in any order; so are sums of products of first with
-second slices. All other products are about 2^-48 of the sum, and their rounding error about 2^-101.
+products stay below 2^53 units and are exact in any order; sums of products of first with second
+slices are exact for the same reason. All other products are about 2^-48 of the sum, and their
+rounding error about 2^-101.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     touching = total > 0
     counts = sums(root > 0)[touching].astype(np.float64)
     count, sharing = float(counts.mean()), float(counts @ counts / counts.sum())
-    # If blocks hold many asperities, this estimates A W r within a block, for r of random signs.
+    # In blocks with many asperities, this estimates A W r within a block for r of random signs.
     rough = scale / m * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / (m * m), 1.0)))
     size, spectrum = _block_spectrum(shape, basis, m, count, workers)
     w = root.astype(np.float32)

@@ -111,7 +111,8 @@ class Softened:
     def sway(self, spacing: float) -> float:
         """[length] bound on |d - r| for two points at the distance r.
 
-        d is the distance of any two nodes from which the values at the two points interpolate.
+        d is the distance of any two nodes, one of those from which L is interpolated to the first
+        point, and one of those for the second point.
         """
         return math.sqrt(2.0) * self.order * spacing
 

@@ -23,7 +23,8 @@ ORDERS = range(4, 30, 2)
 #: The sums over all points are estimated from sums at SAMPLE points over at most MORE points.
 SAMPLE, MORE = 32, 2**15
 
-#: Number of nearest points that are left out of the estimate of a sum.
+#: In the estimate of a sum, nearer points count as if at the distance within which a point has this
+#: many neighbours on average.
 NEAREST = 8
 
 #: Estimated times [ns] on two cores: of transforms for each node, of a product for each near pair,
@@ -99,7 +100,7 @@ class _Sums(NamedTuple):
         some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
         distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
-        # The few nearest pairs are left out: one close pair must not decide the estimate.
+        # The few nearest pairs count as if at this distance: one pair must not decide the estimate.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
         sums = (np.maximum(distances, nearest) ** -power).sum(axis=1)
         return cls(ordered, SAMPLE * share, float(np.median(sums)) / share)
@@ -110,7 +111,10 @@ class _Sums(NamedTuple):
 
 
 def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
-    """The spacing h [length] at which (1) of docs/theory/operators-mesh.md equals the tolerance."""
+    """The spacing h [length] at which the larger of two interpolation errors is the tolerance.
+
+    One is that of near pairs, by (1) of docs/theory/operators-mesh.md, the other of distant pairs.
+    """
     spacing = kernel.reach / (2.0 * kernel.order)
     for _ in range(4):
         counted = 1.8 * sums.around(kernel.reach + kernel.sway(spacing))
