@@ -93,7 +93,10 @@ def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., 
 
 @dataclass
 class Output:
-    """Where a command writes results, and in which form it prints them; fields are `OPTIONS`."""
+    """Where a command writes results, and in which form it prints them.
+
+    Its fields are the values of the `OPTIONS`.
+    """
 
     out: Path | None = None
     force: bool = False
@@ -159,7 +162,7 @@ def proved(work: Callable[[], Proof]) -> Proof | None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """Show a status line on standard error while the body runs, if that is a terminal.
+    """If standard error is a terminal, show a status line there while the body of `with` runs.
 
     The line also shows records of the logger `convexrough`.
     """

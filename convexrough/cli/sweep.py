@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
-    """The pair (K, N) of K/N: the K-th of N shares of the scenes, from 1."""
+    """The pair (K, N) of the text K/N, which asks for the K-th of N shares, counted from 1."""
     if value is None:
         return None
     k, _, n = value.partition("/")

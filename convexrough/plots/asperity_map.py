@@ -59,14 +59,15 @@ def draw_map(
     smooth: Sequence[float] = (),
     room: Array | None = None,
 ) -> None:
-    """Draw a disc at each point with a radius and a faint dot at others, in a square with a margin.
+    """Draw discs, and faint dots at points without a disc, in a square with a margin.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
     room   : (n,) [length] radii of the discs for which the square has room; default: those drawn
 
     From `CROWDED` discs on, a mosaic replaces them: a pixel has the mean colour of the asperities
-    inside it, or the colour of the nearest one if there is none. Asperities without disc are white.
+    inside it, or the colour of the nearest one if none is inside. Asperities without a disc are
+    white.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, outline = whole > 0, [length.of(axis) for axis in smooth]
@@ -107,7 +108,7 @@ def draw_values(
 
     values : (n,), of the contact discs; or (k, n), of discs above one another
     radii  : (k, n) [length] radii of these discs, the largest first
-    most   : the value of the darkest colour; default: the largest
+    most   : the value at the end of the colours; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
     """
     most = float(np.abs(values).max()) or 1.0 if most is None else most

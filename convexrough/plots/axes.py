@@ -45,9 +45,9 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         Cycle: loop, or the plane of loads if the normal load varies; Fretting: map of slip
         amplitudes; LoadPath: shear force against displacement, or the plane of loads if the load
         varies; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
-        wrongly claimed asperities; Comparison, PathComparison: times of the solvers or methods;
-        PhaseLosses: loss against phase; Shakedown: map of factors; Surface, Summits: map;
-        Provability: contacts against pruning
+        proved statuses with marks on wrong claims; Comparison, PathComparison: times of the solvers
+        or methods; PhaseLosses: loss against phase; Shakedown: map of factors, or of slips for the
+        kind "vector"; Surface, Summits: map; Provability: contacts against pruning
     axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
 
     Raises InputError for anything else.

@@ -148,7 +148,7 @@ class Scale:
 
     @property
     def work(self) -> float:
-        """W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) [force length], which is 24/5 f P X0."""
+        """W0 = 24/5 f P X0 [force length]; for a sphere 9 (2 - nu) f^2 P^2 / (5 G a_H)."""
         return 4.8 * self.limit * self.travel
 
     @cached_property

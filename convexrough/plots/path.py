@@ -27,7 +27,8 @@ MOST_MAPS = 8
 #: Largest numbers: of points; of asperities times points; of steps between two given points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
-#: Number of segments at varying load up to which points are added; each needs a solution.
+#: Number of segments at varying load up to which points are added; each point needs a normal
+#: solution.
 MOST_SEGMENTS = 24
 
 
@@ -136,9 +137,11 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
 
 
 def between(path: LoadPath) -> LoadPath:
-    """The path with points added between the given ones, or unchanged if these cost too much.
+    """The path with points added between the given ones.
 
-    Figures call it only if they are not given such a path, because it solves normal problems.
+    The path is unchanged if these points cost too much, if order fails, or if the path starts from
+    another contact. Figures call this function only if they are not given such a path, because it
+    solves normal problems.
     """
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)

@@ -23,8 +23,9 @@ def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, peak pressures of
-        all asperities against the distance from the centre replace the profile
+        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, if they are not in
+        rows or if very many touch, peak pressures of all asperities against the distance from the
+        centre replace the profile
     "loads"    : load of each touching asperity against the distance from the centre
     """
     if not contact.loads.any():
@@ -121,7 +122,7 @@ def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
 
 
 def census(contact: Contact) -> str:
-    """A line that says how many asperities touch, and for how many this is proved."""
+    """A line that says how many asperities have a load, and how many statuses are not proved."""
     text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
     return text + style.not_proved(contact.certificate.scope, contact.status)
 
@@ -132,7 +133,7 @@ def _loads_figure(scale: Scale) -> Figure:
     axes = figure.subplots()
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # of undecided asperities mark only loaded ones
+    if contact.certificate.scope == "none":  # mark only undecided asperities with a load
         unsure &= touching
     r, share = distances(scale), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)

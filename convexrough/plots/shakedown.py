@@ -24,10 +24,11 @@ FINE = 240
 def shakedown_figures(found: Shakedown) -> Figures:
     """The figures of a shakedown limit, with dimensionless forces.
 
-    "shakedown" : the largest factor of the path at which each asperity stops sliding
-    "shakedown_map" : number of asperities that slide in every cycle, if load and shear amplitudes
-        have different factors; at constant load, if shear forces have different means. Only of
-        kind "exact"
+    "shakedown" : the largest factor of the path at which the sliding of each asperity dies out; for
+        the kind "vector" the slip of each asperity in the mechanism
+    "shakedown_map" : number of asperities that slide or open in every cycle, if load and shear
+        amplitudes have different factors; at constant load, if the amplitude and the mean of the
+        shear forces vary. Only for the kind "exact"
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found)
@@ -60,13 +61,19 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
 
 
 def _onsets(found: Shakedown) -> Array:
-    """(k,) onsets sigma_i over P0 of the asperities whose factor is known, in descending order."""
+    """(k,) sigma_i / P0 of the asperities whose factor is known, in descending order.
+
+    sigma_i is the load at which asperity i first touches, P0 the mean load.
+    """
     fall = _fall(found, np.array(1.0), np.array(1.0))
     return np.sort(1.0 - found.factors[np.isfinite(found.factors)] * float(fall))[::-1]
 
 
 def _fall(found: Shakedown, along: Array, across: Array) -> Array:
-    """(P0 - L*) / P0 if load and shear amplitudes have different factors, `along` and `across`."""
+    """(P0 - L*) / P0 for the factors `along` of load amplitudes and `across` of shear amplitudes.
+
+    Asperities that first touch at loads above L* slide or open in every cycle.
+    """
     f = found.scene.friction or 1.0
     p, t = found.load_amplitudes, found.force_amplitudes / f
     reached = [
@@ -77,7 +84,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """The map of how many asperities slide in every cycle, hatched where |Q| exceeds f P."""
+    """The map of how many asperities slide or open in every cycle, hatched where |Q| > f P."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0

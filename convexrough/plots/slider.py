@@ -25,12 +25,12 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
 
-#: Number of forces of the slider, by the largest number of touching asperities it is used for.
+#: Numbers of forces of the slider: each for at most as many touching asperities as its key says.
 FORCES = {2_500: 101, 20_000: 51}
 FEWEST_FORCES = 21
 
-#: Largest numbers of discs (and of dots for open asperities), and of asperities with curves. They
-#: keep a page below 2 MB.
+#: Largest numbers of discs (the same for dots of open asperities), and of asperities with curves.
+#: These limits keep a page below 2 MB.
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 

@@ -47,12 +47,12 @@ MANIFEST = "files.json"
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
-#: The proof leaves out shear forces of at least this fraction of the limit, where all slide.
+#: The proof leaves out shear forces of at least this fraction of f P: all asperities slide there.
 BELOW_LIMIT = 1 - 1e-9
 
 
 def headed(**contents: Any) -> Summary:
-    """A summary of these contents, with the schema and the version of the package."""
+    """A summary of these contents, with the versions of its keys and of the package."""
     return {"schema": SCHEMA, "version": __version__, **contents}
 
 
@@ -107,7 +107,7 @@ class Writer:
         self.text(name, to_json(summary) + "\n")
 
     def tables(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
-        """Write each table of columns as NAME.csv, or as .npz if it has many rows; no loss."""
+        """Write each table as NAME.csv, or as NAME.npz if it has many rows, with all digits."""
         for name, columns in tables.items():
             arrays = [np.asarray(values) for values in columns.values()]
             path = self.path / f"{name}.csv"

@@ -59,7 +59,7 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 
 def unknown(column: str) -> bool:
-    """True if a column with this header (not a number, its name without one) may be heights."""
+    """True if a column may be heights: its header names no index or result, nor is it a number."""
     return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
 
 
@@ -164,7 +164,8 @@ class SceneFile(Task):
 
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
-        has all asperities that can touch up to this approach. None if another quantity chose them
+        has all asperities that can touch up to this approach. None if another quantity limits
+        the pattern, or if there is none
     influence : compliance operator; None for the cheapest
     stages : the tables that request results, by name; the first is [normal]
     text   : text of the file;  seed : seed of its random heights and radii, or None

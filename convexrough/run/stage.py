@@ -116,7 +116,7 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, or else the attribute `name`.
+    """If `name` is a status, the number of asperities with it; otherwise the attribute `name`.
 
     The attribute is that of `found`, or of `found.certificate` if `found` has no such attribute.
     """
@@ -224,7 +224,10 @@ class Result(Table, Plottable):
         return {}
 
     def lines(self) -> list[str]:
-        """The lines of the printed table and of what is proved about its order."""
+        """The lines of the printed table, and a line on what is proved about order.
+
+        That is, whether it is proved that indentations increase with the load.
+        """
         most = MOST_PRINTED if self.steps else len(self.known)
         said = self.printed_table(self.name, self.known, self.headings(), self.title, most)
         proved = ", ".join(sorted(self.orders))

@@ -96,7 +96,7 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table of a file: numbers are finite, text is no number, and unknown keys are mistakes."""
+    """A table of a file. Infinite numbers, text for numbers and unknown keys are mistakes."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 

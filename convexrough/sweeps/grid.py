@@ -189,5 +189,8 @@ def table_in(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The swept keys of a table [sweep] that may have mistakes, each after its list."""
+    """Pairs (table, key) of all swept keys of [sweep], which may contain mistakes.
+
+    table : "together", "over" or "draw"
+    """
     return [(where, key) for where in WHERE for key in table_in(table, where)]

@@ -117,7 +117,7 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
 
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
-    """All vectors; but if the arrays `known` share a shape of two dimensions, all of this shape."""
+    """All vectors; or, if the arrays `known` have one two-dimensional shape, all of this shape."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):

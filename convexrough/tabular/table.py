@@ -74,7 +74,7 @@ class Reading:
     columns : names in the file, by known name;  scales : factors of the numbers
     units   : units of the scene;  convert : convert columns in other units, else refuse them
     scalable : messages may propose the options --scale and --column
-    shared  : columns that are read from another file, too, so that no message proposes --scale
+    shared  : columns that are also read from another file, so that no message proposes --scale
     alike   : columns of one quantity must have one unit, even if the scene names none
     """
 
@@ -110,7 +110,8 @@ class ReadTable(NamedTuple):
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
     others  : the columns that were not read, by header, which may be empty, or by number without
-        headers; one that `Reading.columns` calls the index is "index"; text if a cell is none
+        headers; one that `Reading.columns` calls the index is "index". A column is text if one of
+        its cells is not a number
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -337,7 +338,7 @@ def _text_source(table: TextTable) -> _Source:
 
 
 def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
-    """The reason why cells are no row of the table; "" if they are one."""
+    """The reason why cells are not a row of the table; "" if they are one."""
     if len(cells) != width:
         expected = f"{width}, as in {'the header' if header else 'most rows'}"
         return f"found {len(cells)} cells, expected {expected}"
@@ -401,7 +402,7 @@ def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str
     for i, name in enumerate(source.header or []):
         for each in (each for each in wanted if each not in places and i not in places.values()):
             alike = SequenceMatcher(None, bare(name).lower(), each).ratio()
-            if LOOKS_LIKE < alike < 1:  # equal names are those of columns called otherwise
+            if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
                 expected = f'a known column; did you mean "{each}"?'
                 yield f"columns: found {bare(name)!r}, expected {expected}"
 

@@ -415,7 +415,7 @@ def _stripped(cells: list[str]) -> list[str]:
 def _trimmed(
     header: TextRow | None, rows: list[TextRow], style: Style
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """Header and rows without trailing empty cells; a column of row numbers of R is named ""."""
+    """Header and rows without trailing empty cells; R's nameless row numbers get the name ""."""
     if header is None:
         width = max((len(_stripped(row.cells)) for row in rows), default=0)
     else:

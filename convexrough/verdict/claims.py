@@ -236,7 +236,7 @@ def _negative(
 
 
 def _statuses(table: ReadTable) -> Iterator[tuple[str, NDArray[np.str_], Mapping[str, str]]]:
-    """For each column that says which asperities touch its header, entries and `CLAIMS`."""
+    """Header, entries and `CLAIMS` of each column that says which asperities touch."""
     for name, known in CLAIMS.items():
         if name in table.columns:
             yield bare(table.called[name]).lower(), np.char.strip(table.columns[name]), known
@@ -301,8 +301,8 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
 def _check_one_size(i: Indices, j: Indices, count: int) -> None:
     """Raise InputError if more than `count` pixels without neighbours lie on a coarser grid.
 
-    Then pixels have several sizes. A contact can be one pixel large; there is at most one for each
-    asperity, so up to `count` pixels may have no neighbours.
+    In that case pixels have several sizes. Up to `count` pixels may have no neighbours, because
+    each asperity may have a contact that is one pixel large.
     """
     if len(i) == (i.max() + 1) * (j.max() + 1):
         return  # a full grid

@@ -52,7 +52,7 @@ BY_CHANCE = 0.25
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
-#: A function that returns True if points (m, 2) are where asperities are.
+#: A function that returns True if points (m, 2) are at asperities.
 Fits = Callable[[Array], bool]
 
 
@@ -219,7 +219,7 @@ class Placing:
         return None
 
     def _unread_positions(self) -> Iterator[str]:
-        """A message if two unread columns hold the asperities' positions in another order."""
+        """A message if two unread columns hold positions, or polar ones, in another order."""
         numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
             for what, points in {
@@ -237,7 +237,7 @@ class Placing:
                 return
 
     def _several_tables(self) -> str:
-        """A message if a column tells several tables apart that stand in one file; else ""."""
+        """A message if a column numbers several tables in one file; else ""."""
         count = len(self.scene)
         for name, cells in self.table.others.items():
             values, times = np.unique(cells, return_counts=True)

@@ -31,8 +31,8 @@ SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load
 class GradientStage(Stage):
     """The result to differentiate, and the parameters.
 
-    of       : "loss" of the cycle between +-fraction f P, "displacement" under fraction f P,
-        "approach" or "load"
+    of       : "loss" of the cycle between -Q and Q, or "displacement" under Q, where
+        Q = fraction f P; "approach" or "load"
     by       : parameters with a column in the table
     holding  : "load" or "approach", held constant; default: what is prescribed
     """

@@ -103,8 +103,8 @@ def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of`, and two more.
 
     geometry        : where asperities meet the sphere
-    closest_change  : largest relative change of the loads above a tenth of the largest if the
-        geometry were "closest"; None if it is, or if the change could not be computed
+    closest_change  : largest relative change that the geometry "closest" would cause in a load of
+        at least a tenth of the largest; None in this geometry, or if the change is not known
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():

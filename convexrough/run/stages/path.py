@@ -40,7 +40,7 @@ from convexrough.run.values import (
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
-#: Times (number of chords)^-2: the largest relative error of a loss that was seen in tests.
+#: This times (number of chords)^-2 is the largest relative error of a loss found in tests.
 CHORDS_ERROR = 12
 
 
