@@ -71,7 +71,7 @@ class Pressing(NamedTuple):
         from convexrough.scene.material import Material
         from convexrough.scene.scene import Scene
 
-        # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
+        # At a given approach contacts do not depend on the modulus; Poisson's ratio is for shear only.
         stuff = Material(1.0 if self.modulus is None else self.modulus, 0.3)
         base = partial(Scene, self.radius, material=stuff, geometry="closest")
         pressed = partial(press, approach=self.approach, load=self.load)

@@ -41,8 +41,8 @@ class Verdict(Claim, Table, Plottable):
     within      : largest error allowed, as a fraction of the largest load
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
-    solution    : the solution that Newton's method finds from the given loads, with its own
-        certificate; None where it is not needed or not found
+    solution    : the solution that Newton's method finds from the given loads, or else from its
+        own start, with its own certificate; None where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone
