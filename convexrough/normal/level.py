@@ -106,7 +106,8 @@ class Level:
         """A level of loads near which nothing is proved; a prescribed approach is still known."""
         loads = Ball.around(state.loads, np.inf)
         indentation = Ball.around(state.indentation.mid, np.inf)
-        approach = Ball.around(state.approach.mid, np.inf if problem.by_load else 0.0)
+        error = np.inf if problem.by_load else state.approach.radius
+        approach = Ball.around(state.approach.mid, error)
         none = np.zeros(len(problem), dtype=bool)
         return cls(problem, loads, indentation, approach, none, state, obstacle=obstacle)
 
