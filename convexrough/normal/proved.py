@@ -40,10 +40,13 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:
-    """The solution in the first box that is proved to hold it, or else a level with an obstacle.
+    """The `Level` of the solution in the first box that is proved to contain it.
 
-    boxes : default: those of `normal.boxes.tried`, and if none of these succeeds, boxes in which
-        all candidates without a load are fixed open
+    If there is none, an unproved level whose `obstacle` says why.
+
+    boxes : default: those of `normal.boxes.tried`. If none of these succeeds, boxes in which the
+        asperities without a load are assumed to be open; later attempts drop this assumption for
+        those whose gaps are not proved
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -76,9 +79,9 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
 def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
     """The solution near the trial loads, by the theorem on the box and then on a smaller box.
 
-    Three results: True if it is proved that the box contains the solution, else nothing is proved
-    ((m,) for a stack); (n,) the bounds on the errors of the trial loads that hold if it is True;
-    and the level that is then proved.
+    Three results. First, whether it is proved that the box contains the solution; (m,) for a stack.
+    If not, the other two prove nothing. Second, (n,) bounds on the errors of the trial loads, by
+    the theorem on the box. Third, the level, by the theorem on the smaller box.
     """
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)

@@ -22,10 +22,11 @@ RINGS, LEAST = 128, 150
 #: Approximate size of the evenly spaced sample of asperities that is used.
 SAMPLE = 50_000
 
-#: If the load of a ring is spread evenly, this includes an asperity's own load, spread over its
-#: share of the area. The displacement by this part, to be subtracted, is OWN_SHARE times that by a
-#: uniformly loaded disc of the same area. Ewald's sums give 1.1002 for square and 1.1061 for
-#: hexagonal arrays; for other layouts the value is a heuristic.
+#: The evenly spread load of a ring includes each asperity's own load, spread over the asperity's
+#: share of the area. The displacement of the asperity by this part must be subtracted. It is
+#: OWN_SHARE times the displacement of the centre of a uniformly loaded disc of the same area.
+#: Ewald's sums give 1.1002 for square and 1.1061 for hexagonal arrays; for other layouts the value
+#: is a heuristic.
 OWN_SHARE = 1.10
 
 
