@@ -307,7 +307,10 @@ def cycles(
 ) -> list[Cycle]:
     """The steady cycles of several ranges of shear force at constant load, computed together.
 
-    maximum, minimum, displacement : (m,) as in `cycle`; the errors are those of `cycle`, too
+    maximum, minimum, displacement : (m,) as in `cycle`
+
+    Raises the errors of `cycle`.
+
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
     ['0.00021', '0.0028', '0.048']
@@ -501,6 +504,7 @@ def loops(
     asperities : as in `Cycle.loop`
 
     Raises InputError if the load of a cycle varies.
+
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
     >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
     [23, 41]

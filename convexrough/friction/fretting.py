@@ -86,6 +86,7 @@ class Fretting(Table, Plottable):
 
 def fretting(cycle: Cycle) -> Fretting:
     """The fretting of each asperity in a steady cycle, which `cycle` or `steady` returns.
+
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True

@@ -1,4 +1,4 @@
-"""Friction states along a path of load P and shear force Q: `load_path`; `history`: at constant P.
+"""`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
 
 With the coefficient of friction f, the points of a path are (P, T = Q / f). The friction state is a
 memory curve, a polygon over load levels: docs/theory/paths.md derives it. A level is also the
@@ -255,6 +255,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear
 
     Raises InputError if the scene has no friction, if m = 0, or if a force exceeds f P.
+
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
     ['1.81e-05', '2.66e-06']

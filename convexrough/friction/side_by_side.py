@@ -40,7 +40,7 @@ class PathEntry(Record):
     outcome : "answered", "refused" (the method does not apply to the scene) or "failed"
     message : the reason why there is no result; else ""
     path    : the result; None if there is none
-    force_disagreement : largest difference of a shear force Q_i from the first method that
+    force_disagreement : largest difference of a shear force Q_i from that of the first method that
         answered, divided by the largest friction limit f P_i
     displacement_disagreement : largest difference of the displacement X from that method, divided
         by its largest |X|
