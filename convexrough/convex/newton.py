@@ -94,7 +94,8 @@ class Law(Protocol):
 class Stopping:
     """The conditions that end Newton's method. Residuals are relative to their scale.
 
-    accurate  : an answer is accepted only if its residual is at most this, or `tolerance` if larger
+    accurate  : unless the method ends by `linear`, an answer is accepted only if its residual is at
+        most this, or `tolerance` if larger
     tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
     linear    : the method also ends if the next step is expected to leave a defect of at most this

@@ -88,7 +88,8 @@ class Cycle(Table, Plottable):
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so
         loss and statuses are proved; "proved for one step": statuses hold for the result of one
         general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
-        nothing is proved, and general steps give the results
+        nothing is proved, and general steps give the results. The order also is "fails" if the
+        normal solution at the highest P is not proved; the memory curve then gives the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 
@@ -155,11 +156,11 @@ class Cycle(Table, Plottable):
 
     @property
     def asperity_losses(self) -> Array:
-        """(n,) [force length] energy lost at each asperity per cycle; nan if `order` is "fails".
+        """(n,) [force length] energy lost at each asperity per cycle.
 
-        Where the load varies, these losses are sums over about 64 intervals, each computed from
-        the normal solutions at its ends. Their errors are about 0.1 %; the proved bounds on these
-        errors are some per cent.
+        The values are nan if general steps give the results (see `order`). Where the load varies,
+        these losses are sums over about 64 intervals, each computed from the normal solutions at
+        its ends. Their errors are about 0.1 %; the proved bounds on these errors are some per cent.
         """
         return self._shares[2]
 

@@ -58,7 +58,8 @@ class Fretting(Table, Plottable):
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
 
-    If `cycle.order` is "fails", all arrays except the status are nan.
+    If general steps give the results of the cycle (see `Cycle.order`), all arrays are nan, except
+    the status and `loss_errors`, which is infinite.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
     >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())

@@ -49,7 +49,8 @@ class Walk:
     levels  : the normal solutions of the contact
     start   : the memory curve before the first segment
     points  : the m points (P, T)
-    steps   : number of general steps per segment; None takes general steps only if order fails
+    steps   : number of general steps per segment; None takes general steps only if order fails and
+        the normal solution of the contact is proved
     stepper : solver of the general steps
     """
 
@@ -91,7 +92,11 @@ class Walk:
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """Results of general steps, if these are requested or order fails; else None."""
+        """Results of general steps, or None.
+
+        They are taken if they are requested, or if order fails and the normal solution of the
+        contact is proved.
+        """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)

@@ -64,7 +64,7 @@ class PathEntry(Record):
 class PathComparison(Table, Plottable):
     """The results of three methods for one load path, the general step first.
 
-    order : as in `LoadPath`; if it is "fails", the memory curve does not apply
+    order : as in `LoadPath`; if it is "fails", the result of the memory curve is refused
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> max(each.displacement_disagreement for each in found.entries) < 1e-4

@@ -289,8 +289,8 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Three bounds: on the residual once j carries the missing part of x, on that part, and
-            on the displacements by it and by `others`.
+            """Three bounds: on the residual after asperity j has taken up the part of the total
+            that x misses, on this part, and on the displacements by it and by `others`.
 
             others : bound on the sum of |x| over asperities not proved to touch or be open
             """

@@ -28,7 +28,7 @@ from convexrough.roundoff import SAFETY
 #: of the next box, divided by the latest error bounds. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: Relative error of a load above which it is also bounded through the indentation.
+#: If the relative error of a load is above this, the load is also bounded through the indentation.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -112,7 +112,7 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
 class _Missing(NamedTuple):
     """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
-    docs/theory/one-theorem.md derives it. (1 + t) P has the prescribed total.
+    docs/theory/one-theorem.md derives them. The loads (1 + t) P have the prescribed total.
 
     loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
         from P to (1 + t) P; 0 if P has this total
@@ -137,7 +137,10 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The balls of the loads; an inexact one is replaced by (indentation / k)^(3/2) if smaller."""
+    """The balls of the loads.
+
+    For an inexact load this is the ball of (indentation / k)^(3/2), if that is smaller.
+    """
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
     return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)

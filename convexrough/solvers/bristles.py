@@ -16,8 +16,8 @@ load its indentation is d_i = k B_i^(2/3) and its compliance h_i = (2/3) k B_i^(
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
-At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise its error is
-at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
+At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise the error of
+P is at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
 
 Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator A
 and prescribed displacements D,

@@ -2,9 +2,10 @@
 
 Asperities are grouped in rings about the axis. In the approximation, the loads of all rings cause
 the same displacement w at all asperities of a ring. Their indentations are D - w with
-D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). The matrix K
-contains the displacement of each ring by a unit load spread evenly over each ring. Newton's method
-solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights, radii).
+D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). K_rs is the
+displacement of ring r by a unit load that is spread evenly over ring s, without the displacement of
+an asperity by its own load. Newton's method solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech.
+34 (1967) 153, here for any heights and radii).
 """
 
 from __future__ import annotations
