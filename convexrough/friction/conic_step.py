@@ -84,10 +84,10 @@ class ConePiece(NamedTuple):
     def rows(self, lift: Array) -> Array:
         """(3 k, LIFT) a matrix A: for the variables y of the piece, -A y lies in k cones.
 
-        The cones have dimension 3. The first one contains the bounds of the piece. On a slipping
-        piece the others are `lift`, the cones for powers. A stuck piece has one more cone. It uses
-        three variables: the weight; y3, the force minus the force in the middle of the piece; and
-        y5, the square of y3 divided by the weight.
+        The cones have dimension 3. The first one stands for the bounds of the piece. On a slipping
+        piece the others are `lift`, the cones for powers. A stuck piece has one other cone, and
+        uses three variables: the weight; y3, the force minus the force in the middle of the piece;
+        and y5, the square of y3 divided by the weight.
         """
         low = -self.high if self.rate == 0.0 else self.low
         bounds, square = np.zeros((3, LIFT)), np.zeros((3, LIFT))

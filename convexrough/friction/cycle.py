@@ -88,8 +88,8 @@ class Cycle(Table, Plottable):
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so
         loss and statuses are proved; "proved for one step": statuses hold for the result of one
         general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
-        nothing is proved, and general steps give the results. The order also is "fails" if the
-        normal solution at the highest P is not proved; the memory curve then gives the results
+        nothing is proved, and general steps give the results. If the normal solution at the highest
+        P is not proved, `order` is "fails", too, but the memory curve gives the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 

@@ -238,7 +238,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and beta, which makes its mean with the weights c 0."""
+            """x / c + A x - right - beta, and the beta for which its mean, weighted by c, is 0."""
             above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)

@@ -56,9 +56,9 @@ class Pressing:
     unit: ClassVar[str] = "the approach"
 
     def evaluate(self, unknown: Array) -> newton.Iterate | None:
-        """The state of `Pressed.at`, whose loads have a prescribed total.
+        """The state by `Pressed.at`, whose loads have the total if one is prescribed.
 
-        None if the total is prescribed and no indentation is positive.
+        None if a total is prescribed and no indentation is positive.
         """
         problem, total = self.problem, 0.0
         if problem.approach is not None:

@@ -3,9 +3,9 @@
 Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
 in units of c_t f^2, with Poisson's ratio nu and Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An
 asperity with the load P and the shear force u has the deflection
-own(u) = threshold [1 - (1 - u / P)^(2/3)] with threshold = k P^(2/3) and Hertz's coefficient k. If
-it must take up a longer displacement than threshold, it slides. With the compliance operator A and
-bias = nu / (2 - nu) the tangential kernel is, by (1) of that page,
+own(u) = threshold [1 - (1 - u / P)^(2/3)] with threshold = k P^(2/3) and Hertz's coefficient k. An
+asperity that must take up a displacement longer than threshold slides. With the compliance operator
+A and bias = nu / (2 - nu) the tangential kernel is, by (1) of that page,
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
