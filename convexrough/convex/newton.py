@@ -40,7 +40,7 @@ SHORTEST = 1e-12
 
 
 class Iterate(NamedTuple):
-    """A point of the iteration, with the symbols of this module."""
+    """A point of the iteration, with the symbols of this module; the defect is F(eta)."""
 
     unknown: Array  # eta
     forces: Array  # p(eta), which satisfy the constraints, such as a prescribed total
@@ -79,7 +79,10 @@ class Law(Protocol):
         ...
 
     def noise(self, state: Iterate) -> float:
-        """2-norm of a defect that is small compared with the rounding errors of A p."""
+        """A limit for the 2-norm of F, well below the rounding errors of A p.
+
+        If F is smaller than this, further steps do not help.
+        """
         ...
 
     def advice(self, state: Iterate) -> str:
@@ -91,7 +94,8 @@ class Law(Protocol):
 class Stopping:
     """The conditions that end Newton's method. Residuals are relative to their scale.
 
-    accurate  : an answer is accepted only if its residual is at most this, or `tolerance` if larger
+    accurate  : unless the method ends by `linear`, an answer is accepted only if its residual is at
+        most this, or `tolerance` if larger
     tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
     linear    : the method also ends if the next step is expected to leave a defect of at most this
@@ -113,8 +117,9 @@ def solve(
 ) -> tuple[Iterate, int]:
     """The final state, and the number of steps.
 
-    before : estimate of the 2-norm of the defect that a step before the start would have had; it
-        sets the tolerance of the first linear system
+    before : estimate of the 2-norm of F one step before `state`, as if Newton's method had made
+        this step. With it the convergence of the first step is predicted, for the tolerance of its
+        linear system and for `Stopping.linear`
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does

@@ -1,4 +1,4 @@
-"""Friction states along a path of load P and shear force Q: `load_path`; `history`: at constant P.
+"""`load_path`: friction states along a path of load P and shear force Q; `history`: at constant P.
 
 With the coefficient of friction f, the points of a path are (P, T = Q / f). The friction state is a
 memory curve, a polygon over load levels: docs/theory/paths.md derives it. A level is also the
@@ -49,7 +49,8 @@ class Walk:
     levels  : the normal solutions of the contact
     start   : the memory curve before the first segment
     points  : the m points (P, T)
-    steps   : number of general steps per segment; None takes general steps only if order fails
+    steps   : number of general steps per segment; None takes general steps only if order fails and
+        the normal solution of the contact is proved
     stepper : solver of the general steps
     """
 
@@ -91,7 +92,11 @@ class Walk:
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """Results of general steps, if these are requested or order fails; else None."""
+        """Results of general steps, or None.
+
+        They are taken if they are requested, or if order fails and the normal solution of the
+        contact is proved.
+        """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
@@ -255,6 +260,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear
 
     Raises InputError if the scene has no friction, if m = 0, or if a force exceeds f P.
+
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
     ['1.81e-05', '2.66e-06']
