@@ -108,24 +108,15 @@ class Stopping:
     linear: float = 0.0
 
 
-def solve(
-    law: Law,
-    state: Iterate,
-    stopping: Stopping,
-    *,
-    before: float = np.inf,
-) -> tuple[Iterate, int]:
+def solve(law: Law, state: Iterate, stopping: Stopping) -> tuple[Iterate, int]:
     """The final state, and the number of steps.
-
-    before : estimate of the 2-norm of F one step before `state`, as if Newton's method had made
-        this step. With it the convergence of the first step is predicted, for the tolerance of its
-        linear system and for `Stopping.linear`
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does
     not halve the residual; then the better of the two states is returned. Raises SolverError after
     `most` steps.
     """
+    before = np.inf  # the 2-norm of the last defect
     for step in range(1, stopping.most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
         accurate = state.residual <= stopping.accurate * state.scale
@@ -133,7 +124,7 @@ def solve(
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
         if done or (accurate and size <= noise):
             return state, step - 1
-        expected = (size / before) ** 2 if 0 < before < np.inf else 1.0
+        expected = (size / before) ** 2 if before < np.inf else 1.0
         if expected * size <= stopping.linear:
             return state, step - 1
         forcing = min(MOST_LEFT, expected)

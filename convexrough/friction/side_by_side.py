@@ -138,7 +138,9 @@ def compare_paths(
 
 
 def _entry(way: Way, found: Callable[[], LoadPath], reference: LoadPath | None) -> PathEntry:
-    refused = PathEntry("memory curve", "refused", "an indentation falls as the load rises")
+    refused = PathEntry(
+        "memory curve", "refused", "it is not proved that indentations rise with the load"
+    )
     if way == refused.way and reference is not None and reference.order == "fails":
         return refused
     began = perf_counter()

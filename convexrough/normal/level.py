@@ -181,9 +181,12 @@ class Level:
         """
         if self.box is None or self.trial is None:
             return np.inf
-        missing = self.trial.missing.size * self.problem.largest_entry
+        # `distance` is that of (1 + t) P, which has the total L; t P is bounded in the same norm.
+        P, inside = self.trial.loads.high, self.trial.inside
+        t = self.trial.missing.size / (summed(P) or 1.0) * (1 + SAFETY)
+        moved = t * np.sqrt(self.compliance[inside] @ P[inside] ** 2) * (1 + SAFETY)
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
-        return (self.distance * reach + missing) * (1 + SAFETY)
+        return (self.distance + moved) * reach * (1 + SAFETY)
 
     @cached_property
     def energy(self) -> Ball:
