@@ -99,18 +99,21 @@ def read(
     """The surface in a file: .npy, .npz, .mat, text, or a format that SurfaceTopography reads.
 
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
-    unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
-        different unit in the file is an error. Heights in another known unit are converted
+    unit   : unit of the pixel; optional, because the file may state it, or no unit may be known
+    height_unit : unit of the heights; by default that of the pixel. It is an error if `unit` or
+        `height_unit` differs from what the file states. Heights whose unit is not that of the pixel
+        are converted to the unit of the pixel
     detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None: none
     fill   : True to fill holes with a harmonic function, after the form is fitted to other pixels;
         else holes are an error. Holes are nan, masked, BAD in text, and marks such as -9999 or 1e38
         far from all heights
 
-    An .npz or .mat file contains `heights`, and may contain `unit`, `height_unit`, and `pixel` or x
-    and y, of columns and rows or of each height; other numbers that could change the meaning of the
-    heights are refused. Text contains a matrix, possibly with Gwyddion's comments on its size. A
-    matrix with three columns is a list of x, y and height on a grid. Formats of instruments need
-    the extra `surface`.
+    An .npz or .mat file contains `heights`. It may also contain `unit`, `height_unit`, `pixel`, and
+    coordinates x and y: x of each column and y of each row, or both for each height. Other numbers
+    that could change the meaning of the heights are an error. Text contains a matrix, possibly with
+    the comments on its size that Gwyddion writes. A matrix with three columns is a list of x,
+    y and height on a grid. Formats of instruments need the package SurfaceTopography (the extra
+    `surface`).
 
     Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
     InputError if the file contains no usable map.
@@ -409,7 +412,7 @@ def _on_grid(x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
 
 
 def steps(name: str, values: Array) -> tuple[Indices, float]:
-    """For coordinates in a list: the number of the grid line of each, and the lines' spacing."""
+    """The index, from 0, of each coordinate's grid line, and the distance between grid lines."""
     levels = np.unique(values)
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:
