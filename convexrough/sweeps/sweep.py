@@ -200,8 +200,8 @@ def _planned(
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the numbers depend, except `measures` and the version
 
-    Raises InputError for an unknown measure and, if the first five scenes all fail, the error of the
-    fifth.
+    Raises InputError for an unknown measure and, if the first five scenes all fail, the error of
+    the fifth.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):
