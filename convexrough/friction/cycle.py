@@ -51,8 +51,7 @@ from convexrough.sphere.smooth import smooth_reference
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Where the load varies, integrals over the slip front are cut into about this many cells in all.
-#: The loss of each asperity is then accurate to about 0.1 %.
+#: Where the load varies, the ways of the slip fronts are cut into about this many cells in all.
 CELLS = 64
 
 
@@ -159,8 +158,10 @@ class Cycle(Table, Plottable):
         """(n,) [force length] energy lost at each asperity per cycle.
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
-        these losses are sums over about 64 intervals, each computed from the normal solutions at
-        its ends. Their errors are about 0.1 %; the proved bounds on these errors are some per cent.
+        the ways of the slip fronts are cut into about 64 cells in all. The losses are sums over the
+        cells, computed from the normal solutions at the ends of each cell. Their relative errors
+        are about 0.1 %, except where a front hardly moves while the load changes much; the proved
+        bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -245,7 +246,7 @@ class Loop(Table):
     displacements : (m,) [length] relative tangential displacement of distant points of the two
         bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] local deflection plus slip of each asperity
+    asperity_displacements : (m, k) [length] own deflection plus drift of each asperity
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape

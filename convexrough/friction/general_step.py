@@ -185,7 +185,7 @@ class Bundle(NamedTuple):
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
     forces    : (n,) T_i, the shear forces of the asperities divided by f
-    positions : (n,) deflection plus drift, divided by c_t f
+    positions : (n,) own deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
     """
