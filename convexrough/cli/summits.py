@@ -71,7 +71,7 @@ class Pressing(NamedTuple):
         from convexrough.scene.material import Material
         from convexrough.scene.scene import Scene
 
-        # At a given approach contacts do not depend on the modulus; Poisson's ratio is for shear only.
+        # At a given approach no contact depends on the modulus. Poisson's ratio affects only shear.
         stuff = Material(1.0 if self.modulus is None else self.modulus, 0.3)
         base = partial(Scene, self.radius, material=stuff, geometry="closest")
         pressed = partial(press, approach=self.approach, load=self.load)
@@ -127,10 +127,11 @@ def summits(
     SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text file with a matrix of
     heights or three columns: x, y and height. The command can also press a sphere on the middle of
     the map: give --scene; or --radius and --approach; or --radius, --load and --modulus. It then
-    reports contacts, certificate, crowding and model error for several values of --prune, and
-    recommends one of these values. With --whole it also presses every pixel at the same approach,
-    for comparison. It writes summits.csv, a summary and figures. Results of a.npz go to the folder
-    a-summits unless --out names another.
+    reports contacts, certificate, crowding (above 1 contact discs overlap) and model error for
+    several values of --prune, and recommends one of these values. With --whole it also computes,
+    for comparison, the contact of the whole map at the same approach, by boundary elements, one per
+    pixel. It writes summits.csv, a summary and figures. Results of a.npz go to the folder a-summits
+    unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

@@ -63,10 +63,10 @@ def sweep(
     another. With --summary DIR in place of SWEEP the command computes no scenes, but prints
     quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
-    Exit status: 0 if all rows of the table are certified; 2 wrong input; 3 if a row is undecided; 4
-    if a scene failed, or if workers died twice while computing the same scenes; 130 interrupted. If
-    the command stops early, the rows computed so far are kept, and the same command with --resume
-    computes the rest.
+    Exit status: 0 if all computed scenes are certified; 2 if the input is wrong; 3 if a scene is
+    undecided; 4 if a scene failed, or if the sweep stopped because workers died or have other
+    versions of packages; 130 if interrupted. If the command stops early, the rows computed so far
+    are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

@@ -68,8 +68,8 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.argument("scene", type=PATH)
 @click.argument("loads", type=PATH)
 @click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-              help="Largest error allowed: of a load, over the largest load; of a total, over this "
-              "total.")  # fmt: skip
+              help="Largest error allowed: of a load or shear force, as a fraction of the largest "
+              "one; of a prescribed total, as a fraction of this total.")  # fmt: skip
 @click.option("--floor", metavar="X", type=float, default=0.0,
               help="Treat loads up to X as zero: their asperities are claimed to be open."
               )  # fmt: skip

@@ -2,7 +2,8 @@
 
 A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
 the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
-the four cones (1) and the five cones (2), and "Why it is exact" the limits of the number S.
+the four cones (1) and the five cones (2). The section "Why it is exact" gives the limits of the
+convexity number S of a box, up to which they are exact.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
 
 class ConeRows(NamedTuple):
-    """Rows with  constant - matrix @ variables  in `cones` second-order cones of dimension 3."""
+    """Rows of a program:  constant - matrix @ variables  lies in second-order cones.
+
+    cones : number of these cones, which have dimension 3
+    """
 
     matrix: csc_array  # (3 cones, width)
     constant: Array  # (3 cones,)

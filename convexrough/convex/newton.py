@@ -40,7 +40,7 @@ SHORTEST = 1e-12
 
 
 class Iterate(NamedTuple):
-    """A point of the iteration, with the symbols of this module."""
+    """A point of the iteration, with the symbols of this module; the defect is F(eta)."""
 
     unknown: Array  # eta
     forces: Array  # p(eta), which satisfy the constraints, such as a prescribed total
@@ -79,7 +79,10 @@ class Law(Protocol):
         ...
 
     def noise(self, state: Iterate) -> float:
-        """2-norm of a defect that is small compared with the rounding errors of A p."""
+        """A limit for the 2-norm of F, well below the rounding errors of A p.
+
+        If F is smaller than this, further steps do not help.
+        """
         ...
 
     def advice(self, state: Iterate) -> str:
@@ -91,7 +94,8 @@ class Law(Protocol):
 class Stopping:
     """The conditions that end Newton's method. Residuals are relative to their scale.
 
-    accurate  : an answer is accepted only if its residual is at most this, or `tolerance` if larger
+    accurate  : unless the method ends by `linear`, an answer is accepted only if its residual is at
+        most this, or `tolerance` if larger
     tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
     linear    : the method also ends if the next step is expected to leave a defect of at most this
@@ -104,23 +108,15 @@ class Stopping:
     linear: float = 0.0
 
 
-def solve(
-    law: Law,
-    state: Iterate,
-    stopping: Stopping,
-    *,
-    before: float = np.inf,
-) -> tuple[Iterate, int]:
+def solve(law: Law, state: Iterate, stopping: Stopping) -> tuple[Iterate, int]:
     """The final state, and the number of steps.
-
-    before : estimate of the 2-norm of the defect that a step before the start would have had; it
-        sets the tolerance of the first linear system
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does
     not halve the residual; then the better of the two states is returned. Raises SolverError after
     `most` steps.
     """
+    before = np.inf  # the 2-norm of the last defect
     for step in range(1, stopping.most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
         accurate = state.residual <= stopping.accurate * state.scale
@@ -128,7 +124,7 @@ def solve(
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
         if done or (accurate and size <= noise):
             return state, step - 1
-        expected = (size / before) ** 2 if 0 < before < np.inf else 1.0
+        expected = (size / before) ** 2 if before < np.inf else 1.0
         if expected * size <= stopping.linear:
             return state, step - 1
         forcing = min(MOST_LEFT, expected)

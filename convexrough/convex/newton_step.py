@@ -6,9 +6,9 @@ W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The norma
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
 A is the compliance operator. The number beta is 0, or, if the loads must keep their sum, the one
-for which sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If it
-is not positive definite, diag(`shells`) is added to A, which makes it so. Conjugate gradients also
-return A W y, from which the step d of every asperity follows, touching or not.
+for which sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If this
+matrix is not positive definite, diag(`shells`) is added to A, which makes it so. Conjugate
+gradients also return A W y, from which the step d of every asperity follows, touching or not.
 """
 
 from __future__ import annotations
@@ -161,8 +161,9 @@ class _Smoothed:
     """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
 
     Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. A call also changes the
-    residual by a multiple of W, so that single precision is enough. The sum of these multiples,
-    `shift`, is the number beta of the step, for a defect that is scaled as the residual is.
+    residual by a multiple of the diagonal of W, so that single precision is enough. The sum of
+    these multiples, `shift`, is the number beta of the step, for a defect that is scaled as the
+    residual is.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:

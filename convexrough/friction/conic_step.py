@@ -1,12 +1,13 @@
 """The general step as one second-order cone program, which checks the solution by Newton's method.
 
 The elastic energy W(T) of an asperity is the integral of its deflection over its shear force T. It
-is convex, and the convex hull of one stuck piece and of a slipping piece for each direction of slip
-and each layer of the old memory curve in which the slip front may end. The cones of
-`convexrough.convex.cones` represent each piece exactly. Piece j has a weight w_j, which replaces
-the 1 in its cones. The weights of an asperity add up to 1. The forces and energies of its pieces
-add up to those of the asperity. Forces are in units of the coefficient of friction f, displacements
-of c_t f with Mindlin's ratio c_t: docs/theory/without-order.md, "The step as one cone program".
+consists of pieces: one stuck piece, and one slipping piece for each direction of slip and each
+layer of the old memory curve in which the slip front may end. W is convex, so it is the convex hull
+of its pieces. The cones of `convexrough.convex.cones` represent each piece exactly. Piece j has a
+weight w_j, which replaces the 1 in its cones. The weights of an asperity add up to 1. The forces
+and energies of its pieces add up to those of the asperity. Forces are in units of the coefficient
+of friction f, displacements in units of c_t f with Mindlin's ratio c_t:
+docs/theory/without-order.md, "The step as one cone program".
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ THIN = 1e-9
 class ConePiece(NamedTuple):
     """A piece of W(T). Forces are divided by the load N of the asperity, lengths by k N^(2/3).
 
-    On a slipping piece the level L of the slip front runs from `low` to `high`. There
-    T = force - rate L,  the deflection is  own - rate L^(2/3),  and
-    W = own T + (3/5) rate^2 L^(5/3) + energy. On a stuck piece  rate = 0,  |T - force| <= high  and
-    W = own (T - force) + (T - force)^2 softness / 2 + energy.
+    On a slipping piece the level L of the slip front runs from `low` to `high`. With the constants
+    `force`, `rate`, `own` and `energy` of the piece,  T = force - rate L,  the deflection is
+    own - rate L^(2/3),  and  W = own T + (3/5) rate^2 L^(5/3) + energy.  On a stuck piece
+    rate = 0,  |T - force| <= high  and  W = own (T - force) + (T - force)^2 softness / 2 + energy.
     """
 
     low: float
@@ -81,11 +82,12 @@ class ConePiece(NamedTuple):
         return found
 
     def rows(self, lift: Array) -> Array:
-        """(3 k, LIFT) rows of A: those with  -A y  in k cones of dimension 3.
+        """(3 k, LIFT) a matrix A: for the variables y of the piece, -A y lies in k cones.
 
-        The cones are that for the bounds, then `lift`, the rows for powers on a slipping piece. A
-        stuck piece uses three variables: the weight; y3, the force minus the force in the middle of
-        the piece; and y5, the square of y3 divided by the weight.
+        The cones have dimension 3. The first one stands for the bounds of the piece. On a slipping
+        piece the others are `lift`, the cones for powers. A stuck piece has one other cone, and
+        uses three variables: the weight; y3, the force minus the force in the middle of the piece;
+        and y5, the square of y3 divided by the weight.
         """
         low = -self.high if self.rate == 0.0 else self.low
         bounds, square = np.zeros((3, LIFT)), np.zeros((3, LIFT))

@@ -141,7 +141,7 @@ class MemoryCurve(Table, Plottable):
         The front reaches the lower end of a layer when a fraction `reach` of the segment is
         covered. Within a layer this fraction is linear in the level of the front. The front passes
         a layer of slope `sign` at once. If the load falls, the point itself may meet the curve
-        again, and the slip ends there.
+        again; the slip then ends.
         """
         added, shear = load - self.load, height - self.height
         rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0

@@ -51,8 +51,7 @@ from convexrough.sphere.smooth import smooth_reference
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Where the load varies, integrals over the slip front are cut into about this many cells in all.
-#: The loss of each asperity is then accurate to about 0.1 %.
+#: Where the load varies, the ways of the slip fronts are cut into about this many cells in all.
 CELLS = 64
 
 
@@ -88,7 +87,8 @@ class Cycle(Table, Plottable):
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so
         loss and statuses are proved; "proved for one step": statuses hold for the result of one
         general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
-        nothing is proved, and general steps give the results
+        nothing is proved, and general steps give the results. If the normal solution at the highest
+        P is not proved, `order` is "fails", too, but the memory curve gives the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 
@@ -155,11 +155,13 @@ class Cycle(Table, Plottable):
 
     @property
     def asperity_losses(self) -> Array:
-        """(n,) [force length] energy lost at each asperity per cycle; nan if `order` is "fails".
+        """(n,) [force length] energy lost at each asperity per cycle.
 
-        Where the load varies, these losses are sums over about 64 intervals, each computed from
-        the normal solutions at its ends. Their errors are about 0.1 %; the proved bounds on these
-        errors are some per cent.
+        The values are nan if general steps give the results (see `order`). Where the load varies,
+        the ways of the slip fronts are cut into about 64 cells in all. The losses are sums over the
+        cells, computed from the normal solutions at the ends of each cell. Their relative errors
+        are about 0.1 %, except where a front hardly moves while the load changes much; the proved
+        bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -244,7 +246,7 @@ class Loop(Table):
     displacements : (m,) [length] relative tangential displacement of distant points of the two
         bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] local deflection plus slip of each asperity
+    asperity_displacements : (m, k) [length] own deflection plus drift of each asperity
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -307,7 +309,10 @@ def cycles(
 ) -> list[Cycle]:
     """The steady cycles of several ranges of shear force at constant load, computed together.
 
-    maximum, minimum, displacement : (m,) as in `cycle`; the errors are those of `cycle`, too
+    maximum, minimum, displacement : (m,) as in `cycle`
+
+    Raises the errors of `cycle`.
+
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
     ['0.00021', '0.0028', '0.048']
@@ -501,6 +506,7 @@ def loops(
     asperities : as in `Cycle.loop`
 
     Raises InputError if the load of a cycle varies.
+
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
     >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
     [23, 41]

@@ -58,7 +58,8 @@ class Fretting(Table, Plottable):
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
 
-    If `cycle.order` is "fails", all arrays except the status are nan.
+    If general steps give the results of the cycle (see `Cycle.order`), all arrays are nan, except
+    the status and `loss_errors`, which is infinite.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
     >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())
@@ -86,6 +87,7 @@ class Fretting(Table, Plottable):
 
 def fretting(cycle: Cycle) -> Fretting:
     """The fretting of each asperity in a steady cycle, which `cycle` or `steady` returns.
+
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True

@@ -97,7 +97,10 @@ class OwnCurves:
         return self.ended(front, front[1:])
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
-        """A straight step that ends here, (n,) each; the curves must be cut at `indentations`."""
+        """A straight step to these indentations and deflections, (n,) each.
+
+        The curves must be cut at `indentations`.
+        """
         base, moved = self.levels[:, -1], deflections - self.heights[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
@@ -182,7 +185,7 @@ class Bundle(NamedTuple):
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
     forces    : (n,) T_i, the shear forces of the asperities divided by f
-    positions : (n,) deflection plus drift, divided by c_t f
+    positions : (n,) own deflection plus drift, divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
     """
@@ -336,7 +339,10 @@ class Stepper:
         return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
 
     def _newton(self, iterate: _Iterate) -> Array:
-        """The change of the unknown in a Newton step, from those whose forces change."""
+        """The change of the unknown in a Newton step.
+
+        The linear system has only the asperities whose forces change with eta, and x.
+        """
         some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
         slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)
         coupled, matrix = self.A[:, some] * slopes, np.zeros((n + 1, n + 1))
@@ -359,7 +365,7 @@ class _Iterate(NamedTuple):
     own: OwnStep  # the steps of the asperities that are displaced by eta
     slopes: Array  # (n,) dT_i / deta_i
     defect: Array  # (n + 1,) the left sides of (1) minus the right sides
-    residual: float  # the largest defect, or the displacement that corrects that of T if larger
+    residual: float  # the largest defect of eta; if larger, the displacement that corrects T
 
 
 class SteppedPath(NamedTuple):

@@ -97,7 +97,8 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Loads]) -> tuple[Ball, Bal
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) integrals I of -dB/dL over pieces on which the load changes.
 
-    They follow from (4) of docs/theory/losses.md, with the intervals for D, m and M given there.
+    They follow from (4) of docs/theory/losses.md, with the intervals that this page gives for D, m
+    and M.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))

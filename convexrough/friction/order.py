@@ -286,7 +286,9 @@ class _Span(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """True unless each asperity is proved open at `lower`, or is rising and proved deeper above."""
+    """True unless each asperity is proved open at `lower`, or is rising and is proved to have a
+    larger indentation at `upper` than at `lower`.
+    """
     if upper.box is None:
         return True
     if lower.box is None:

@@ -1,10 +1,14 @@
-"""Friction states along a path of load P and shear force Q: `load_path`; `history`: at constant P.
+"""`load_path` computes friction states along a path of load P and shear force Q.
 
-With the coefficient of friction f, the points of a path are (P, T = Q / f). The friction state is a
-memory curve, a polygon over load levels: docs/theory/paths.md derives it. A level is also the
-normal solution at one load. States are sums over the levels of the memory curve, and losses are
-integrals over the pieces of each segment (`curve.Piece`). If an indentation falls as the load
-rises, general steps compute the results, without proofs.
+`history` does so at constant P. With the coefficient of friction f, the points of a path are
+(P, T = Q / f). The memory curve stores the friction state: the shear force that the layers of the
+contact up to the normal load s carry, divided by f, as a function of s. It is a polygon
+(docs/theory/paths.md). A level is a total load, or the normal solution at this load. Forces and
+displacements are sums over the vertices of the memory curve. Losses are sums over pieces of each
+segment; on a piece the slip front falls through one layer of the curve (`curve.Piece`).
+
+If an indentation falls as the load rises, the memory curve does not apply: `general_step` then
+computes the states step by step (docs/theory/without-order.md), without proofs.
 """
 
 from __future__ import annotations
@@ -44,12 +48,14 @@ LEAST_PART = 1e-250
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A path from a memory curve through m points, with straight segments between them.
+    """A path that begins in the friction state `start` and leads through m points along straight
+    segments.
 
     levels  : the normal solutions of the contact
-    start   : the memory curve before the first segment
+    start   : the memory curve of the friction state before the first segment
     points  : the m points (P, T)
-    steps   : number of general steps per segment; None takes general steps only if order fails
+    steps   : number of general steps per segment; with None, general steps are taken only if order
+        fails and the normal solution of the contact is proved
     stepper : solver of the general steps
     """
 
@@ -74,7 +80,7 @@ class Walk:
 
     @property
     def pieces(self) -> list[list[Piece]]:
-        """The pieces of the loss on each segment."""
+        """The parts of each segment (`Piece`) whose losses add up to that of the segment."""
         return [pieces for _, pieces in self._segments]
 
     @cached_property
@@ -91,7 +97,11 @@ class Walk:
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """Results of general steps, if these are requested or order fails; else None."""
+        """Results of general steps, or None.
+
+        They are taken if they are requested, or if order fails and the normal solution of the
+        contact is proved.
+        """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
@@ -129,13 +139,13 @@ class LoadPath(Table, Plottable):
     approaches     : (m,) [length] approach D0; at the load 0, the approach of the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] own deflection of each asperity plus its drift
+    asperity_displacements : (m, n) [length] own deflection plus drift of each asperity
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] level of the slip front: the load level above which the latest
-        segment that changes P or Q has changed the memory curve; nan if nothing slips on it
+    fronts         : (m,) [force] the load level down to which slip has reached on the latest
+        segment along which P or Q changes; nan if nothing slips on this segment
     status         : (m, n) for the latest segment: "stuck" (no slip), "partial" (a disc sticks),
         "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
@@ -201,12 +211,14 @@ class LoadPath(Table, Plottable):
         displacements: ArrayLike | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum of losses and displacements by the scene and the path.
+        """Derivatives of a weighted sum of losses and displacements.
+
+        They are derivatives with respect to the scene and the path.
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
             of the last loss is 1, and all others are 0
-        holding : quantity kept constant, as in `Contact.gradient`. All derivatives except those by
-            `forces` are at constant forces Q, not at constant Q / (f P)
+        holding : quantity kept constant, as in `Contact.gradient`. All derivatives except those
+            with respect to `forces` are at constant forces Q, not at constant Q / (f P)
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
 
@@ -233,10 +245,12 @@ def load_path(
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
-    influence : how the compliance matrix is stored, as in `press`; None chooses by speed
-    general_steps : number of general steps per segment. These steps hold also if an indentation
-        falls as the load rises (docs/theory/without-order.md), but their results are not proved.
-        None uses the memory curve or, if an indentation falls, 16, 32 or 64 steps per segment
+    influence : how the compliance matrix is stored, as in `press`; with None, the cheapest way is
+        chosen
+    general_steps : number of general steps per segment. General steps are valid also if an
+        indentation falls as the load rises (docs/theory/without-order.md), but their results are
+        not proved. With None, the memory curve gives the states or, if order fails in a proved
+        contact, 16, 32 or 64 general steps per segment do
 
     Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
     SolverError if a normal problem is not solved.
@@ -255,6 +269,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear
 
     Raises InputError if the scene has no friction, if m = 0, or if a force exceeds f P.
+
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
     ['1.81e-05', '2.66e-06']

@@ -50,7 +50,8 @@ def elliptic_path(
     chords : approximate number of chords that replace the ellipse. In tests the loss was smaller
         than that of the ellipse by a fraction of at most 12 / chords^2
 
-    Raises InputError for other phases, or if `friction` is not positive.
+    Raises InputError if the phase is not from -pi to pi, or if `friction` is not positive.
+
     >>> loads, forces = cr.elliptic_path(
     ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8
     ... )

@@ -80,7 +80,8 @@ class ShearState(Table, Plottable):
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
-    displacements : [length] own deflection plus slip, without the effect of other asperities
+    displacements : [length] own deflection plus drift (here the slip), without the effect of other
+        asperities
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides
 

@@ -40,7 +40,7 @@ class PathEntry(Record):
     outcome : "answered", "refused" (the method does not apply to the scene) or "failed"
     message : the reason why there is no result; else ""
     path    : the result; None if there is none
-    force_disagreement : largest difference of a shear force Q_i from the first method that
+    force_disagreement : largest difference of a shear force Q_i from that of the first method that
         answered, divided by the largest friction limit f P_i
     displacement_disagreement : largest difference of the displacement X from that method, divided
         by its largest |X|
@@ -64,7 +64,7 @@ class PathEntry(Record):
 class PathComparison(Table, Plottable):
     """The results of three methods for one load path, the general step first.
 
-    order : as in `LoadPath`; if it is "fails", the memory curve does not apply
+    order : as in `LoadPath`; if it is "fails", the result of the memory curve is refused
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> max(each.displacement_disagreement for each in found.entries) < 1e-4
@@ -138,7 +138,9 @@ def compare_paths(
 
 
 def _entry(way: Way, found: Callable[[], LoadPath], reference: LoadPath | None) -> PathEntry:
-    refused = PathEntry("memory curve", "refused", "an indentation falls as the load rises")
+    refused = PathEntry(
+        "memory curve", "refused", "it is not proved that indentations rise with the load"
+    )
     if way == refused.way and reference is not None and reference.order == "fails":
         return refused
     began = perf_counter()

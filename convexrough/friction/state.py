@@ -1,9 +1,11 @@
-"""Friction states as sums of normal solutions, weighted with slope changes of the memory curve.
+"""Friction states as weighted sums of normal solutions.
 
-Equation (1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the
-displacement X of the bodies. The same sum over the indentations n_i (minus the gap where open) is
-the own deflection of an asperity plus its drift, the displacement relative to the opposite surface.
-Equation (1) of docs/theory/states.md is the special case of first loading.
+The weights are the changes of slope of the memory curve, which stores the state
+(docs/theory/paths.md). Equation (1) of that page gives the shear forces Q_i of the asperities and
+the displacement X of the bodies. With the indentations n_i in place of the loads P_i, and the
+factor of X, the sum is the own deflection of asperity i, which is due to its own force, plus its
+drift. The drift is its displacement relative to the opposite surface. Where an asperity is open,
+n_i is minus its gap. Equation (1) of docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):
-    """m states of N asperities in the scene's units; radii are infinite without a proof.
+    """m states of N asperities in the scene's units.
+
+    Error bounds (the radii of the balls) are infinite without a proof.
 
     displacements : (m,) X, of the bodies
     forces        : (m, N) Q_i, shear forces of the asperities
@@ -51,7 +55,7 @@ class LevelSums(NamedTuple):
 
     used    : (k,) loads of all levels
     places  : (m, j) the levels of each curve, as indices into `used`
-    weights : (m, j) bends of the curves at these levels
+    weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above
     """
 
     used: list[Fraction]
@@ -118,7 +122,10 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) the status whose mask in `proved` is true; else "open" if proved, or "undecided"."""
+    """(N,) for each asperity the status whose mask in `proved` is true for it.
+
+    If there is none, the status is "open" if that is proved, else "undecided".
+    """
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"

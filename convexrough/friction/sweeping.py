@@ -10,8 +10,8 @@ If 1 - q_i is positive for all i on the support, it is a lower bound on the rate
 of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
 
 (1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
-of radius R_j = scale C~_j. Multiplied by q_i, the potential of these charges is nowhere below that
-of the unit charge.
+of radius R_j = scale C~_j with scale = 1 / (pi E*). Multiplied by q_i, the potential of these
+charges is at no asperity k != i of the support below that of the unit charge.
 
 There are three ways to find weights:
 
@@ -102,7 +102,11 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """Potentials of unit charges at asperities, swept onto `shells`: radii (n,), on the support."""
+    """Sweeping of unit charges at asperities onto shells about their neighbours, as in (1).
+
+    support : indices of the asperities on the support
+    shells  : (n,) radii R_j of the shells; 0 off the support
+    """
 
     influence: Influence
     support: Indices

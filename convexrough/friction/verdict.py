@@ -116,6 +116,7 @@ def verify_shear(
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
     """Comparison of shear forces from any source with the proved state on first loading.
+
     forces  : (n,) [force] shear forces in the order of the scene's asperities
     force   : [force] the prescribed sum Q of the shear forces
     within  : largest error allowed, as a fraction of the largest force

@@ -58,8 +58,8 @@ CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
 #: WIDTHS are radii of shells divided by t, the cheapest first. WIDENED is a factor for the shells
-#: of nearly singular pairs. LESS is the largest difference between the radii of two neighbours,
-#: divided by their distance. Heuristics: any radii give valid bounds.
+#: of nearly singular pairs. Each radius is raised to at least the radii of the neighbours, less
+#: LESS times the distance. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -103,10 +103,12 @@ class Box(NamedTuple):
     def closed(self) -> Box:
         """A box that contains this one, to be tried at another load or approach.
 
-        The solution there may lie outside, so `faces` makes the proof show that it is inside.
-        Where shells prove the convexity of this box, an upper end moves up to the load at which
-        the convexity number of its asperity equals that of the box. So also asperities at the rim
-        of the contact, with small loads, get upper ends far above the error bounds of their loads.
+        The solution at the other load or approach may lie outside this box. So `faces` holds the
+        upper ends, and the proof must show that the loads are below them. If shells prove the
+        convexity on this box, each upper end above 0 is raised to the load at which shell_i / h_i
+        equals the convexity number of the box, if that load is larger. So also asperities at the
+        rim of the contact, with small loads, get upper ends far above the error bounds of their
+        loads.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -120,9 +122,12 @@ class Box(NamedTuple):
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
-    """At most one box on which convexity is proved: that of all solutions, else one near `loads`.
+    """At most one box on which convexity is proved.
 
-    displacement : (n,) A `loads`
+    It is the global box, which contains every solution, or else a local box, which contains
+    `loads`.
+
+    displacement : (n,) A P for P = `loads`
     """
     highest = problem.overhang(loads, displacement)
     corner = np.maximum(problem.bounds(highest), loads)  # the box must hold both states
@@ -196,7 +201,8 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity.
 
     They are the asperities of pairs that are too close for convexity. If there is no such pair,
-    they are the asperities whose shells meet other shells; if no shells meet, all with a load.
+    they are the asperities whose shells, of the radii t, meet other shells; if no shells meet, all
+    with a load.
     """
     which = np.flatnonzero(loads)
     if len(which) < 2:
@@ -277,7 +283,10 @@ class Nearest(NamedTuple):
         return cls(distances, which, closest, meeting)
 
     def wide_radii(self, lengths: Array, width: float) -> Array:
-        """(n,) radii of shells, `width` times `lengths` or more; each `closest` must be below 1."""
+        """(n,) radii of shells, at least `width` times `lengths`.
+
+        Requires that all numbers in the field `closest` are below 1.
+        """
         radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
         covering: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
         return np.asarray(np.maximum(radii, covering))

@@ -34,9 +34,10 @@ from convexrough.sphere import hertz
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
-#: If contact radii are at most this fraction of the distance to the nearest neighbour, in every
-#: other solution a disc covers a neighbour's summit. In units of this distance it is the radius a
-#: for which (1), with the radius b = 1 in the other solution, gives m = pi / 4; rounded down.
+#: If no contact radius exceeds this fraction of the distance to the nearest neighbour, a disc of
+#: every other solution covers the summit of its nearest neighbour. In units of this distance the
+#: fraction is the radius a for which (1) of docs/theory/crowded.md, with the radius b = 1 in the
+#: other solution, gives the mean m = pi / 4; rounded down.
 ROOMY = 0.52
 
 
@@ -302,7 +303,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch: approach plus offset is at most 0 in every solution."""
+    """The asperities that cannot touch: in every solution approach plus offset is at most 0."""
 
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
@@ -390,7 +391,10 @@ NO_OTHERS = OtherSolutions(False, np.inf, True)
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """(n,) m of (1) for contact radii a and b in two solutions; it increases with both."""
+    """(n,) the mean m of contact radii a and b in two solutions; it increases with both.
+
+    (2 / pi) m is the shell radius t of (1) of docs/theory/crowded.md.
+    """
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

@@ -47,7 +47,7 @@ class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
     one, many : the singular and the plural of the term for a force in messages
-    proved    : name in messages of the set of asperities that the claim is about
+    proved    : term in messages for what the claim says of the asperities, such as "contact set"
     kinds     : names of the attributes that hold indices of wrong statuses, with a text on each
     claims    : the statuses that are claimed where `claimed` is True and where it is False
     within : largest error allowed, as a fraction of the largest force, and of the total
@@ -94,7 +94,10 @@ class Claim(ABC):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) statuses proved from the forces, else from the solution, else "undecided"."""
+        """(n,) statuses proved from the given forces; where none is proved, those of `solution`.
+
+        An asperity without a proved status is "undecided".
+        """
         status: NDArray[np.str_] = self.certificate.status
         if self.solution is None:
             return status
@@ -102,7 +105,7 @@ class Claim(ABC):
 
     @property
     def basis(self) -> str:
-        """What is proved about the assumption that the proof of the forces needs; "" if none."""
+        """A text: what the proof assumes, and whether this is proved; "" without an assumption."""
         return ""
 
     @property

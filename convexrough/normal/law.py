@@ -18,7 +18,8 @@ from convexrough.sphere import hertz
 #: One problem, or a stack with one problem in each row.
 Problem: TypeAlias = NormalProblem | Stack
 
-#: Squared contact radius of a rough sphere over that of a smooth one. It affects speed only.
+#: An estimate of the squared contact radius of a rough sphere, divided by that of a smooth one. It
+#: affects speed only.
 WIDER = 1.1
 
 
@@ -29,7 +30,7 @@ class Pressed(NamedTuple):
     loads, displacement : P and A P
     gap      : k P^(2/3) + A P - D, the gradient of the energy
     defect   : the residual F of the contact law: the gap where loaded, elsewhere min(gap, 0)
-    approach : D0: the prescribed one, or the one that fits the gaps of the touching best
+    approach : D0: the prescribed one, or the one that fits the gaps of touching asperities best
     """
 
     own: Array
@@ -60,7 +61,7 @@ class Pressed(NamedTuple):
 
     @property
     def unknown(self) -> Array:
-        """The indentation; of open asperities, whose loads do not depend on it, min(-gap, 0)."""
+        """Indentations of touching asperities; min(-gap, 0) for open ones, whose loads are 0."""
         return np.asarray(self.own + (self.defect - self.gap))
 
     @property
@@ -76,8 +77,8 @@ def on_hertz_pressure(problem: Problem) -> Array:
 
     P = x^3 s with s = (1 - r^2 / a^2)^(1/2), the distance r from the axis, and the contact radius
     a. The number x follows from a prescribed load. At a prescribed approach it minimises the
-    energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If the smooth body would not touch there, P is
-    a load on the asperity with the largest offset only.
+    energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If there is no such x > 0, s is replaced by 1 at
+    the asperity with the largest offset and 0 at all others.
     """
     load, approach = problem.load, problem.approach
     if approach is None:  # from the highest asperity, so that no digits of small loads are lost

@@ -1,4 +1,4 @@
-"""A normal solution of a scene at a total load L, from which friction and gradients are computed.
+"""A solution of the normal contact problem at a total load L: the basis of friction and gradients.
 
 A proved solution is the only one in a box of loads. At the total load L it has the loads P_i(L),
 the approach D0(L), the indentations n_i(L) (minus the gap where open), and the energy
@@ -66,7 +66,10 @@ class Springs(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the indices of the candidates that cause this."""
+    """The reason why nothing is proved, and which asperities cause this.
+
+    which : indices into `NormalProblem.candidates`, the asperities that could touch
+    """
 
     reason: str
     which: Indices
@@ -77,16 +80,18 @@ class Level:
     """A normal solution near computed loads, as balls in scaled units.
 
     All arrays are (n,), for the asperities of `problem`. The level of a stack of m problems has one
-    row for each: arrays are (m, n) or, if they hold one number per problem, (m, 1).
+    row for each: arrays are (m, n) or, if they hold one number per problem, (m, 1). Where nothing
+    is proved, the radii of the balls are infinite, except that of a prescribed approach.
 
     loads, indentation : P_i and n_i;  approach : () D0
     open      : (n,) True where an asperity is proved to have a gap
     trial     : the loads from which the solution was proved, and their residuals; None at L = 0
     box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
-        L = 0. Where nothing is proved, the radii of the balls are infinite
+        L = 0
     distance  : bound on the norm of P - P* for the loads P of `trial` and the solution P*; the
         square of the norm is sum_i h_i (P_i - P*_i)^2
-    compliance : (n,) h of this norm, the diagonal of H for a smaller box
+    compliance : (n,) the h_i of this norm: the local compliance at the upper ends of a second,
+        smaller box, which also contains the solution
     obstacle  : the reason why nothing is proved, or None
     """
 
@@ -103,10 +108,13 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, obstacle: Obstacle) -> Level:
-        """A level of loads near which nothing is proved; a prescribed approach is still known."""
+        """The level for loads near which no solution is proved: all radii are infinite, except that
+        of a prescribed approach.
+        """
         loads = Ball.around(state.loads, np.inf)
         indentation = Ball.around(state.indentation.mid, np.inf)
-        approach = Ball.around(state.approach.mid, np.inf if problem.by_load else 0.0)
+        error = np.inf if problem.by_load else state.approach.radius
+        approach = Ball.around(state.approach.mid, error)
         none = np.zeros(len(problem), dtype=bool)
         return cls(problem, loads, indentation, approach, none, state, obstacle=obstacle)
 
@@ -132,7 +140,8 @@ class Level:
     def load(self) -> Ball:
         """() the total load L; if it is not prescribed, with an error bound by Cauchy's inequality.
 
-        Where nothing is proved it is the sum of the computed loads.
+        Where nothing is proved, the ball is around the sum of the computed loads, and its radius
+        bounds only rounding errors.
         """
         if self.problem.by_load:
             return self.problem.control
@@ -145,7 +154,10 @@ class Level:
         return Ball.around(total.mid, total.radius + np.reshape(spread, total.shape))
 
     def row(self, k: int, problem: NormalProblem) -> Level:
-        """The level in row k of a stack, for the problem of this row, in a box of all rows."""
+        """The level in row k of a stack; `box` is the one that all rows share.
+
+        problem : the problem of this row
+        """
         it = self.trial
         assert it is not None
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
@@ -162,12 +174,19 @@ class Level:
         return Rows(load, self.approach[:, 0], *known)
 
     def moves(self, coupling: Coupling) -> Any:
-        """(m,) bounds on |A P - A P*| at the m points to which `coupling` maps loads."""
+        """(m,) bounds on the errors |A P - A P*| of the displacements at m points.
+
+        A is here the map `coupling` from loads to the displacements at these points, and P are the
+        loads of `trial`.
+        """
         if self.box is None or self.trial is None:
             return np.inf
-        missing = self.trial.missing.size * self.problem.largest_entry
+        # `distance` is that of (1 + t) P, which has the total L; t P is bounded in the same norm.
+        P, inside = self.trial.loads.high, self.trial.inside
+        t = self.trial.missing.size / (summed(P) or 1.0) * (1 + SAFETY)
+        moved = t * np.sqrt(self.compliance[inside] @ P[inside] ** 2) * (1 + SAFETY)
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
-        return (self.distance * reach + missing) * (1 + SAFETY)
+        return (self.distance + moved) * reach * (1 + SAFETY)
 
     @cached_property
     def energy(self) -> Ball:
@@ -223,7 +242,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and beta; with it the mean, weighted by c, is 0."""
+            """x / c + A x - right - beta, and the beta for which its mean, weighted by c, is 0."""
             above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
@@ -274,8 +293,8 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Three bounds: on the residual once j carries the missing part of x, on that part, and
-            on the displacements by it and by `others`.
+            """Three bounds: on the residual after asperity j has taken up the part of the total
+            that x misses, on this part, and on the displacements by it and by `others`.
 
             others : bound on the sum of |x| over asperities not proved to touch or be open
             """

@@ -35,7 +35,7 @@ STEPS = 30
 #: indentations. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: Largest size of an array (rows, asperities), because dozens of them are in use at once.
+#: Largest size of an array (rows, asperities), because dozens of such arrays are in use at once.
 NUMBERS = 2**17
 
 quietly = np.errstate(all="ignore")
@@ -135,9 +135,10 @@ def _key(load: Ball) -> tuple[float, float, float]:
 def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
     """The solutions of all rows, and (m,) True for rows that are proved; others have no meaning.
 
-    A proved row is accurate, with the status of every asperity proved.
+    In a row that counts as proved, the residual is also near its rounding error, and the status of
+    every asperity is proved.
 
-    box : default `widest`
+    box : one box for all rows; default: a box for each row, by `widest`
     """
     loads = pressed(stack)
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
@@ -166,7 +167,10 @@ def pressed(stack: Stack) -> Array:
 
 
 def widest(stack: Stack, state: Trial) -> Box:
-    """Boxes that contain every solution and these loads; the shells give their convexity."""
+    """For each row the box that contains every solution and the loads of `state`.
+
+    The shells give its convexity number.
+    """
     highest = stack.control.upper
     if stack.by_load:
         given = stack.coefficients, stack.exact.offsets.lower, highest

@@ -18,7 +18,7 @@ from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
 #: In `all_that_could_touch` a scene extends to at least LEAST_REACH contact radii of a smooth body.
-#: The approach is bounded on a scene whose radius is WIDER times as large.
+#: If the weights are 0 beyond, the approach is bounded on a scene with a radius WIDER times this.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -130,7 +130,11 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] loads of this total by Hertz's law, for the displacement by a smooth sphere."""
+    """(n,) [force] estimated loads with the total `load`.
+
+    From each offset the displacement by a smooth sphere under this load is subtracted. Hertz's law
+    gives the loads at these indentations plus one number, which is chosen to fit the total.
+    """
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
@@ -140,7 +144,7 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
     """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    Other shapes are replaced by a sphere of mean curvature; under a flat it is 0.
+    Other shapes are replaced by a sphere of mean curvature. Under a flat the result is 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)
@@ -160,7 +164,7 @@ def all_that_could_touch(
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
     A bound found on a wide scene also holds for a narrower scene that contains all asperities with
-    a nonzero weight: (2) of docs/theory/certificate.md is then the same sum with the same lambda.
+    a nonzero weight: in (2) of docs/theory/certificate.md the sum and lambda are then the same.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

@@ -37,8 +37,9 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: If no load changes by more than this part of the largest one, A P is updated by a product of A
-#: with the changes in float64, and keeps 29 digits.
+#: If a matrix is stored, and no load changes by more than this part of the largest one, A P is
+#: updated by a product of A with the changes in float64, and keeps 29 digits. Without a stored
+#: matrix A P is always updated in this way.
 NEARBY = 1e-13
 
 #: 1 / pi to 66 digits.
@@ -67,7 +68,7 @@ class Units:
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
-        """Units of the size of `approach` [length] and of the load whose indentation it is.
+        """Units of about the size of `approach` [length] and of the load with this indentation.
 
         coefficient : k of Hertz's law, indentation = k load^(2/3)
 
@@ -168,7 +169,10 @@ class NormalProblem:
         return Ball.exact(given) if self.exact_control is None else self.exact_control
 
     def at_load(self, load: Ball) -> NormalProblem:
-        """The problem of the same asperities under a load that needs at most `approach_bound`."""
+        """The problem of the same asperities under a total load.
+
+        The approach under this load must be at most `approach_bound`.
+        """
         return self._like(approach=None, load=float(load.value), exact_control=load)
 
     def at_approach(self, approach: Ball) -> NormalProblem:
@@ -216,7 +220,8 @@ class NormalProblem:
         slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta), to be reduced to 0
         enough : fraction of the defect that the step may leave;  todo : for `Stack.correct` only
 
-        If `influence.cheap_sums`, asperities with slope and defect 0 are left out to save time.
+        If `Influence.cheap_sums` is True, asperities with slope and defect 0 are left out to save
+        time.
         """
         some, influence = np.arange(len(self)), self.influence
         if influence.cheap_sums:

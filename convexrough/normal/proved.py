@@ -28,7 +28,7 @@ from convexrough.roundoff import SAFETY
 #: of the next box, divided by the latest error bounds. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: Relative error of a load above which it is also bounded through the indentation.
+#: If the relative error of a load is above this, the load is also bounded through the indentation.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -40,10 +40,13 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:
-    """The solution in the first box that is proved to hold it, or else a level with an obstacle.
+    """The `Level` of the solution in the first box that is proved to contain it.
 
-    boxes : default: those of `normal.boxes.tried`, and if none of these succeeds, boxes in which
-        all candidates without a load are fixed open
+    If there is none, an unproved level whose `obstacle` says why.
+
+    boxes : default: those of `normal.boxes.tried`. If none of these succeeds, boxes in which the
+        asperities without a load are assumed to be open; later attempts drop this assumption for
+        those whose gaps are not proved
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -76,9 +79,9 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
 def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
     """The solution near the trial loads, by the theorem on the box and then on a smaller box.
 
-    Three results: True if it is proved that the box contains the solution, else nothing is proved
-    ((m,) for a stack); (n,) the bounds on the errors of the trial loads that hold if it is True;
-    and the level that is then proved.
+    Three results. First, whether it is proved that the box contains the solution; (m,) for a stack.
+    If not, the other two prove nothing. Second, (n,) bounds on the errors of the trial loads, by
+    the theorem on the box. Third, the level, by the theorem on the smaller box.
     """
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
@@ -109,7 +112,7 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
 class _Missing(NamedTuple):
     """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
-    docs/theory/one-theorem.md derives it. (1 + t) P has the prescribed total.
+    docs/theory/one-theorem.md derives them. The loads (1 + t) P have the prescribed total.
 
     loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
         from P to (1 + t) P; 0 if P has this total
@@ -134,7 +137,10 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The balls of the loads; an inexact one is replaced by (indentation / k)^(3/2) if smaller."""
+    """The balls of the loads.
+
+    For an inexact load this is the ball of (indentation / k)^(3/2), if that is smaller.
+    """
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
     return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)

@@ -3,9 +3,9 @@
 Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
 one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
 
-The residual  k P^(2/3) + A P - d - D0  of loads P known as pairs is a ball, whose radius bounds
-the errors of the data, the product and the arithmetic. A correction is one step of
-docs/theory/newton.md in float64.
+The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0  is a
+ball, whose radius bounds the errors of the data, the product and the arithmetic. A correction is
+one step of docs/theory/newton.md in float64.
 """
 
 from __future__ import annotations

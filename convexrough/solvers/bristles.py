@@ -9,15 +9,15 @@ have the stiffness 2 E* per length, and the bristle at x touches at the indentat
 with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
 cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
-In scaled units let B_i be the load at which the contact radius of asperity i is b_i. There its
-indentation is d_i = k B_i^(2/3) and its compliance h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let
-phi_ij / m be the force on cell j:
+In scaled units let B_i be the load at which the contact radius of asperity i is b_i. Under this
+load its indentation is d_i = k B_i^(2/3) and its compliance h_i = (2/3) k B_i^(-1/3) =
+1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
-At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise its error is
-at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
+At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise the error of
+P is at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
 
 Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator A
 and prescribed displacements D,
@@ -28,8 +28,9 @@ and prescribed displacements D,
 For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
 the contact energy at the upper ends of the box P <= B. First B are the a priori bounds on the
 loads. If a Cholesky factorisation does not find A + diag(h) positive definite there, the box is cut
-at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. There the shell
-lemma of docs/theory/convexity.md proves definiteness. An answer on a cut face is refused.
+at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the cut box
+the shell lemma of docs/theory/convexity.md proves definiteness. An answer with a load at an upper
+end that was cut is refused.
 """
 
 from __future__ import annotations

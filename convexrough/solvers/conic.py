@@ -59,8 +59,8 @@ class TooDenseError(InputError):
     """Some asperities have contact radii too large for a convex program: a_i > (pi/2) s_i.
 
     asperities : (m,) the indices of these asperities in the scene
-    ratios     : (m,) an estimate of the contact radius that each would need, divided by (pi/2) s_i;
-        s_i is half the distance to the nearest neighbour
+    ratios     : (m,) an estimate of the contact radius that each would have if its box did not
+        limit its load, divided by (pi/2) s_i; s_i is half the distance to the nearest neighbour
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -84,7 +84,8 @@ class ConeBoxes:
     members : (m,) the asperities in the program, as indices into `problem.candidates`
     loads   : (m,) B_i, upper ends of the boxes
     S       : (m,) convexity numbers of the boxes
-    cut     : (m,) True where B_i is below the a priori bound
+    cut     : (m,) True where B_i is below the a priori bound, the load that the asperity would
+        carry alone (`NormalProblem.bounds`)
     five    : True for the form with five cones per asperity, False for four
     limit   : largest S for which this form is exact
     """
@@ -121,7 +122,10 @@ class ConeBoxes:
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The error that names the members with `pressed` > 0; `pressed` (m,) gives `ratios`."""
+        """The `TooDenseError` for the members with `pressed` > 0.
+
+        pressed : (m,) the `ratios` of these members, and 0 for all others
+        """
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -308,8 +312,8 @@ class LiftedProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity these
-    stand for powers of t = (p / B)^(1/3), where B ends the box: t^2 to t^5, and t^5 - t^6. The form
-    with five cones, for larger boxes, also has y1 for t, before y2.
+    stand for powers of t = (p / B)^(1/3), where B is the upper end of the box: t^2 to t^5, and
+    t^5 - t^6. The form with five cones, for larger boxes, also has y1 for t, before y2.
     """
 
     problem: NormalProblem

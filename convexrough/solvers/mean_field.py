@@ -2,9 +2,10 @@
 
 Asperities are grouped in rings about the axis. In the approximation, the loads of all rings cause
 the same displacement w at all asperities of a ring. Their indentations are D - w with
-D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). The matrix K
-contains the displacement of each ring by a unit load spread evenly over each ring. Newton's method
-solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, here for any heights, radii).
+D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). K_rs is the
+displacement of ring r by a unit load that is spread evenly over ring s, without the displacement of
+an asperity by its own load. Newton's method solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech.
+34 (1967) 153, here for any heights and radii).
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ RINGS, LEAST = 128, 150
 #: Approximate size of the evenly spaced sample of asperities that is used.
 SAMPLE = 50_000
 
-#: If the load of a ring is spread evenly, this includes an asperity's own load, spread over its
-#: share of the area. The displacement by this part, to be subtracted, is OWN_SHARE times that by a
-#: uniformly loaded disc of the same area. Ewald's sums give 1.1002 for square and 1.1061 for
-#: hexagonal arrays; for other layouts the value is a heuristic.
+#: The evenly spread load of a ring includes each asperity's own load, spread over the asperity's
+#: share of the area. The displacement of the asperity by this part must be subtracted. It is
+#: OWN_SHARE times the displacement of the centre of a uniformly loaded disc of the same area.
+#: Ewald's sums give 1.1002 for square and 1.1061 for hexagonal arrays; for other layouts the value
+#: is a heuristic.
 OWN_SHARE = 1.10
 
 

@@ -31,14 +31,14 @@ from convexrough.sphere import hertz
 NEGLIGIBLE = 88 * ROUNDOFF
 
 #: If at most so many asperities could touch, the iteration includes all, and the start uses a
-#: product with A. It affects speed only.
+#: product with A. This number affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
 ACCURATE = 1e-12
 
-#: Asperities are near the contact if their gap is at most this part of the largest D_i. It affects
-#: speed only.
+#: Asperities are near the contact if their gap is at most this part of the largest D_i. This number
+#: affects speed only.
 MARGIN = 0.03
 
 
@@ -56,7 +56,10 @@ class Pressing:
     unit: ClassVar[str] = "the approach"
 
     def evaluate(self, unknown: Array) -> newton.Iterate | None:
-        """The state with loads of the prescribed total, `Pressed`; None if none is positive."""
+        """The state by `Pressed.at`, whose loads have the total if one is prescribed.
+
+        None if a total is prescribed and no indentation is positive.
+        """
         problem, total = self.problem, 0.0
         if problem.approach is not None:
             unknown = np.minimum(unknown, problem.approach + problem.offsets)

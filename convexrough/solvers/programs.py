@@ -94,7 +94,7 @@ class RawAnswer(NamedTuple):
 
 
 class ProgramAnswer(NamedTuple):
-    """The answer to a `NormalProblem`, from that to its program, not yet checked."""
+    """The answer to a `NormalProblem`, converted from the answer to its program; not checked."""
 
     loads: Array  # of the asperities in the program, in the order and units of the problem
     approach: float  # prescribed, or from the multiplier of the total load

@@ -62,8 +62,9 @@ def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> 
 def load_ratio(ratio: Number) -> Number:
     """The load of an ellipsoid over that of the sphere of radius sqrt(Rx Ry) at the same approach.
 
-    From `semi_axes` and `approach` P = pi E* sqrt(Rx R_D) (delta / (1.5 R_F))^(3/2), and from Hertz
-    P = (4/3) E* (Rx Ry)^(1/4) delta^(3/2) for the sphere.
+    From `semi_axes` and `approach` P = pi E* sqrt(Rx R_D) (delta / (1.5 R_F))^(3/2) with
+    R_D(0, q^2, 1), R_F(0, 1, q^2) and q = b / a. From Hertz P = (4/3) E* (Rx Ry)^(1/4) delta^(3/2)
+    for the sphere.
 
     ratio : Rx / Ry >= 1
     """

@@ -14,7 +14,8 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and relative size of a last step.
+#: Largest number of Gauss-Newton steps to the best sphere, and relative size of a step that is the
+#: last one.
 STEPS, ENOUGH = 50, 1e-12
 
 #: Terms of a form are too alike on the measured pixels if the least eigenvalue of the matrix of
@@ -64,8 +65,9 @@ class Removed:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The form of this kind that fits best by least squares, and (ny, nx) its heights.
 
-    Holes (nan) do not count; the form is nan there. docs/theory/surfaces.md, "Removing the form".
-    The code divides lengths by half the map's size.
+    The form is fitted to the pixels that are not holes (nan), and is nan in the holes. For the
+    method see docs/theory/surfaces.md, "Removing the form". The code divides lengths by about half
+    the longer side of the map.
 
     Raises InputError if no sphere fits, or if the heights do not determine the form.
     """

@@ -1,6 +1,7 @@
 """The hills of a map, with positions and prominences of their maxima.
 
-docs/theory/surfaces.md, "Pruning". The rank of a pixel is its place in ascending order of heights.
+A hill consists of all pixels whose steepest way up ends at the same maximum. The rank of a pixel is
+its place in ascending order of heights. For the method see docs/theory/surfaces.md, "Pruning".
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    They are edges of the spanning tree (Kruskal) with the highest crossings between hills.
+    The passes are edges of the spanning tree that joins the hills over the highest crossings
+    (Kruskal's algorithm).
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
@@ -95,7 +97,10 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """For pairs of neighbouring pixels of two hills: smaller and larger hill, and lower rank."""
+    """For each pair of neighbouring pixels of two hills: the numbers of the hills, and a rank.
+
+    The smaller number is first. The rank is that of the lower pixel.
+    """
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]
     there = np.s_[down:, max(0, right) : columns - max(0, -right)]

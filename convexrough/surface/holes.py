@@ -19,15 +19,16 @@ KNOWN, OUTSIDE = -1, -2
 OUTLYING = 6.0
 
 
-#: About this many pixels are a sample, in which frequent heights are looked for.
+#: About this many pixels form the sample in which `repeated` counts heights.
 SAMPLE = 2**17
 
 
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
 
-    A similar neighbour differs by at most half of the outlier's distance from the median. Holes
-    (nan) are neither outlying nor similar.
+    A pixel is outlying if its height differs from the median by more than OUTLYING standard
+    deviations. A neighbour is similar if its height differs from that of the pixel by less than
+    half of this difference. Holes (nan) are neither outlying nor similar.
     """
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
@@ -43,8 +44,8 @@ def spikes(heights: Array) -> Indices:
 def clipped(heights: Array) -> int:
     """The number of pixels with the largest height if these are surprisingly many, else 0.
 
-    Many means at least ten, and more than all other pixels whose heights are at most 1 % of the
-    range below the largest height, or equal the second largest height.
+    They are many if there are at least ten, and more than all other pixels together whose heights
+    are at most 1 % of the range below the largest height, or equal the second largest height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -82,9 +83,9 @@ def copied(heights: Array) -> float:
 
 
 def filled(heights: Array) -> Array:
-    """The map with each hole (nan) filled, so that it is the mean of its neighbours.
+    """The map with holes (nan) filled; each is the mean of the pixels with which it shares a side.
 
-    No filled pixel becomes a summit. At least one pixel must not be a hole.
+    So no filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:

@@ -61,7 +61,10 @@ class Moments(Record):
 
 
 def moments_of(heights: Array, pixel: tuple[float, float]) -> Moments:
-    """The moments, from differences of neighbours. These underestimate waves of a few pixels."""
+    """The moments, from differences of neighbours.
+
+    Differences underestimate slopes and curvatures of waves that are only a few pixels long.
+    """
     across = [(1, pixel[0]), (0, pixel[1])]
     slopes = [np.mean((np.diff(heights, axis=axis) / step) ** 2) for axis, step in across]
     bends = [np.mean((np.diff(heights, 2, axis=axis) / step**2) ** 2) for axis, step in across]

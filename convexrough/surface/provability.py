@@ -1,9 +1,9 @@
-"""The choice of the pruning: proofs of the contact, and errors of its model, against pruning.
+"""The choice of the pruning: how proofs of the contact, and errors of its model, depend on it.
 
-Pruning removes hills of small prominence. With weak pruning many summits are close to others. If
-the contacts of two summits overlap they are really one contact, which the model of point forces
-does not describe. Crowded summits also make the energy nonconvex, so that the solution cannot be
-proved.
+Pruning removes hills of small prominence (height of the maximum above the highest pass to a taller
+one). With weak pruning many summits are close to others. If the contact discs of two summits
+overlap, the two are really one contact, which the model of point forces does not describe. Crowded
+summits can also make the energy nonconvex, and then the solution cannot be proved.
 """
 
 from __future__ import annotations
@@ -37,9 +37,10 @@ Press = Callable[[Asperities], Contact]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Provability(Table, Plottable):
-    """Contacts with increasing pruning. Arrays are (m,), with a value for each pruning.
+    """Contacts of the summits that are left at m prunings, the weakest first. Arrays are (m,).
 
-    prune, heights : least prominence of a hill, as a fraction of Sz and as a [length]
+    prune, heights : least prominence of a hill that is not removed, as a fraction of the height Sz
+        of the map and as a [length]
     summits, contacts, undecided : numbers of summits, of summits that touch, and of undecided ones
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found

@@ -33,8 +33,9 @@ TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 #: Names that the array of heights may have in an .npz file with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
-#: Names that say in an .npz or .mat file what its heights and pixels are, and parts of names that
-#: probably do, also if they are those of texts or of vectors.
+#: STATED: arrays of an .npz or .mat file that state the pixel and the units. SCALES: parts of names
+#: of arrays that probably change the meaning of the heights; even texts and vectors with such names
+#: are an error.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
@@ -43,9 +44,9 @@ SCALES = re.compile(
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
 
-#: Possible marks of holes are MARKS, numbers of at least the size HUGE, and the largest and the
-#: smallest number. They mark holes if they differ from the median of the other heights by more than
-#: FAR times the range of the other heights.
+#: Possible marks of holes are MARKS, numbers whose absolute value is at least HUGE, and the largest
+#: and the smallest number. They mark holes if they differ from the median of the other heights by
+#: more than FAR times the range of the other heights.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Two pixel sizes count as equal up to this relative difference.
@@ -59,7 +60,8 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
-#: A unit of length anywhere in a comment ("um" is also a German word), and words before a scale.
+#: A unit of length anywhere in a comment ("um" is also a German word), and words that announce a
+#: scale.
 _UNIT = re.compile(
     r"(?<![^\W\d])(?:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)(?!\w)"
     r"|(?:[\d(\[,:=]|\bin)\s*um(?!\w)|纳米|微米|毫米",
@@ -99,18 +101,21 @@ def read(
     """The surface in a file: .npy, .npz, .mat, text, or a format that SurfaceTopography reads.
 
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
-    unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
-        different unit in the file is an error. Heights in another known unit are converted
+    unit   : unit of the pixel; optional, because the file may state it, or no unit may be known
+    height_unit : unit of the heights; by default that of the pixel. It is an error if `unit` or
+        `height_unit` differs from what the file states. Heights whose unit is not that of the pixel
+        are converted to the unit of the pixel
     detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None: none
     fill   : True to fill holes with a harmonic function, after the form is fitted to other pixels;
         else holes are an error. Holes are nan, masked, BAD in text, and marks such as -9999 or 1e38
         far from all heights
 
-    An .npz or .mat file contains `heights`, and may contain `unit`, `height_unit`, and `pixel` or x
-    and y, of columns and rows or of each height; other numbers that could change the meaning of the
-    heights are refused. Text contains a matrix, possibly with Gwyddion's comments on its size. A
-    matrix with three columns is a list of x, y and height on a grid. Formats of instruments need
-    the extra `surface`.
+    An .npz or .mat file contains `heights`. It may also contain `unit`, `height_unit`, `pixel`, and
+    coordinates x and y: x of each column and y of each row, or both for each height. Other numbers
+    that could change the meaning of the heights are an error. Text contains a matrix, possibly with
+    the comments on its size that Gwyddion writes. A matrix with three columns is a list of x,
+    y and height on a grid. Formats of instruments need the package SurfaceTopography (the extra
+    `surface`).
 
     Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
     InputError if the file contains no usable map.
@@ -154,7 +159,10 @@ def read(
 def _pixel(
     found: tuple[float, float] | None, given: float | tuple[float, float] | None
 ) -> tuple[float, float]:
-    """The pixel in the file or, if it states none, the given one."""
+    """The pixel in the file or, if it states none, the given one.
+
+    Raises InputError if the two differ, or if there is none.
+    """
     if (known := found if given is None else given) is None:
         expected = "its size, which the file does not state: pixel=, or --pixel"
         raise InputError("pixel", found="none", expected=expected)
@@ -279,7 +287,7 @@ def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
 
 
 def _even(line: Array) -> bool:
-    """True for numbers at equal distances, up to rounding to six digits."""
+    """True for numbers at equal distances, if they may be rounded to six digits."""
     steps, size = np.diff(line), float(np.abs(line).max())
     return bool(
         len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
@@ -368,7 +376,7 @@ def _chosen(found: dict[str, NDArray[Any]]) -> str:
 
 
 def _placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """`_on_grid` for coordinates of columns and rows, or of each height."""
+    """The result of `_on_grid`, for x of each column and y of each row, or both of each height."""
     vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
     shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
     if heights.shape != shape or not (vectors or y.shape == shape):
@@ -409,7 +417,7 @@ def _on_grid(x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
 
 
 def steps(name: str, values: Array) -> tuple[Indices, float]:
-    """For coordinates in a list: the number of the grid line of each, and the lines' spacing."""
+    """The index, from 0, of each coordinate's grid line, and the distance between grid lines."""
     levels = np.unique(values)
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:

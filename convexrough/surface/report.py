@@ -47,7 +47,7 @@ UNLIKE = 0.2
 class Scanned:
     """A surface, all summits, those left by pruning, and the result of pressing these.
 
-    curve   : contacts against pruning; None if nothing was pressed
+    curve   : contacts at several prunings; None if nothing was pressed
     contact : contact of `summits`; None if nothing was pressed or no solution was found
     whole   : the contact of the whole map by boundary elements, or None
     """
@@ -63,7 +63,7 @@ class Scanned:
     def of(
         cls, surface: Surface, prune: float, fit: int, press: Press | None, *, whole: bool = False
     ) -> Scanned:
-        """The summits of a surface; `press` presses them, and `whole` asks for the whole map."""
+        """The summits of a surface, pressed by `press`; with `whole` also the whole map."""
         LOGGER.info("finding summits")
         maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
         if press is None:
@@ -185,7 +185,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
 
 
 def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
-    """The line on the radius that presses, if a curved form was removed from the map."""
+    """The line on the radius of the pressing sphere, if a curved form was removed from the map."""
     curvature = sum(each.curvature for each in scanned.surface.removed)
     if scanned.contact is not None and curvature:
         scene = scanned.contact.scene

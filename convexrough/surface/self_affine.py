@@ -11,7 +11,7 @@ from convexrough.scene.asperities import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
-#: Default length of the shortest wave, in pixels; at this length pixels resolve tips.
+#: Default of the shortest wavelength, in pixels; at this wavelength pixels resolve tips.
 RESOLVED = 8.0
 
 
@@ -34,7 +34,7 @@ def self_affine(
     rolloff   : [length] wavelength above which the spectrum is constant
     seed      : seed of the random phases. Amplitudes are not random: all maps have equal moments
     pixels    : number of pixels per side;  pixel : [length] size of a pixel
-    cutoff    : [length] shortest wave; default 8 pixels
+    cutoff    : [length] shortest wavelength; default 8 pixels
     unit      : unit of length, as in `Surface`
 
     Maps with the same size pixels * pixel, seed and `cutoff` are the same surface with different

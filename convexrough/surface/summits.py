@@ -28,9 +28,9 @@ class Origin(Record):
     level      : [length] mean height of the map;  max_height : [length] Sz of the map
     moments    : spectral moments of the map
     prune      : least prominence of a hill, as a fraction of Sz
-    fit        : pixels across the square of a fitted paraboloid
+    fit        : number of pixels along a side of the square to which each paraboloid is fitted
     maxima     : number of pixels higher than their eight neighbours
-    pruned     : number of these that were merged into taller hills
+    pruned     : number of these maxima whose hills were merged into taller ones
     at_edge    : number left out because they are too near to the edge of the map
     without_top : number left out because their paraboloid has no top in its square
 

@@ -22,11 +22,11 @@ from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
 
-#: Largest ratio of the sides of a pixel; longer ones do not resolve summits.
+#: Largest ratio of the sides of a pixel; longer pixels do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: A trend causes a warning if it explains more than the part MOST of the variance; for this it is
-#: fitted to at most FITTED pixels along a side.
+#: A form causes a warning if it explains more than the fraction MOST of the variance of heights.
+#: For this purpose it is fitted to at most FITTED pixels along a side.
 MOST, FITTED = 0.5, 256
 
 #: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
@@ -152,8 +152,8 @@ class Surface(Record, Plottable):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on a form that explains most of the variance, and on pixels that look wrong.
 
-        Forms are fitted to at most 256 by 256 of the pixels. A spike is a pixel or a pair of pixels
-        whose height differs much from the median and from all neighbours.
+        Forms are fitted to at most 256 by 256 of the pixels. A spike is a pixel or a pair of
+        neighbouring pixels whose heights differ much from the median and from all other neighbours.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3

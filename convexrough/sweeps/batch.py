@@ -37,7 +37,10 @@ Row = tuple[str, str, list[float]]
 
 @dataclass(frozen=True)
 class Tables:
-    """Scenes of a grid over keys of a scene file at `path`, to which other paths are relative."""
+    """The scenes of a grid over keys of the scene file at `path`.
+
+    Paths in the tables are relative to the folder of this file.
+    """
 
     grid: Grid
     tables: Mapping[str, Any]
@@ -75,7 +78,7 @@ class Tables:
         return lambda number: task_of(self.path, self._study(number, last), **layouts)
 
     def _study(self, number: int, last: dict[str, Any]) -> Study:
-        """The checked tables of a scene. Scenes that differ only in the seed are checked once."""
+        """The checked tables of a scene. Consecutive scenes with equal values share one check."""
         values, seed = self.grid.point(number)
         if last.get("values") != values:
             study, mistakes = validate(with_values(self.tables, values, seed))
@@ -144,8 +147,9 @@ class Batch:
 def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     """The columns of a batch, and the versions of the packages that computed them.
 
-    No value depends on other scenes; the last bits of error bounds may, as products with matrices
-    are rounded in another way if there are more rows. A failed scene's row has the error.
+    The values of a scene do not depend on the other scenes of the batch. The last bits of its error
+    bounds may, because the rounding of matrix products depends on the number of rows. The row of a
+    failed scene contains the message of its error.
     """
     with one_thread():
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
@@ -161,7 +165,7 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
 
 
 def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
-    """The row of one scene; `known` has its numbers if the scene was computed with others."""
+    """The row of a scene; `known` has its numbers if it was computed together with others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)

@@ -14,7 +14,7 @@ from convexrough.plots.notebook import Figure
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
-#: Quantiles: the ends of the two bands, and in the middle that of the line.
+#: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 #: Combinations of other swept keys have bands of their own if there are at most this many;

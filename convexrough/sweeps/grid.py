@@ -1,4 +1,4 @@
-"""The table [sweep] of a sweep file: keys that vary, and the scenes that they give.
+"""The table [sweep] of a sweep file: keys of the scene file that vary, and the resulting scenes.
 
 Scenes are numbered as in nested loops. The outermost loop takes the k-th values of all lists in
 `together`. Inside it is one loop for each key in `over`, in their order. The innermost loop takes
@@ -151,7 +151,7 @@ class Grid(FileTable):
 
 
 def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
-    """The random value of a key for a seed, which is independent of the values of other keys.
+    """The random value of a key for a seed. It is independent of the values of other keys.
 
     "normal", and the logarithm of "lognormal", are clipped at six standard deviations.
     """
@@ -183,7 +183,7 @@ def with_values(
 
 
 def table_in(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The table of this name; {} if there is none, or something else has the name."""
+    """The table of this name; {} if there is none, or if the name is that of something else."""
     value = tables.get(name)
     return value if isinstance(value, dict) else {}
 

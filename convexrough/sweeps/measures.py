@@ -1,11 +1,13 @@
-"""The numbers that a sweep can measure: names in the summary of a run, or their last parts.
+"""The numbers that a sweep can measure.
 
-`cycle.loss` is the loss of each cycle. `loss` means the same if no earlier stage has a `loss`. A
-column is named after the number and its row: `loss_0.37` is the loss of the cycle between
-+-0.37 f P, where f P is the friction limit; `history.loss_2` is that at a history's third force.
+A number has the name that it has in the summary of a run, or the last part of this name.
+`cycle.loss` is the loss of each cycle. `loss` means the same if no earlier stage (table of results,
+such as `shear`) has a `loss`. A column is named after the number and its row: `loss_0.37` is the
+loss of the cycle between +-0.37 f P, where f P is the friction limit; `history.loss_2` is the loss
+at the third force of a history.
 
-Scenes of a batch are pressed and cycled together where possible. Each is then a row of common
-arrays. Only numbers in `NORMAL` and `CYCLE` can be measured so.
+Where possible, the contacts and cycles of a batch are computed together, with a row of common
+arrays for each scene. This gives only the numbers in `NORMAL` and `CYCLE`.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ Stages = Mapping[str, Stage]
 #: Numbers in a summary, by their name and the label of their row.
 Numbers = dict[tuple[str, str], float]
 
-#: ONSET: these quantiles of the shear forces at which loaded asperities start to slide, over f P.
+#: The number ONSET stands for these QUANTILES of the shear forces, divided by f P, at which loaded
+#: asperities start to slide.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
 #: Errors that mean that one scene failed; the others are still computed.
@@ -57,7 +60,7 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The numbers of a scene; why they are not certified, and why the model may fail, or ""."""
+    """The numbers of a scene; why they are not certified, or ""; why the model may fail, or ""."""
 
     numbers: Numbers
     doubts: str
@@ -107,7 +110,8 @@ def row_label(ends: Sequence[float]) -> str:
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
     """The columns for each name in `measures`, which stands for the first number of that name.
 
-    Raises InputError if no number has the name. Stages after the last needed one are not computed.
+    Stages after the last needed one are not computed. Raises InputError for a name that no
+    number has.
     """
     rows: dict[str, list[str]] = {}
 
@@ -149,8 +153,9 @@ def _count(status: str) -> Callable[[Found], Array]:
     return lambda found: (found["status"] == status).sum(axis=1)
 
 
-#: Numbers of summaries, computed from arrays of `Contacts` and `Cycles` and from "amplitudes" (of
-#: force), "moved" (proved displacement amplitudes), "smooth" and "scales" (losses of spheres).
+#: Numbers of summaries, computed from arrays of `Contacts` and `Cycles`, and from "amplitudes" (of
+#: force), "moved" (displacement amplitudes, nan if not proved), "scales" (the scale W0 of
+#: `Cycle.loss_normalised`) and "smooth" (losses of smooth spheres / W0).
 NORMAL: dict[str, Callable[[Found], Array]] = {
     **{name: _count(name) for name in ("contact", "open", "undecided")},
     "approach": lambda found: found["approaches"],
@@ -176,7 +181,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 
 def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
-    """The measured numbers of the scenes that are proved together, by the index of the scene."""
+    """The measured numbers of the scenes that are proved together, by the number of the scene."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}

@@ -30,16 +30,16 @@ from convexrough.threads import cores
 #: Largest number of batches submitted at a time: to an executor, and for each local process.
 AT_ONCE, EACH = 1000, 2
 
-#: The sweep ends after this many lost batches, which are batches whose worker died.
+#: The sweep ends if more than this many batches are lost: their worker died.
 MOST_LOST = 64
 
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, in order of completion.
 
-    A batch is lost if its worker dies. After all others, lost batches are computed again, one by
-    one. Raises WorkerError if a batch is lost again, if more than 64 are lost, if a worker has
-    other versions of packages, or if no worker is left.
+    A batch is lost if its worker dies. Lost batches are computed again after all others, one by
+    one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a worker
+    has other versions of packages, or if no worker is left.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []

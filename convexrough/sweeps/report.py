@@ -67,7 +67,7 @@ def failures(table: SweepTable) -> list[str]:
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """Warnings: tables with loads of their own, and the certified scenes that have a message."""
+    """Warnings about tables with loads of their own, and about certified scenes with a message."""
     own = [
         f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
         f"{name}.reference, a factor on them, with it in [sweep.together]"

@@ -195,12 +195,13 @@ def _planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for the scenes of `source`; the first that is solved shows which numbers exist.
+    """The plan for the scenes of `source`; the first solved scene shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the numbers depend, except `measures` and the version
 
-    Raises InputError for an unknown measure, and the error of the first five scenes if all fail.
+    Raises InputError for an unknown measure and, if the first five scenes all fail, the error of
+    the fifth.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):
@@ -273,15 +274,17 @@ def sweep(
         replaces the list of a sweep file
     out      : folder for the results; default: they are only returned
     executor : any executor of `concurrent.futures`; default: processes
-    workers  : number of processes; default: number of processors
-    resume   : continue an interrupted sweep in the folder;  overwrite : compute it again
+    workers  : number of processes; default: the number of cores that this process may use
+    resume   : continue an interrupted sweep in the folder;  overwrite : remove its
+        results first
     part     : (k, n): compute only the k-th of n shares of the scenes, counted from 1
 
     The table is the same, bit for bit, for any executor, any order of computation and any number of
-    interruptions. In the row of a failed scene `message` is the reason.
+    interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice while computing the same scenes, or if none is left.
+    workers died twice while computing the same scenes or died too often, if none is left, or if a
+    worker has other versions of packages.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)

@@ -1,7 +1,8 @@
 """The table of a sweep, in memory or in a folder: a manifest that never changes, and parts.
 
 A part is a Parquet file of consecutive rows, written once and named by its first scene. All parts
-have the same number of rows, so their contents do not depend on the process that computes them.
+except the last have the same number of rows, which the manifest states. So the contents of a part
+do not depend on the process that computes it.
 """
 
 from __future__ import annotations
@@ -221,8 +222,8 @@ class SweepTable(Record):
     folder    : folder of the parts; None if the table is `in_memory`
 
     The columns are `scene` (its number), the swept keys, `seed` (-1 if nothing is random), `status`
-    ("certified", "undecided" or "failed"), `message` (the reason), and the measured numbers (nan if
-    failed).
+    ("certified", "undecided" or "failed"), `message` (why the scene is not certified, and
+    warnings), and the measured numbers (nan if failed).
 
     >>> loads = [1e-7, 2e-7, 3e-7]
     >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
@@ -271,7 +272,7 @@ class SweepTable(Record):
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Some columns, by default all, of one part after the other; for large tables."""
+        """Some columns, by default all, one part at a time; for large tables."""
         self._refuse_unknown(names or ())
         if self.in_memory is not None:
             yield {name: self.in_memory[name] for name in names or self.columns}

@@ -125,7 +125,11 @@ class _Friction:
 
 
 def _direction(problem: FrictionProblem, state: newton.Iterate) -> Array:
-    """The step d(eta); if the matrix is not positive definite, the shift is added to the kernel."""
+    """The step d(eta).
+
+    If the matrix is not positive definite, the shift, a diagonal that makes the kernel positive
+    semidefinite, is added to the kernel.
+    """
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     n = len(problem)

@@ -1,15 +1,17 @@
 """The friction problem of the loaded asperities: docs/theory/vector-friction.md.
 
 Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
-in units of c_t f^2, with Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An asperity with the load P
-and the shear force u has the deflection own(u) = threshold [1 - (1 - u / P)^(2/3)], and slides
-beyond threshold = k P^(2/3). With the compliance operator A and bias = nu / (2 - nu) the tangential
-kernel is, by (1) of that page,
+in units of c_t f^2, with Poisson's ratio nu and Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An
+asperity with the load P and the shear force u has the deflection
+own(u) = threshold [1 - (1 - u / P)^(2/3)] with threshold = k P^(2/3) and Hertz's coefficient k. An
+asperity that must take up a displacement longer than threshold slides. With the compliance operator
+A and bias = nu / (2 - nu) the tangential kernel is, by (1) of that page,
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
-for the unit vector d from j to i and Poisson's ratio nu. Under the shear force Q, T = Q / f. The
-forces q_i, of size |q_i| <= P_i and sum T, and the slips satisfy, with the rigid displacement X,
+for the unit vector d from j to i. Q is the shear force, and T = Q / f. The forces q_i on the
+asperities have sizes |q_i| <= P_i and the sum T. With the rigid displacement X the forces and slips
+satisfy
 
     X = own(q_i) + (B q)_i + slip_i,   own(q) parallel to q.
 """
@@ -61,9 +63,11 @@ class FrictionProblem:
 
     Arrays are (n,), in scaled units. Raises InputError without friction.
 
-    levels   : the normal solutions of the contact
+    levels   : the `FrictionLevels` of the contact: solutions of the normal problem at loads up to
+        its own
     scope    : scope of the contact's certificate; "none" without a proof
-    touching, places : indices of the loaded asperities in the scene, and among its candidates
+    touching, places : indices of the loaded asperities in the scene, and in `levels.candidates`,
+        the asperities that may touch
     loads, errors : P, and bounds on the errors;  most : upper bounds on P
     thresholds : k P^(2/3)
     compliance : h_i = (2/3) threshold_i / P_i; the Hessian of the local energy is at least h_i I
@@ -157,7 +161,11 @@ class FrictionProblem:
         return self.levels.top.tangent.loads[self.places]
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) u and eta of `shear`, with the scalar kernel, under the shear force T [force]."""
+        """(n,) the shear forces u and the displacements eta (deflection plus slip) by the simple
+        model of `shear`, in scaled units.
+
+        height : [force] T = Q / f
+        """
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares * self.compliance
@@ -194,7 +202,11 @@ class FrictionProblem:
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) the forces q(eta) at these deflections eta; |q_i| = P_i where sliding."""
+        """(n, 2) the forces q(eta) of asperities that must take up the displacements eta by
+        deflection and slip; |q_i| = P_i where sliding.
+
+        deflections : (n, 2) eta
+        """
         _, across = self.slopes(deflections)
         return deflections * across[:, None]
 
@@ -212,9 +224,9 @@ class FrictionProblem:
     def residual(self, state: VectorState) -> float:
         """The largest relative violation of the conditions of least energy.
 
-        Relative to |X| these are the error of the equation for X (top of the module), the part of a
-        slip across its force, and slip_i (1 - |q_i| / P_i). The part of |q_i| beyond P_i is
-        relative to P_i, and the error of the total to |T|.
+        The violations are: the error of the equation for X (top of the module), the part of a slip
+        across its force, and |slip_i| (1 - |q_i| / P_i), all divided by |X|; the part of |q_i|
+        beyond P_i, divided by P_i; and the error of the total, divided by |T|.
         """
         if not np.isfinite(state.displacement).all():
             return np.inf
@@ -262,10 +274,11 @@ class FrictionProblem:
 
 
 def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) eigenvalues of dq/deta along and across eta, from scale = P/k and share = |eta|/k.
+    """(n,) eigenvalues of dq/deta along and across eta.
 
-    The force is q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - |eta|/k, 0). The second eigenvalue
-    is |q| / |eta|.
+    They follow from scale = P / threshold and share = |eta| / threshold. The force is
+    q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0). The second eigenvalue is
+    |q| / |eta|.
     """
     left = np.maximum(1.0 - share, 0.0)
     root = np.sqrt(left)

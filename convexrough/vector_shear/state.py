@@ -154,7 +154,10 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> VectorState:
-    """The solver's result, checked to be finite. The forces in a SolverError are converted."""
+    """The solver's result, checked to be finite.
+
+    The forces in a SolverError of the solver are converted to those of all asperities [force].
+    """
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
