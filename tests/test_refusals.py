@@ -55,6 +55,9 @@ def test_summits_of_a_map_stay_with_it(tmp_path: Path) -> None:
     contact = cr.press(cr.Scene(1e4, summits, MATERIAL), load=10.0)
     with pytest.raises(cr.InputError, match="contact: found summits of another map"):
         cr.surface.press_whole(cr.surface.self_affine(0.8, 0.1, 32.0, seed=2), contact)
+    for turned in (surface.heights[::-1], np.rot90(surface.heights), surface.heights.T):
+        with pytest.raises(cr.InputError, match="contact: found summits of another map"):
+            cr.surface.press_whole(cr.surface.Surface(turned, surface.pixel), contact)
     plain = cr.press(cr.Scene(1e4, rougher, MATERIAL), load=10.0)
     with pytest.raises(cr.InputError, match="contact: found asperities that are no summits of a"):
         cr.surface.press_whole(surface, plain)
@@ -62,3 +65,19 @@ def test_summits_of_a_map_stay_with_it(tmp_path: Path) -> None:
     with pytest.raises(cr.InputError, match="units: found summits in µm, expected"):
         cr.Scene(1e4, named, MATERIAL, units=("mm", "N"))
     assert len(cr.Scene(1e4, named, MATERIAL, units=("um", "N"))) == len(named)
+
+
+def test_amplitudes_that_are_masked_or_no_numbers() -> None:
+    scene = replace(cr.gallery.case("two-equal").scene, friction=0.5)
+    masked = np.ma.masked_array([1e-9, -1e-9, 3e-9], mask=[0, 0, 1])
+    for given in (
+        {"force_amplitudes": masked},
+        {"force_amplitudes": [1e-9, -1e-9, 0.0], "load_amplitudes": masked},
+    ):
+        with pytest.raises(cr.InputError, match="_amplitudes: found 1 masked"):
+            cr.shakedown(scene, loads=1e-7, **given)
+    for wrong in (None, "1e-8", [1e-8]):
+        with pytest.raises(cr.InputError, match="load_amplitude"):
+            cr.phase_losses(
+                scene, load=1e-7, load_amplitude=wrong, force_amplitude=1e-8, phases=[0.0]
+            )

@@ -110,6 +110,7 @@ class Output:
         from convexrough.run.results import results_folder
 
         given |= {"force": self.force, "formats": self.formats, "dpi": self.dpi}
+        given["command"] = click.get_current_context().info_name
         return results_folder(self.out or default, **given)
 
     def say(

@@ -157,6 +157,8 @@ def phase_losses(
     """
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
+    load_amplitude = checks.finite("load_amplitude", load_amplitude)
+    force_amplitude = checks.finite("force_amplitude", force_amplitude)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     checks.some("phases", turns)
     checks.some("factors", sizes)

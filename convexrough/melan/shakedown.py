@@ -25,7 +25,7 @@ from convexrough.friction.order import Order
 from convexrough.influence import Kind
 from convexrough.melan.program import Limit, solve
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table
+from convexrough.record import Along, Table, singular
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.vector_shear.problem import FrictionProblem
@@ -115,7 +115,8 @@ class Shakedown(Table, Plottable):
                 ("mechanism", ("vertex", "asperity", "direction")),
                 ("force_amplitudes", ("vertex", "direction")),
             ):
-                found[name] = along, found[name][1]
+                column = singular(name)
+                found[column] = along, found[column][1]
         return found
 
 
@@ -159,7 +160,7 @@ def shakedown(
         Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
     else:
         Q0 = checks.finite("forces", cast("float", forces))
-        q = checks.array("force_amplitudes", np.atleast_1d(np.asarray(force_amplitudes)))
+        q = checks.array("force_amplitudes", np.atleast_1d(np.asanyarray(force_amplitudes)))
     p = _alike("load_amplitudes", load_amplitudes, len(q))
     t0, t = Q0 / f, q / f
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
@@ -287,7 +288,7 @@ def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
 
 def _alike(what: str, values: ArrayLike, count: int) -> Array:
     """(count,) checked amplitudes; one number stands for all."""
-    given = checks.array(what, np.atleast_1d(np.asarray(values)))
+    given = checks.array(what, np.atleast_1d(np.asanyarray(values)))
     if np.ndim(values) == 0:
         return frozen(np.full(count, float(given[0])))
     if len(given) != count:

@@ -123,6 +123,8 @@ def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
     for sign in (1.0, -1.0):
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,
                   ls=DASHED)  # fmt: skip
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(style.round_ticks(5))  # the same after layout, which needs them
     style.label(
         axes, unit.label("P"), unit.short("T = Q/f" if unit.said and not unit.symbol else "T")
     )

@@ -157,13 +157,14 @@ def results_folder(
     reads: Iterable[str | Path] = (),
     formats: Sequence[str] = ("png",),
     dpi: int = 200,
+    command: str = "",
     **said: Any,
 ) -> Iterator[Writer]:
     """A temporary folder; if the body succeeds, it becomes `folder`, or its files move there.
 
-    force : accept a folder with contents
+    force : accept a folder with contents, but not with results of another command
     reads : files that the body reads; none of them may be in `folder`
-    formats, dpi : of figures
+    formats, dpi : of figures;  command : the command that writes, for `files.json`
     said  : entries of `files.json` in addition to the names of the files written
 
     Raises FileError, before the body runs, if `folder` cannot be written or replaced.
@@ -176,16 +177,19 @@ def results_folder(
         if folder.exists() and not folder.is_dir():
             raise FileExistsError(17, "File exists")
         for each in reads:
-            if Path(each).resolve().parent == folder.resolve():
+            places = {Path(each).resolve().parent, Path(each).parent.resolve()}  # of links, too
+            if folder.resolve() in places:
                 raise FileError(f"{folder}: holds {Path(each).name}, an input; name another folder")
         if folder.is_dir() and any(folder.iterdir()) and not force:
             advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")
+        if (earlier := _manifest(folder).get("command", command)) != command:
+            raise FileError(f"{folder}: holds results of `{earlier}`; name another folder")
         new.mkdir()
         try:
             yield Writer(folder, new, formats, dpi)
             names = sorted(path.name for path in new.iterdir())
-            write_text(new / MANIFEST, to_json(headed(files=names, **said)) + "\n")
+            write_text(new / MANIFEST, to_json(headed(files=names, command=command, **said)) + "\n")
             _moved(new, folder)
         finally:
             shutil.rmtree(new, ignore_errors=True)
@@ -198,20 +202,27 @@ def _moved(new: Path, folder: Path) -> None:
     if not folder.is_dir():
         os.replace(new, folder)
         return
-    for name in _earlier(folder):
-        path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
-        if path.is_file() or path.is_symlink():
-            path.unlink()
+    remove_earlier(folder)
     for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
         os.replace(path, folder / path.name)
 
 
-def _earlier(folder: Path) -> list[str]:
+def remove_earlier(folder: Path) -> None:
+    """Remove the files that `files.json` in the folder lists, and `files.json` first."""
+    files = _manifest(folder).get("files")
+    for name in [MANIFEST, *map(str, files)] if isinstance(files, list) else []:
+        path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
+        if path.is_file() or path.is_symlink():
+            path.unlink()
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    """The contents of `files.json` in the folder; empty if there is none."""
     try:
-        files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
-        return [MANIFEST, *map(str, files)]
-    except (OSError, ValueError, KeyError, TypeError):
-        return []
+        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def origin(source: SceneFile) -> Summary:

@@ -156,8 +156,8 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     checks.instance("surface", surface, Surface)
     checks.instance("contact", contact, Contact)
     origin = getattr(contact.scene.asperities, "origin", None)
-    there = (surface.unit, surface.pixel, float(surface.heights.mean()))
-    if origin is None or (origin.unit, origin.pixel, origin.level) != there:
+    there = surface.unit, surface.pixel, surface.heights.shape, surface.checksum
+    if origin is None or (origin.unit, origin.pixel, origin.shape, origin.checksum) != there:
         found = "asperities that are no summits of a map"
         if origin is not None:
             found = f"summits of another map (in {origin.unit or 'no unit'})"

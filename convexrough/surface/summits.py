@@ -26,6 +26,7 @@ class Origin(Record):
     source, pixel, unit, removed, filled : as in `Surface`
     shape      : (ny, nx) numbers of pixels
     level      : [length] mean height of the map;  max_height : [length] Sz of the map
+    checksum   : CRC-32 of the heights, which tells maps apart
     moments    : spectral moments of the map
     prune      : least prominence of a hill, as a fraction of Sz
     fit        : number of pixels along a side of the square to which each paraboloid is fitted
@@ -45,6 +46,7 @@ class Origin(Record):
     removed: tuple[Removed, ...]
     filled: int
     level: float
+    checksum: int
     max_height: float
     moments: Moments
     prune: float

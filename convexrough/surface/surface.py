@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -254,6 +255,11 @@ class Surface(Record, Plottable):
         return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
                        unit=into.name, removed=removed)  # fmt: skip
 
+    @property
+    def checksum(self) -> int:
+        """CRC-32 of the heights."""
+        return zlib.crc32(np.ascontiguousarray(self.heights).tobytes())
+
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
         """The summits of the map as asperities, in descending order of the heights of their maxima.
 
@@ -295,6 +301,7 @@ class Surface(Record, Plottable):
             removed=self.removed,
             filled=self.filled,
             level=float(self.heights.mean()),
+            checksum=self.checksum,
             max_height=self.max_height,
             moments=self.moments,
             prune=prune,

@@ -22,6 +22,7 @@ from convexrough import checks, frames
 from convexrough.atomic import to_json, write_text
 from convexrough.errors import FileError, InputError, file_errors, needed
 from convexrough.record import Record, in_text
+from convexrough.run.results import remove_earlier
 from convexrough.sweeps.batch import Columns, different
 
 if TYPE_CHECKING:
@@ -157,6 +158,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
         with file_errors(path, "hold results"):
             for part in earlier.parts():
                 earlier.file(part.start).unlink(missing_ok=True)
+            remove_earlier(path)  # of `sweep --summary`
         write_text(path / MANIFEST, to_json(manifest) + "\n")
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):

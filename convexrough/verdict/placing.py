@@ -330,7 +330,12 @@ class Placing:
             found = f"found x, y 10^{power} times as large as the scene's"
             ways = _options("scale", dict.fromkeys("xy", f"{10.0**-power:g}"))
             if any(bare(self.table.called[name]) != self.table.called[name] for name in "xy"):
-                ways = "correct their units in the header"
+                own = self.scene.units.length
+                ways = (
+                    "correct their units in the header"
+                    if own
+                    else f"{ways}, as the scene names no units"
+                )
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
     def _shifted(self, points: Array) -> str:

@@ -269,6 +269,8 @@ def test_a_solver_that_lies_does_not_move_the_limit(
     swing = np.array([[0.0, 1.0], [0.3, -0.8], [-0.6, 0.1]]) * RADIUS
     honest = melan.run_clarabel
     truth = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    assert list(truth.to_dataframe().columns)[-2:] == ["witness_x", "witness_y"]
+    assert truth.to_xarray()["force_amplitude"].shape == (3, 2)
     rng = np.random.default_rng(5)
 
     def liar(*arguments: object) -> RawAnswer:
