@@ -54,7 +54,7 @@ class Pair(NamedTuple):
 
     def __add__(self, other: object) -> Pair:
         assert isinstance(other, Pair)
-        if np.ndim(self.high) == 1 and len(self.high) > CHUNK and len(other.high) > CHUNK:
+        if np.ndim(self.high) == 1 and len(self.high) > CHUNK and np.size(other.high) > CHUNK:
             return in_parts(len(self.high), lambda some: self.at(some) + other.at(some))
         first, high_rest = two_sum(self.high, other.high)
         low, low_rest = two_sum(self.low, other.low)

@@ -111,7 +111,8 @@ class Along:
                     lost.add_loss(piece, loss)
             if displacement:
                 for level, bend in curve.bends:
-                    moved.add(level, displacement, Fraction(0), bend)
+                    if bend:
+                        moved.add(level, displacement, Fraction(0), bend)
         return lost, moved
 
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -254,8 +255,9 @@ def path_gradient(
     )
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
-    later = np.cumsum(spent[::-1])[::-1]  # a loss on one segment is part of all later losses
-    steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
+    # A loss on one segment is part of all later losses.
+    later = [*accumulate(map(Fraction, spent[::-1].tolist()))][::-1]
+    steps = [(k, later[k], Fraction(far[k])) for k in range(m)]
     along = Along.of(known, Fraction(path.start), steps, path.loads, path.forces)
     sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
     if path.load_constant and any(sliding):

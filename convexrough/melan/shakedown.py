@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -163,6 +163,8 @@ def shakedown(
         q = checks.array("force_amplitudes", np.atleast_1d(np.asanyarray(force_amplitudes)))
     p = _alike("load_amplitudes", load_amplitudes, len(q))
     t0, t = Q0 / f, q / f
+    if kind != "vector":  # exactly, as the factor can depend on small differences
+        t0, t, p = Fraction(Q0) / Fraction(f), _fractions(q) / Fraction(f), _fractions(p)
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
@@ -174,26 +176,31 @@ def shakedown(
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
     contact = press(scene, load=P0, influence=influence)
     if kind == "exact":
-        limit = _exact(contact, float(t0), p, t)
+        limit = _exact(contact, t0, p, t)
     else:
-        limit = _elastic(contact, float(t0), t) if kind == "elastic" else solve(contact, t0, t)
+        limit = _elastic(contact, t0, t) if kind == "elastic" else solve(contact, t0, t)
     arrays = {"factors": limit.factors, "witness": f * limit.witness, "mechanism": limit.mechanism}
     return Shakedown(
         scene=scene,
         kind=kind,
         **limit._asdict() | {name: frozen(values) for name, values in arrays.items()},
         load=P0,
-        force=frozen(f * t0) if kind == "vector" else float(f * t0),
-        load_amplitudes=frozen(p),
+        force=frozen(Q0) if kind == "vector" else float(Q0),
+        load_amplitudes=frozen(np.asarray(p, dtype=np.float64)),
         force_amplitudes=frozen(q),
     )
 
 
-def _exact(contact: Contact, t0: float, p: Array, t: Array) -> Limit:
+def _fractions(values: Array) -> Any:
+    """The values as an array of exact fractions."""
+    return np.array([Fraction(each) for each in values.tolist()], dtype=object)
+
+
+def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
     """The limit with partial slip; t0, t : the mean shear force and amplitudes, divided by f."""
     levels = contact.cached(FrictionLevels)
-    P0 = float(levels.load)
-    plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
+    P0 = levels.load
+    plus, minus = (-(p + t)).max(), (-(p - t)).max()
     fall = _fall(p, t)
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
@@ -205,7 +212,7 @@ def _exact(contact: Contact, t0: float, p: Array, t: Array) -> Limit:
 
         L* is the load of docs/theory/shakedown.md: what touches at L* stays stuck in part.
         """
-        return min(float(levels.load - onset) / fall if fall > 0 else np.inf, gross)
+        return float(min((P0 - onset) / fall if fall > 0 else np.inf, gross))
 
     if len(touching) <= MOST_ONSETS:
         found |= enclosed(levels, touching.tolist())
@@ -216,7 +223,7 @@ def _exact(contact: Contact, t0: float, p: Array, t: Array) -> Limit:
     order = levels.order({worst.lower, worst.upper})
     proved = order == "proved" and bool(levels.to_scene(sure.touching)[touching].all())
     lower, upper = factor(worst.upper), factor(worst.lower)
-    height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
+    height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
     rest = levels.to_scene(sure.loads.value * levels.units.force)
     return Limit(
@@ -224,44 +231,46 @@ def _exact(contact: Contact, t0: float, p: Array, t: Array) -> Limit:
         lower=lower * (1 - SAFETY) if proved else 0.0,
         upper=upper * (1 + SAFETY) if proved else np.inf,
         factors=factors,
-        gross=gross,
+        gross=float(gross),
         witness=height / (float(worst.upper) or 1.0) * rest,
         mechanism=gaps / (gaps.max() or 1.0),
         order=order,
     )
 
 
-def _fall(p: Array, t: Array) -> float:
+def _fall(p: Any, t: Any) -> Any:
     """The decrease of the load L* of `_exact` per unit of the factor.
 
     It is the mean of the maxima of -(p + t) and -(p - t), with t = q / f.
     """
-    return float((-(p + t)).max() + (-(p - t)).max()) / 2
+    return ((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
-def _elastic(contact: Contact, t0: float, t: Array) -> Limit:
+def _elastic(contact: Contact, t0: Fraction, t: Any) -> Limit:
     """Melan's limit with the scalar kernel: the least factor of all asperities and gross sliding.
 
     t0, t : the mean shear force and its (m,) amplitudes, divided by f. The elastic shares q are the
     derivatives of the normal loads by the total load.
     """
-    problem, high, low = contact.cached(FrictionProblem), float(t.max()), float(t.min())
-    unit = problem.units.force
+    problem, high, low = contact.cached(FrictionProblem), t.max(), t.min()
+    unit, total = problem.units.force, problem.levels.load
     P, q = problem.levels.top.loads[problem.places], problem.elastic
-    each = P / q * (2.0 * unit / (high - low))  # where the range of a shear force is 2 P_i
-    gross = min(
-        (contact.load - t0) / high if high > 0 else np.inf,
-        (contact.load + t0) / -low if low < 0 else np.inf,
+    each = P / q * (2.0 * unit / float(high - low))  # where the range of a shear force is 2 P_i
+    gross = float(
+        min(
+            (total - t0) / high if high > 0 else np.inf,
+            (total + t0) / -low if low < 0 else np.inf,
+        )
     )
     limits = np.abs(each.value)
     factor = min(float(limits.min()), gross)
     proved = bool(q.positive.all())  # the solution holds for positive shares only
     critical = np.arange(len(P)) == int(np.argmin(limits)) if factor < gross else np.ones(len(P))
     # The force at rest may lie from -P_i - factor q_i low to P_i - factor q_i high.
-    travelled = np.outer(factor * q.value / unit, (low, high))
+    travelled = np.outer(factor * q.value / unit, (float(low), float(high)))
     room_low, room_high = -P.value - travelled.min(axis=1), P.value - travelled.max(axis=1)
     width = room_high - room_low
-    part = (t0 / unit - room_low.sum()) / (width.sum() or 1.0)
+    part = (float(t0) / unit - room_low.sum()) / (width.sum() or 1.0)
     factors = np.full(len(contact.scene), np.nan)
     factors[problem.touching] = limits
     return Limit(

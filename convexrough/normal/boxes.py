@@ -132,6 +132,9 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
     highest = problem.overhang(loads, displacement)
     corner = np.maximum(problem.bounds(highest), loads)  # the box must hold both states
     h = problem.compliance(corner)
+    if problem.by_load and not problem.convexity_at(h) < 1:  # this bound costs more
+        corner = np.maximum(problem.bounds(min(highest, problem.approach_bound)), loads)
+        h = problem.compliance(corner)
     nowhere, none = even(np.inf, len(problem)), np.zeros(len(problem), dtype=bool)
     if (theta := problem.convexity_at(h)) < 1:
         yield Box("global", problem, corner, h, theta, nowhere, none)

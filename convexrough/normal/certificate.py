@@ -204,7 +204,9 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
         return _unproved(level, start, gaps)
     others = NO_OTHERS
     if box.scope != "global":
-        highest = problem.overhang(level.loads.value, start.product.value)
+        assert level.trial is not None
+        # The weights and their displacement must be of the same loads.
+        highest = problem.overhang(level.trial.loads.high, level.trial.product.upper)
         others = OtherSolutions.of(problem, level.loads.upper, highest)
     load_errors = _load_errors(problem, loads, level)
     moved = _apart(start.loads.high, level) + np.abs(start.loads.low)
@@ -298,7 +300,9 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
         if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
             return np.inf
-    total = float(excess @ moved) + float(start.missing.size * found.approach.size)
+    total = float(excess @ moved) + float(
+        start.missing.size * max(found.approach.size, start.approach.size)
+    )
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)
 
 

@@ -115,8 +115,10 @@ class Level:
         indentation = Ball.around(state.indentation.mid, np.inf)
         error = np.inf if problem.by_load else state.approach.radius
         approach = Ball.around(state.approach.mid, error)
-        none = np.zeros(len(problem), dtype=bool)
-        return cls(problem, loads, indentation, approach, none, state, obstacle=obstacle)
+        opened = np.zeros(len(problem), dtype=bool)
+        if problem.by_load:  # what no solution can load
+            opened = problem.exact.offsets.upper + problem.approach_bound * (1 + SAFETY) < 0
+        return cls(problem, loads, indentation, approach, opened, state, obstacle=obstacle)
 
     @classmethod
     def unloaded(cls, problem: NormalProblem) -> Level:

@@ -26,7 +26,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
 from convexrough.vector_shear.newton import FrictionNewton
-from convexrough.vector_shear.problem import FrictionProblem, VectorState
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 class FrictionSolver(Protocol):
@@ -146,7 +146,7 @@ def shear_vector(
         stick_radii=in_scene(contact.contact_radii[problem.touching] * np.cbrt(left), 1.0),
         disagreement=_disagreement(problem, state, height),
         residual=problem.residual(state),
-        duality_gap=known.excess * unit * travel,
+        duality_gap=(known.excess + _rounding(problem, state)) * unit * travel,
         certificate=_certificate(contact, problem, state, known),
         solver=solver.name,
         iterations=state.iterations,
@@ -208,6 +208,14 @@ def _times(vectors: Array, size: Array | float) -> Array:
     product = np.zeros(np.broadcast_shapes(vectors.shape, np.shape(size)))
     np.multiply(vectors, size, out=product, where=vectors != 0)
     return product
+
+
+def _rounding(problem: FrictionProblem, state: VectorState) -> float:
+    """Bound on what the rounding of the forces [force] can add to the energy."""
+    size = problem.sizes(state.increments)
+    own = along(problem.deflections(size), state.increments, size)
+    slope = np.hypot(*(own + problem.couple(state.increments)).T)
+    return float(4.0 * ROUNDOFF * (size @ slope))
 
 
 def _disagreement(problem: FrictionProblem, state: VectorState, height: Fraction) -> float:

@@ -257,3 +257,33 @@ def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
     assert smaller.certificate.meaning == "the only solution"
     larger = cr.press(bench("lattice", 20.0), approach=5e-5)
     assert larger.certificate.scope == "local"
+
+
+def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> None:
+    """Of a crowded pair far from a bank of asperities either one can touch.
+
+    The bound on the approach took the displacement of other loads than its weights.
+    """
+    sites = np.array(
+        [(i + 0.5 * j, j * np.sqrt(3) / 2) for i in range(-4, 5) for j in range(-4, 5)]
+    )
+    bank = sites[np.argsort(np.hypot(*sites.T), kind="stable")][:13]
+    material, apart, far = cr.Material(1.0, 0.3), 1e-2, 1e4
+    flat = cr.Scene(np.inf, cr.Asperities(bank, 0.4), material, geometry="summit")
+    loads = cr.press(flat, approach=1.0).loads
+    tips = (2.28 * apart) ** 2 / 0.5, (2.65 * apart) ** 2 / 0.475
+    asperities = cr.Asperities(
+        [*bank, (far, 0), (far + apart, 0), (-far, far)],
+        [0.4] * 13 + [*tips, 0.4],
+        [0.0] * 13 + [-0.5, -0.525, -1.02],
+    )
+    scene = cr.Scene(np.inf, asperities, material, geometry="summit")
+    one = np.append(loads, [4 / 3 * np.sqrt(tips[0]) * 0.5**1.5, 0, 0])
+    two = np.append(loads, [0, 4 / 3 * np.sqrt(tips[1]) * 0.475**1.5, 0])
+    total = float(one.sum())
+    poor = 0.05 * one
+    poor[-1] = 0.95 * total
+    found = [cr.certify(scene, each, load=total) for each in (poor, one, two)]
+    assert [each.scope for each in found] == ["local"] * 3
+    assert found[1].status[13] == found[2].status[14] == "contact"
+    assert found[1].status[14] == found[2].status[13] == "open"
