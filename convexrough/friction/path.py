@@ -144,10 +144,11 @@ class LoadPath(Table, Plottable):
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] the load level down to which slip has reached on the latest
-        segment along which P or Q changes; nan if nothing slips on this segment
-    status         : (m, n) for the latest segment: "stuck" (no slip), "partial" (a disc sticks),
-        "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
+    fronts         : (m,) [force] the load level down to which slip has reached at the end of the
+        latest segment along which P or Q changes; nan if nothing slips there, also if slip ended
+        on the segment because the load fell below this level
+    status         : (m, n) at the end of the latest segment: "stuck" (no slip), "partial" (a disc
+        sticks), "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
     order          : "proved": no indentation falls as the load rises, between any two total loads
         at which normal solutions are used; other values as in `Cycle`

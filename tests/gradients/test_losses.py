@@ -173,3 +173,15 @@ def test_normalised(name: str, holding: Any) -> None:
     assert slope == pytest.approx((normalised(1e-4) - normalised(-1e-4)) / 2e-4, rel=1e-4)
     errors = np.abs(gradient.height_errors).max()
     assert 0 < errors <= SHARP * np.abs(gradient.heights).max()
+
+
+def test_weights_along_a_history() -> None:
+    """Weights that cancel lose no digit; at held load the displacement has a derivative by it."""
+    contact = with_friction("paper")
+    force = 0.3 * FRICTION * contact.load
+    path = cr.history(contact, forces=[force] * 3)
+    cancelled = path.gradient(losses=[1e16 + 2, 1.0, -1e16])
+    assert cancelled.value == pytest.approx(3 * path.losses[-1], rel=1e-15)
+    moved = path.gradient(displacements=[0.0, 0.0, 1.0], holding="load")
+    once = cr.shear(contact, force=force).gradient(displacement=1.0, holding="load")
+    assert moved.load == pytest.approx(once.load, rel=1e-14)

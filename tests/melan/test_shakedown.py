@@ -1,6 +1,7 @@
 """Limits of shakedown: values of the prototypes, and histories a little below and above each."""
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import product
 from typing import Any
 
@@ -113,6 +114,16 @@ def test_a_limit_is_at_most_gross_sliding() -> None:
     assert (limit.factor, limit.limited_by) == (np.inf, None)
     swing = {"load_amplitudes": [0.1 * P, 0.0], "force_amplitudes": [0.02 * P, 0.0]}
     assert cr.shakedown(PAPER, loads=P, **swing).factor == np.inf
+
+
+@pytest.mark.parametrize("kind", ["exact", "elastic"])
+def test_bounds_near_gross_sliding_hold_for_the_given_numbers(kind: Any) -> None:
+    """The room that the mean shear force leaves is a small difference of two numbers."""
+    mean = 0.5 * P * (1 - 1e-6)
+    swing = 0.3e-6 * 0.5 * P
+    found = cr.shakedown(PAPER, loads=P, forces=mean, force_amplitudes=[swing, -swing], kind=kind)
+    exact = (Fraction(P) - 2 * Fraction(mean)) / (2 * Fraction(swing))  # f = 1/2
+    assert found.lower <= exact <= found.upper
 
 
 def test_an_asperity_that_only_opens_is_told() -> None:
