@@ -8,6 +8,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
 from levels_reference import SCENES, Holding, of_setup, pressed
+from scenes import paper
 
 import convexrough as cr
 
@@ -177,7 +178,7 @@ def test_normalised(name: str, holding: Any) -> None:
 
 def test_weights_along_a_history() -> None:
     """Weights that cancel lose no digit; at held load the displacement has a derivative by it."""
-    contact = with_friction("paper")
+    contact = cr.press(with_friction(paper()), load=3e-7)
     force = 0.3 * FRICTION * contact.load
     path = cr.history(contact, forces=[force] * 3)
     cancelled = path.gradient(losses=[1e16 + 2, 1.0, -1e16])
