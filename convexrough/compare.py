@@ -195,7 +195,9 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 
 
 def solver_named(name: str) -> solvers.Solver:
-    """The solver that scene files call by this name; for a name with a dot, `package.Class()`.
+    """The solver with this name in scene files, such as "newton".
+
+    For a name with a dot, such as "mine.Solver", an instance of that class, made without arguments.
 
     Raises InputError where there is no such solver.
     """

@@ -39,11 +39,10 @@ def compare(
     SCS and QOCO also solve the cone program if they are installed. With --solver, only the named
     solvers are compared with Newton's method.
 
-    Exit status: 0 if all results agree; 2 wrong input; 3 if a certified result
-    contradicts another that is proved to be the only solution; else 4 if a solver failed; else 3
-    if no result is certified, if a load differs from Newton's by more than --within, or if a
-    solver does not accept the scene. A contradiction would reveal a mistake in the mathematics
-    or the code.
+    Exit status, by the first case that applies: 2 if the input is wrong; 3 if a certified result
+    contradicts another that is proved to be the only solution; 4 if a solver failed; 3 if no result
+    is certified, if a load differs from Newton's by more than --within, or if a solver does not
+    accept the scene; else 0. A contradiction would reveal a mistake in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
@@ -92,7 +91,8 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
     contact law, and its dual, which bounds the energy from below. The format mps and a second npz
     (qpsolvers) contain the quadratic program of bristles (springs that together follow Hertz's
-    law). index.json gives the minimum of each program, and how to convert a solution to loads.
+    law). index.json gives the minimum of each program, the unit of its loads, and the asperities
+    that they belong to.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

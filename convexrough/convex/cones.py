@@ -2,8 +2,8 @@
 
 A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
 the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
-the four cones (1) and the five cones (2). The section "Why it is exact" gives the limits of the
-convexity number S of a box, up to which they are exact.
+the four cones (1) and the five cones (2). The section "Why it is exact" proves up to which S, the
+convexity number of a box, each form is exact: 21/25 with four cones, 1 with five.
 """
 
 from __future__ import annotations

@@ -48,19 +48,20 @@ class Certificate(Table):
     scope : "global": the scene has exactly one solution; "local": the bounds hold for one solution
         near these loads, but others are not excluded (`meaning` describes which are possible);
         "none": nothing is proved, every bound is infinite and every asperity is undecided
-    convexity_number : if below 1, the energy is strictly convex on the box of loads that was used:
-        the smallest eigenvalue of the Hessian, scaled by each asperity's local compliance, is at
-        least 1 - convexity_number
+    convexity_number : if below 1, the energy is strictly convex on the box of loads on which the
+        proof is based: the smallest eigenvalue of the Hessian, scaled by each asperity's local
+        compliance, is at least 1 - convexity_number
     codes : index of each status in `STATUSES`
     load_errors : [force] bounds on |load - solution|
     gaps : [length] gaps that remain under these loads; 0 where an asperity touches
     gap_errors : [length] bounds on |gap - solution|
     approach : [length] the prescribed approach, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
-    duality_gap : [force length] upper bound on the energy of these loads minus the least energy. It
-        is 0 up to rounding at a solution, and infinite where nothing is proved. If the total load
-        is prescribed, loads on asperities that cannot touch are first dropped, and the others
-        scaled to the total
+    duality_gap : [force length] upper bound on the energy of these loads minus that of the
+        solution, which is the least energy if the scope is "global". It is 0 up to rounding at the
+        solution. It is infinite where nothing is proved, or where the energy is not proved convex
+        between the loads and the solution. If the total load is prescribed, loads on asperities
+        that cannot touch are first dropped, and the others scaled to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
         of these asperities touches are not excluded
@@ -103,7 +104,7 @@ class Certificate(Table):
 
     @property
     def meaning(self) -> str:
-        """A sentence on the scope: which other solutions are possible.
+        """The scope in words: which other solutions are possible.
 
         >>> contact.certificate.meaning
         'the only solution'
@@ -112,7 +113,9 @@ class Certificate(Table):
             return "the only solution"
         if self.scope == "none":
             why = f": {self.obstacle}" if self.obstacle else ""
-            return f"nothing is proved because of {len(self.in_the_way):,} asperities{why}"
+            count = len(self.in_the_way)
+            which = "1 asperity" if count == 1 else f"{count:,} asperities"
+            return f"nothing is proved because of {which}{why}"
         others = []
         if self.other_solutions_cover:
             others.append("a disc that covers its nearest neighbour's summit")
@@ -122,9 +125,9 @@ class Certificate(Table):
             )
         if others:
             return f"any other solution has {' and '.join(others)}"
-        fixed_open = (
-            f" with the same {self.fixed_open:,} asperities fixed open" if self.fixed_open else ""
-        )
+        count = self.fixed_open
+        which = "asperity" if count == 1 else f"{count:,} asperities"
+        fixed_open = f" with the same {which} fixed open" if count else ""
         return f"the only solution near these loads{fixed_open}"
 
     @property
@@ -360,9 +363,9 @@ def _screened_energy(
 
 
 class OtherSolutions(NamedTuple):
-    """Properties of all solutions other than the one found, which a local certificate describes.
+    """Properties that all solutions other than the one found have; a local certificate states them.
 
-    docs/theory/crowded.md, "Other solutions", derives them; (1) is an equation of that page.
+    docs/theory/crowded.md, "Other solutions", derives them.
     """
 
     possible: bool  # False if it is proved that there are none

@@ -47,9 +47,11 @@ class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
     one, many : the singular and the plural of the term for a force in messages
-    proved    : term in messages for what the claim says of the asperities, such as "contact set"
+    proved    : what messages put before "proved", "not proved" or "wrong", such as "contact set"
     kinds     : names of the attributes that hold indices of wrong statuses, with a text on each
-    claims    : the statuses that are claimed where `claimed` is True and where it is False
+    claimed   : (n,) True where the asperity is claimed to touch or, in a verdict on shear, to slide
+    claims    : the two statuses that are thus claimed, where `claimed` is True and where it is
+        False
     within : largest error allowed, as a fraction of the largest force, and of the total
     total_prescribed : [force] None where it is not prescribed
     certificate : the certificate of the given forces
@@ -85,7 +87,7 @@ class Claim(ABC):
 
     @property
     def wrong(self) -> dict[str, Indices]:
-        """Each text in `kinds`, with the indices of the asperities that are wrong in this way."""
+        """For each text in `kinds`, the indices of the asperities to which it applies."""
         return {said: getattr(self, name) for name, said in self.kinds.items()}
 
     @abstractmethod
@@ -105,7 +107,7 @@ class Claim(ABC):
 
     @property
     def basis(self) -> str:
-        """A text: what the proof assumes, and whether this is proved; "" without an assumption."""
+        """A text: what the proof assumes, and whether that is proved; "" if it assumes nothing."""
         return ""
 
     @property

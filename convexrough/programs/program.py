@@ -173,8 +173,9 @@ def program(
 
 
 def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
-    """The problem of a scene with a dense matrix, and its loads (n,) by Newton's method, in scaled
-    units.
+    """The problem of a scene, and the loads (n,) that Newton's method finds, in scaled units.
+
+    The compliance operator of the problem is a dense matrix.
     """
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:

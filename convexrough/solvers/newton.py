@@ -2,8 +2,8 @@
 
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
-D = D0 + d of `NormalProblem`. For many asperities the iteration includes only those near the
-contact, until the others are found to be open.
+D = D0 + d of `NormalProblem`. For many asperities the iteration first includes only those near the
+contact, and adds others until all that are left out are found to be open.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ MARGIN = 0.03
 class Pressing:
     """The contact law, in the form of `convex.newton`: docs/theory/newton.md, "The normal map".
 
-    farthest : max |d_i| over all candidates, also those that `problem` leaves out
+    problem  : the asperities of the iteration, perhaps only those near the contact
+    farthest : max |d_i| over all asperities that could touch
     """
 
     problem: NormalProblem
@@ -56,9 +57,10 @@ class Pressing:
     unit: ClassVar[str] = "the approach"
 
     def evaluate(self, unknown: Array) -> newton.Iterate | None:
-        """The state by `Pressed.at`, whose loads have the total if one is prescribed.
+        """The state at `unknown`, by `Pressed.at`.
 
-        None if a total is prescribed and no indentation is positive.
+        If a total load is prescribed, the loads are scaled to it. The state is then None if no
+        indentation is positive.
         """
         problem, total = self.problem, 0.0
         if problem.approach is not None:
@@ -115,8 +117,8 @@ class Newton:
         the symbols of docs/theory/newton.md;  0 for the accuracy of float64
     max_iterations : largest number of steps; SolverError is raised if they are not enough
 
-    Once the left side is below 1e-12 (|D0| + max_i |d_i|), the method also stops if the residual is
-    small compared with the rounding of A P, or if a step does not halve the left side.
+    Once the left side, the residual, is below 1e-12 (|D0| + max_i |d_i|), the method also stops if
+    it is small compared with the rounding errors of A P, or if a step does not halve it.
     """
 
     tolerance: float = 0.0

@@ -129,6 +129,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
         most = "at most " if math.isfinite(proof[name]) else ""
         return f"{most}{bound(proof[name])} {unit_of(name, units)}".rstrip()
 
+    least = "that of the solution" if proof["scope"] == "local" else "its minimum"
     lines = [
         ("asperities", f"{normal['asperities']}{able}"),
         *((f"  {status}", f"{normal[status]:>{width}}") for status in COUNTS),
@@ -138,7 +139,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
         ("convexity number", f"{proof['convexity_number']:.4g}  (below 1 the energy is convex)"),
         ("load error", f"{known('load_error')}{relative}"),
         ("gap error", known("gap_error")),
-        ("duality gap", f"{known('duality_gap')}  (excess of the energy over its minimum)"),
+        ("duality gap", f"{known('duality_gap')}  (excess of the energy over {least})"),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
