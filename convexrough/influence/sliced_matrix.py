@@ -36,8 +36,9 @@ KEPT = 4096
 #: at most twice as many as the part, because other parts may be needed later.
 SMALL = 128
 
-#: Number of entries that are computed together and fit in the cache.
-PIECE = 2**15
+#: Number of entries that are computed together: arrays of 64 KB, which fit in the cache, and which
+#: the allocator reuses without returning them to the system.
+PIECE = 2**13
 
 #: Bound on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
 LARGEST = 2.0**300
