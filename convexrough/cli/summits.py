@@ -109,7 +109,8 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Fit each tip to a square of N by N pixels.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Remove hills less prominent than PART of the height range Sz.")  # fmt: skip
+              help="Remove hills whose prominence is below the fraction PART of the "
+                   "height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @output_options()
@@ -127,11 +128,11 @@ def summits(
     SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text file with a matrix of
     heights or three columns: x, y and height. The command can also press a sphere on the middle of
     the map: give --scene; or --radius and --approach; or --radius, --load and --modulus. It then
-    reports contacts, certificate, crowding (above 1 contact discs overlap) and model error for
-    several values of --prune, and recommends one of these values. With --whole it also computes,
-    for comparison, the contact of the whole map at the same approach, by boundary elements, one per
-    pixel. It writes summits.csv, a summary and figures. Results of a.npz go to the folder a-summits
-    unless --out names another.
+    reports contacts, certificate, crowding (a value above 1 means that contact discs overlap) and
+    model error for several values of --prune, and recommends one of these values. With --whole it
+    also computes, for comparison, the contact of the whole map at the same approach, by boundary
+    elements, one per pixel. It writes summits.csv, a summary and figures. Results of a.npz go to
+    the folder a-summits unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

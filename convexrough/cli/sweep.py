@@ -57,16 +57,16 @@ def sweep(
     resume: bool,
     part: tuple[int, int] | None,
 ) -> int:
-    """Compute every scene of a sweep file.
+    """Compute every scene of SWEEP, a scene file with a table [sweep].
 
     Results go to a folder named after the file (rough.toml: rough-sweep) unless --out names
     another. With --summary DIR in place of SWEEP the command computes no scenes, but prints
     quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
     Exit status: 0 if all computed scenes are certified; 2 if the input is wrong; 3 if a scene is
-    undecided; 4 if a scene failed, or if the sweep stopped because workers died or have other
-    versions of packages; 130 if interrupted. If the command stops early, the rows computed so far
-    are kept, and the same command with --resume computes the rest.
+    undecided; 4 if a scene failed, or if the sweep stopped because worker processes died or use
+    other versions of packages than this process; 130 if interrupted. If the command stops early,
+    the rows computed so far are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

@@ -50,9 +50,10 @@ class ScatteredInfluence:
     """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
     point_error : [length] bound on the error of each coordinate of the points
-    tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
-    tolerance   : target of the relative error of a product that is due to interpolation; the bounds
-        on the error hold whatever it is
+    tails       : (n, 2) [length] the exact points minus `points`, or None if all of these are 0;
+        see `Scene.contact_tails`
+    tolerance   : target for the relative error that interpolation causes in a product; the error
+        bounds hold for any value of it
 
     Few points, or points in dense clusters, have no mesh: their products are those of a matrix.
     """

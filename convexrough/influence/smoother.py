@@ -1,7 +1,7 @@
 """An approximate inverse of I + W A W, to precondition conjugate gradients.
 
 It is the matrix M of docs/theory/newton.md, "The preconditioner", for the compliance operator A and
-a diagonal W:  M = I - v G (1 - (1 + b A)^-1) G v.  G^2 takes means with Gaussian weights. v is
+a diagonal W:  M = I - v G (I - (I + b A)^-1) G v.  G^2 takes means with Gaussian weights. v is
 W / d^(1/2) for a local mean d of W^2, and b the median of d. The Gaussian is as wide as a window of
 cells: those of the asperities' lattice, or squares. The code computes M on blocks of m x m cells,
 smaller than a window, with the mean of A over pairs of blocks. The constants are heuristics: they
@@ -43,7 +43,7 @@ WINDOW = 8
 #: with points are at most WIDEST_GAP cells apart; larger distances are shortened to this.
 MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
-#: Lower limit of the eigenvalues of 1 + b A in the code, because A has negative ones for short
+#: Lower limit of the eigenvalues of I + b A in the code, because A has negative ones for short
 #: waves.
 LEAST = 0.2
 

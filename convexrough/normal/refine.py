@@ -1,4 +1,4 @@
-"""The contact law on balls, and Newton's method that refines loads to thirty digits.
+"""The contact law on balls, and Newton's method, which refines loads to more than float64's digits.
 
 Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
 one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
@@ -122,7 +122,11 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
 
 
 def refines(problem: NormalProblem) -> bool:
-    """True if refinement to thirty digits costs no more than the solution."""
+    """True if refinement costs no more than the solution; only then loads are refined.
+
+    It corrects the loads until the residual is about as small as the error bound of a sharp product
+    (docs/theory/operators.md). A stored matrix of more than `FEW` candidates is used without it.
+    """
     return not problem.influence.stored or len(problem) <= FEW
 
 

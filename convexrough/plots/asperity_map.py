@@ -19,8 +19,8 @@ from convexrough.plots import style
 from convexrough.plots.measure import Measure, Scale
 from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH
 
-#: From DENSE discs on, vector files contain these as pixels. From CROWDED discs on, a mosaic of
-#: coloured pixels replaces the discs.
+#: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
+#: mosaic, an image that has one colour per pixel.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.
@@ -63,11 +63,12 @@ def draw_map(
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
-    room   : (n,) [length] radii of the discs for which the square has room; default: those drawn
+    room   : (n,) [length] radii of discs that must fit into the square; default: those of the discs
+        drawn
 
-    From `CROWDED` discs on, a mosaic replaces them: a pixel has the mean colour of the asperities
-    inside it, or the colour of the nearest one if none is inside. Asperities without a disc are
-    white.
+    If there are `CROWDED` or more discs, a mosaic replaces discs and dots. A pixel has the mean
+    colour of the asperities inside it if there are several, otherwise the colour of the nearest
+    asperity, or none if that is far away. Asperities without a disc are white.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, outline = whole > 0, [length.of(axis) for axis in smooth]
@@ -106,7 +107,8 @@ def draw_values(
 ) -> ScalarMappable:
     """Draw discs in the colours of `values`, and a named colour bar; return the colours.
 
-    values : (n,), of the contact discs; or (k, n), of discs above one another
+    values : (n,), one for each contact disc; or (k, n), for k discs of each asperity, the later
+        drawn over the earlier
     radii  : (k, n) [length] radii of these discs, the largest first
     most   : the value at the end of the colours; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones

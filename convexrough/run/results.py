@@ -1,10 +1,10 @@
 """Results as a summary, a report and warnings, and the folder to which they are written.
 
-The folder is written under a temporary name and then renamed. If it exists already, the complete
-new files are moved into it one by one, `files.json` last. A folder with contents is accepted only
-with `force`. Before the move, `files.json` of the earlier run is deleted, and then the files that
-it lists. Other files stay. If the process dies while files are moved, the folder has only some of
-the new files, and no `files.json`.
+The folder is written under a temporary name and then renamed. If a folder of the final name exists
+already, the complete new files are moved into it one by one, `files.json` last. A folder with
+contents is accepted only with `force`. Before the move, `files.json` of the earlier run is deleted,
+and then the files that it lists. Other files stay. If the process dies while files are moved, the
+folder has only some of the new files, and no `files.json`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ BELOW_LIMIT = 1 - 1e-9
 
 
 def headed(**contents: Any) -> Summary:
-    """A summary of these contents, with the versions of its keys and of the package."""
+    """These contents as a summary, with the versions of its keys (`SCHEMA`) and of the package."""
     return {"schema": SCHEMA, "version": __version__, **contents}
 
 
@@ -160,14 +160,17 @@ def results_folder(
     command: str = "",
     **said: Any,
 ) -> Iterator[Writer]:
-    """A temporary folder; if the body succeeds, it becomes `folder`, or its files move there.
+    """A context manager that yields the writer of a temporary folder.
+
+    If the `with` block ends without an error, the temporary folder is renamed to `folder`; if
+    `folder` exists, the files are moved into it.
 
     force : accept a folder with contents, but not with results of another command
-    reads : files that the body reads; none of them may be in `folder`
+    reads : files that the block reads; none of them may be in `folder`
     formats, dpi : of figures;  command : the command that writes, for `files.json`
     said  : entries of `files.json` in addition to the names of the files written
 
-    Raises FileError, before the body runs, if `folder` cannot be written or replaced.
+    Raises FileError, before the block runs, if `folder` cannot be written or replaced.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
     parents = [each for each in folder.parents if not each.exists()]

@@ -283,8 +283,8 @@ def sweep(
     interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice while computing the same scenes or died too often, if none is left, or if a
-    worker has other versions of packages.
+    workers died twice while computing the same scenes, if they died too often, if no worker is
+    left, or if a worker has other versions of packages than this process.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
@@ -323,8 +323,8 @@ def run(
 ) -> tuple[SweepTable, dict[str, Any]]:
     """Compute what is missing in the table of a plan; arguments as for `sweep`.
 
-    Returns the table; and `found`, a message about rows that existed already, `computed`, the
-    number of scenes that this call computed, and the `seconds` it took.
+    Returns the table, and a dictionary: `found`, a message about rows that existed already;
+    `computed`, the number of scenes that this call computed; `seconds`, the time that it took.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)

@@ -74,7 +74,8 @@ class Reading:
     columns : names in the file, by known name;  scales : factors of the numbers
     units   : units of the scene;  convert : convert columns in other units, else refuse them
     scalable : messages may propose the options --scale and --column
-    shared  : columns that are also read from another file, so that no message proposes --scale
+    shared  : columns that are also read from another file; no message proposes --scale for them,
+        because the option would apply to both files
     alike   : columns of one quantity must have one unit, even if the scene names none
     """
 
@@ -91,7 +92,10 @@ AS_IT_IS = Reading()
 
 
 def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """The header of each known column in `given`, as NAME=COLUMN or COLUMN=NAME."""
+    """The header of each known column that `given` names.
+
+    An entry of `given` is a known name and a header, in either order.
+    """
     named = {}
     for one, other in given.items():
         name, column = (one, other) if one in known or other not in known else (other, one)
@@ -109,9 +113,9 @@ class ReadTable(NamedTuple):
     rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the columns that were not read, by header, which may be empty, or by number without
-        headers; one that `Reading.columns` calls the index is "index". A column is text if one of
-        its cells is not a number
+    others  : the columns that were not read. The key is the header, which may be empty, or the
+        number of the column (from 1) if there is no header. The column that `Reading.columns` names
+        as index has the key "index". A column is text if one of its cells is not a number
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -157,10 +161,12 @@ def read_table(
     """Columns of a file by known names. The numbers of other columns are not checked.
 
     required, optional : names of columns, all of them in `COLUMNS`
-    instead : columns that replace a required one if the file has the first of them
+    instead : for a required column, the columns that are read in its place if the file lacks it but
+        has the first of them
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
-    line : a single line of this many numbers without a header, or of more than 3, is one column
+    line : if a file without a header is one line, and has this many numbers or more than 3, it is
+        read as one column (only with `unnamed`)
     table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
