@@ -48,9 +48,10 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
-    """(...) [length] sum of both surfaces' normal displacements, relative to the distant bodies.
+    """(...) [length] sum of the normal displacements of both surfaces.
 
-    Each asperity contributes the field of its Hertz pressure.
+    The displacement of each surface is relative to distant points of its body. Each asperity
+    contributes the field of its Hertz pressure.
     """
     touching, centres, a = _discs(contact)
     R = contact.scene.relative_radii[touching]
@@ -75,12 +76,13 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 
 
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
-    """(...) [length] sum of both surfaces' displacements along x, relative to the distant bodies.
+    """(...) [length] sum of the displacements of both surfaces along x.
 
-    It adds, over the asperities, the displacement (3.91) of Johnson (1985) for both bodies. Dini
-    and Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the
-    relative displacement of the bodies. This sum only approximates it, because `shear` averages
-    compliances over directions.
+    The displacement of each surface is relative to distant points of its body. The sum is over the
+    asperities; each contributes the displacement (3.91) of Johnson (1985) for both bodies. Dini and
+    Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the relative
+    displacement of the bodies. This sum only approximates it: in `shear` the compliance between two
+    asperities is a mean over the directions in which one can lie from the other.
     """
     centres, a, shares, peaks = _sheared(state)
     material = state.contact.scene.material

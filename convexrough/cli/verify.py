@@ -112,16 +112,17 @@ def verify(
 
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
     Columns x and y, or an index, assign each row to an asperity; without them the rows are in the
-    order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
-    is a column pressure and no column load, rows are nodes or pixels. Pressure times area is added
-    to the load of the nearest asperity. The areas are in the column named area; without it, each
-    row is a pixel of a regular grid. With --out the command writes a table, a figure and
-    verdict.json.
+    order of the scene. An asperity with a positive load is claimed to touch, one with the load 0 to
+    be open. If there is a column pressure and no column load, rows are nodes or pixels. Pressure
+    times area is added to the load of the nearest asperity. The areas are in the column named area;
+    without it, each row is a pixel of a regular grid. With --out the command writes a table, a
+    figure and verdict.json.
 
-    Exit status: 0 if it is proved that exactly the claimed asperities touch, and that the errors of
-    loads, shear forces and prescribed totals are at most --within; 2 wrong input; 3 if a claim is
-    wrong or not proved, or if --proof finds no proof; 4 if the shear problem could not be solved.
-    With --explain nothing is checked, and the status is 0 if the files can be read.
+    Exit status: 0 if it is proved that exactly the claimed asperities touch (and with --shear, that
+    exactly the claimed ones slide), and that the errors of loads and shear forces, and of their
+    totals where --shear-force or the scene prescribes these, are at most --within; 2 wrong input; 3
+    if a claim is wrong or not proved, or if --proof finds no proof; 4 if the shear problem could
+    not be solved. With --explain nothing is checked, and the status is 0 if the files can be read.
     """
     import numpy as np
 

@@ -1,10 +1,10 @@
 """The memory curve: the tangential state under varying normal load, as plane geometry.
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
-after any path of (P, T) is a polygon: heights Th(s) over load levels 0 <= s <= P, from (0, 0) to
-the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes the
-polygon by the rules of docs/theory/paths.md, "The rules". The slip front is the level above which
-the segment has changed the polygon. The rules do not depend on elasticity. All numbers are exact
+after any path of (P, T) is a polygonal line: heights Th(s) over load levels 0 <= s <= P, from
+(0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes
+this line by the rules of docs/theory/paths.md, "The rules". The slip front is the level above which
+the segment has changed the line. The rules do not depend on elasticity. All numbers are exact
 fractions, so no rule rounds.
 """
 
@@ -47,12 +47,12 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Plottable):
-    """The friction state after a path, as a polygon over load levels (docs/theory/paths.md).
+    """The friction state after a path, as a polygonal line over load levels (docs/theory/paths.md).
 
     levels, heights : (m + 1,) [force] coordinates s and Th of the vertices, from the origin
     slopes : (m,) slope of each layer, between a vertex and the next
     front  : [force] level of the slip front at the end of the last segment; above it, this segment
-        has changed the polygon. None if nothing slips
+        has changed the line. None if nothing slips
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])

@@ -216,7 +216,8 @@ class Cycle(Table, Plottable):
             points. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if several asperities slide last, at the same force.
+        approach is kept constant, or if several asperities are the last to start to slide, all at
+        the same force.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")

@@ -1,15 +1,15 @@
 """Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
 
 f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. In a
-contact disc with a stick disc of radius c, the amplitude of the slip at the distance r from the
-centre is  f c_t [g + (r^2/R) h(c/r)]  with
+contact disc with a stick disc of radius c (0 if nothing sticks), the amplitude of the slip at the
+distance r from the centre is  f c_t [g + (r^2/R) h(c/r)]  with
 
     h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
 
-f c_t g is the amplitude of gross slip. It is 0 if a part of the contact disc sticks. (r^2/R) h(c/r)
-is the gap of a Hertz contact of radius c at the distance r. The formula holds inside the contact
-disc at the lowest load of the cycle. Outside this disc contact is lost in each cycle, and the slip
-is not known. The shear traction is a sum over the loads s_k at which the slope of the memory curve
+f c_t g is the amplitude of gross slip; g is 0 if a part of the disc sticks. (r^2/R) h(c/r) is the
+gap of a Hertz contact of radius c at the distance r. The formula holds inside the contact disc at
+the lowest load of the cycle. Outside this disc contact is lost in each cycle, and the slip is not
+known. The shear traction is a sum over the loads s_k at which the slope of the memory curve
 (docs/theory/paths.md) changes. b_k is the slope below s_k minus the slope above it, and a(s_k) is
 the contact radius at the load s_k:
 
@@ -47,13 +47,14 @@ class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle. Arrays are (n,), and 0 where open.
 
     status           : `Cycle.status`
-    slip_amplitudes  : [length] half the range of slip at one radius, that of the contact disc at
-        the lowest load of the cycle; nan where contact is lost in the cycle ("intermittent"),
+    slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
+        load of the cycle; nan where contact is lost in the cycle ("intermittent"),
         because slip while it is open is not known
     gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
         sticks, nan where "intermittent"
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
-        bounds on their errors. If the load varies, they are less exact than `Cycle.loss`
+        bounds on their errors. If the load varies, these losses are less exact than `Cycle.loss`;
+        see `Cycle.asperity_losses`
     mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies

@@ -66,7 +66,7 @@ Front: TypeAlias = tuple[Indices, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class OwnCurves:
-    """The memory curves of n asperities: polygons of m vertices, of which the last may be repeated.
+    """The memory curves of n asperities: polygonal lines of m vertices; the last may be repeated.
 
     coefficients : (n,) k of Hertz's law
     levels, heights : (n, m) indentations and deflections at the vertices

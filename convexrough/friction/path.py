@@ -2,10 +2,10 @@
 
 `history` does so at constant P. With the coefficient of friction f, the points of a path are
 (P, T = Q / f). The memory curve stores the friction state: the shear force that the layers of the
-contact up to the normal load s carry, divided by f, as a function of s. It is a polygon
-(docs/theory/paths.md). A level is a total load, or the normal solution at this load. Forces and
-displacements are sums over the vertices of the memory curve. Losses are sums over pieces of each
-segment; on a piece the slip front falls through one layer of the curve (`curve.Piece`).
+contact up to the normal load s carry, divided by f, as a function of s. It is a polygonal
+line (docs/theory/paths.md). A level is a total load, or the normal solution at this load. Forces
+and displacements are sums over the vertices of the memory curve. Losses are sums over pieces of
+each segment; on a piece the slip front falls through one layer of the curve (`curve.Piece`).
 
 If an indentation falls as the load rises, the memory curve does not apply: `general_step` then
 computes the states step by step (docs/theory/without-order.md), without proofs.

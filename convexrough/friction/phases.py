@@ -96,7 +96,8 @@ class PhaseLosses(Table, Plottable):
     smooth  : (c,) [force length] losses of the shape without roughness; nan if no solution of the
         smooth contact is known
     levels  : (c,) [force] L*, as in `Cycle.level`
-    sliding : (c,) number of asperities that slide or lose contact in every cycle
+    sliding : (c,) number of asperities that, on this ellipse, slide as a whole or lose contact in
+        the steady cycle
     order   : the weakest `Cycle.order` of all cycles
 
     >>> losses = cr.phase_losses(

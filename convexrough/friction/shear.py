@@ -39,8 +39,9 @@ class ShearCertificate(Table):
     scope  : scope of the certificate of the pressed contact; "none" where nothing is proved
     order  : "proved": no indentation falls as the load rises from P - Q/f to P (load P, shear force
         Q, coefficient of friction f), so statuses and bounds hold for the true state; "proved for
-        one step": they hold for the result of one general step (docs/theory/without-order.md);
-        "fails": nothing is proved
+        one step": statuses and bounds hold for the result of one general step from rest to Q
+        (docs/theory/without-order.md), which is the true state unless the deflection of some
+        asperity decreased on the way; "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
@@ -80,8 +81,8 @@ class ShearState(Table, Plottable):
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
-    displacements : [length] own deflection plus drift (here the slip), without the effect of other
-        asperities
+    displacements : [length] tangential displacement of each asperity due to its own force, plus its
+        slip; the effect of other asperities is left out
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides
 
@@ -111,7 +112,7 @@ class ShearState(Table, Plottable):
 
     @property
     def order(self) -> Order:
-        """Whether order is proved: as in `ShearCertificate`."""
+        """What is proved about order: one of the three values of `ShearCertificate.order`."""
         return self.certificate.order
 
     def gradient(
@@ -130,7 +131,8 @@ class ShearState(Table, Plottable):
             too; `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if there is no derivative. In gross sliding there is none if the approach
-        is kept constant, or if several asperities slide last, at the same force.
+        is kept constant, or if several asperities are the last to start to slide, all at the same
+        force.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")

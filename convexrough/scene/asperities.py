@@ -139,7 +139,8 @@ class Asperities(Record):
         height_std    : [length] standard deviation of heights, which are normal random numbers
         tip_radius_cv : coefficient of variation of tip radii, which are lognormal random numbers
             with the mean `tip_radius`
-        seed          : whole number that fixes the random numbers; required if any are random
+        seed          : whole number that fixes the random numbers; required if heights or tip radii
+            are random
 
         Random heights, and logarithms of random tip radii, are clipped at 6 standard deviations.
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends

@@ -62,7 +62,8 @@ class Surface(Record, Plottable):
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, for pixels with one side more than
-    ten times the other, and for unknown units.
+    ten times the other, and for a unit that is neither "" nor a unit of length such as "mm" or
+    "µm".
 
     >>> surface = cr.surface.Surface(np.random.default_rng(1).normal(size=(64, 64)), pixel=0.5)
     >>> surface.size
@@ -153,8 +154,9 @@ class Surface(Record, Plottable):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on a form that explains most of the variance, and on pixels that look wrong.
 
-        Forms are fitted to at most 256 by 256 of the pixels. A spike is a pixel or a pair of
-        neighbouring pixels whose heights differ much from the median and from all other neighbours.
+        Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: pixels,
+        or pairs of neighbouring pixels, whose heights differ much from the median height of the map
+        and from those of all other neighbours.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
