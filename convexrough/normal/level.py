@@ -253,14 +253,18 @@ class Level:
         def size_of(left: Ball) -> float:
             return float(np.sqrt(c @ left.value**2))
 
+        def known(left: Ball) -> bool:
+            """True if the residual is at most its error bound: it cannot be reduced."""
+            return size_of(left) <= float(np.sqrt(c @ left.radius**2)) < np.inf
+
         x = completed(Pair.exact(float(total.value) * weights))
         left, beta = residual(x, problem.product(x))
         size = size_of(left)
         first = max(size, size_of(right))
         for _ in range(CORRECTIONS):
-            rounding = float(np.sqrt(c @ left.radius**2))
-            if size == 0.0 or size <= rounding < np.inf:
+            if size == 0.0 or known(left):
                 break
+            rounding = float(np.sqrt(c @ left.radius**2))
             defect = np.where(touching, left.value, 0.0)
             unit = float(np.abs(defect).max())
             step = correct(
@@ -278,7 +282,7 @@ class Level:
                 x, left, beta, size = following, better, risen, now
             if not now < 0.5 * before:
                 break
-        if size > SOLVED * first:
+        if size > SOLVED * first and not known(left):
             raise SolverError(
                 "the state has no derivative: its linear system is singular, or nearly",
                 solver="response",

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
+from scenes import paper
 
 import convexrough as cr
+from convexrough.arithmetic.balls import Ball
+from convexrough.contact import levels_of
 
 #: Half a unit in the last place of the largest, and what a bound may be of it.
 ULP, BOUND = 2.0**-53, 1e-14
@@ -98,3 +101,11 @@ def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() 
     state = cr.shear(contact, force=0.25 * contact.load)
     assert state.order.startswith("proved")
     assert state.certificate.displacement_error < 1e-14 * state.displacement
+
+
+def test_a_response_to_what_is_hardly_known_is_no_failure() -> None:
+    """A right side with a large error was taken for a singular system."""
+    level = cr.press(paper(), approach=5e-5).cached(levels_of).top
+    right = Ball.around(np.linspace(0.0, 1.0, len(level.problem)), 10.0)
+    found = level.response(right, Ball.exact(0.0))
+    assert np.isfinite(found.loads.radius).all()
