@@ -6,7 +6,9 @@ marked `sample(n)` only n of its cases run, drawn anew each time; `--full` runs 
 
 import os
 import random
+import sys
 from collections import defaultdict
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -109,3 +111,11 @@ class Here(ThreadPoolExecutor):
 def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("pool", "sweep"):
         monkeypatch.setattr(f"convexrough.sweeps.{module}.Processes", Here)
+
+
+@pytest.fixture(autouse=True)
+def figures_are_closed() -> Iterator[None]:
+    """Once a test has imported pyplot, `plot` opens its figures; more than 20 cause a warning."""
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
