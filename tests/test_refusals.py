@@ -81,3 +81,11 @@ def test_amplitudes_that_are_masked_or_no_numbers() -> None:
             cr.phase_losses(
                 scene, load=1e-7, load_amplitude=wrong, force_amplitude=1e-8, phases=[0.0]
             )
+
+
+def test_maps_of_the_wrong_kind() -> None:
+    heights = np.random.default_rng(0).normal(size=(20, 20))
+    wrong = {"unit": None, "filled_pixels": np.zeros((20, 20)), "pixel": np.ones((3, 2))}
+    for name, value in wrong.items():
+        with pytest.raises(cr.InputError, match=f"^{name}: found"):
+            cr.surface.Surface(heights, **{"pixel": 1.0, name: value})

@@ -94,9 +94,17 @@ class Surface(Record, Plottable):
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
+        if not isinstance(unit, str):
+            raise InputError("unit", found=repr(unit)[:60], expected='a name, such as "µm", or ""')
         named = known_unit("unit", unit)
         object.__setattr__(self, "unit", named.name if named else "")
         object.__setattr__(self, "removed", removed)
+        if filled_pixels is not None:
+            filled_pixels = frozen(np.array(filled_pixels))
+            if filled_pixels.dtype.kind != "b" or filled_pixels.shape != self.heights.shape:
+                found = f"an array of {filled_pixels.dtype}, of shape {filled_pixels.shape}"
+                expected = f"True or False for each height, of shape {self.heights.shape}"
+                raise InputError("filled_pixels", found=found, expected=expected)
         object.__setattr__(self, "filled_pixels", filled_pixels)
         object.__setattr__(self, "source", source)
         known = self.heights if filled_pixels is None else self.heights[~filled_pixels]
@@ -339,7 +347,7 @@ def checked_pixel(pixel: ArrayLike) -> tuple[float, float]:
     """The sizes (dx, dy) of a pixel. Raises InputError if they are not valid."""
     both: Any = pixel if np.ndim(pixel) else (pixel, pixel)
     if len(both) != 2:
-        raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")
+        raise InputError("pixel", found=f"{np.size(both)} numbers", expected="one or two")
     dx, dy = (checks.positive("pixel", each) for each in both)
     if max(dx, dy) > MOST_ASPECT * min(dx, dy):
         found = f"{dx:g} by {dy:g}"
