@@ -117,7 +117,8 @@ class Level:
         approach = Ball.around(state.approach.mid, error)
         opened = np.zeros(len(problem), dtype=bool)
         if problem.by_load:  # what no solution can load
-            opened = problem.exact.offsets.upper + problem.approach_bound * (1 + SAFETY) < 0
+            highest = problem.approach_bound
+            opened = problem.exact.offsets.upper + (highest + SAFETY * abs(highest)) < 0
         return cls(problem, loads, indentation, approach, opened, state, obstacle=obstacle)
 
     @classmethod
