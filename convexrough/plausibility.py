@@ -26,9 +26,9 @@ ARRAY, ON_LATTICE = 20, 7
 #: its peak.
 CUT_OFF = 0.7
 
-#: The rim of an array consists of the farthest asperity in each of DIRECTIONS sectors. At most the
-#: part CUT_RIM of these may touch without a warning, because single tall asperities touch there.
-DIRECTIONS, CUT_RIM = 16, 0.5
+#: At most this part of the asperities at the rim of an array may touch without a warning, because
+#: single tall asperities touch there.
+CUT_RIM = 0.5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
@@ -186,24 +186,14 @@ def axis_outside(scene: Scene) -> bool:
     """True for an array of asperities that do not surround the axis of the sphere."""
     if not is_array(scene):
         return False
-    low, high = scene.asperities.positions.min(axis=0), scene.asperities.positions.max(axis=0)
+    low, high = scene.asperities.layout.corners
     outside = (low < high) & ((low >= 0) | (high <= 0))
     return any(bool(outside[axes].any()) for _, axes in scene.curved)
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """The share of the asperities at the rim, the farthest in each sector, that touch.
-
-    It is 0 if the asperities are too few for an array.
-    """
-    if not is_array(scene):
-        return 0.0
-    positions = scene.asperities.positions
-    x, y = (positions - (positions.min(axis=0) + positions.max(axis=0)) / 2).T
-    sectors = np.rint(np.arctan2(y, x) * (DIRECTIONS / (2.0 * np.pi))).astype(np.intp) % DIRECTIONS
-    outwards, farthest = np.argsort(x * x + y * y), np.full(DIRECTIONS, -1)
-    farthest[sectors[outwards]] = outwards  # in each sector the last one, the farthest, remains
-    return float(touching[farthest[farthest >= 0]].mean())
+    """The share of the asperities at the rim that touch; 0 if they are too few for an array."""
+    return float(touching[scene.asperities.layout.rim].mean()) if is_array(scene) else 0.0
 
 
 def at_the_rim(extent: float) -> str:
@@ -224,7 +214,8 @@ def array_extent(scene: Scene, load: float) -> float | None:
     if smooth is None:
         return None
     axes = smooth.semi_axes if isinstance(smooth, SmoothEllipsoid) else smooth.contact_radius
-    reached = np.abs(scene.asperities.positions).max(axis=0)
+    low, high = scene.asperities.layout.corners
+    reached = np.maximum(-low, high)
     return float((reached / axes)[reached > 0].min(initial=np.inf))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,11 +66,11 @@ class Lattice(Cached):
         given = self.basis if self.unshrunk is None else self.unshrunk
         return [[t * Fraction(x) for t, x in zip(self.shrink, row, strict=True)] for row in given]
 
-    @property
+    @cached_property
     def spacing(self) -> float:
         """[length] the shortest distance between two sites."""
         a, b = self.basis
-        return float(min(np.hypot(*vector) for vector in (a, b, a + b, a - b)))
+        return min(math.hypot(*vector) for vector in (a, b, a + b, a - b))
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:

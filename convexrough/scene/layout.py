@@ -18,6 +18,9 @@ from convexrough.scene.neighbours import refuse_coincident
 MANY = 5000
 
 
+#: The rim of points consists of the farthest one in each of this number of sectors.
+SECTORS = 16
+
 #: Bound on the distance from their sites of points made on a lattice, over the largest coordinate.
 MADE_SITE_ERROR = 16 * 2.0**-53
 
@@ -124,6 +127,21 @@ class Layout(Cached):
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]
+
+    @cached_property
+    def corners(self) -> tuple[Array, Array]:
+        """(2,) [length] the least and the largest coordinates."""
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+    @cached_property
+    def rim(self) -> Indices:
+        """Indices of the points at the rim: the farthest in each sector about the middle."""
+        low, high = self.corners
+        x, y = (self.points - (low + high) / 2).T
+        sectors = np.rint(np.arctan2(y, x) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
+        outwards, farthest = np.argsort(x * x + y * y), np.full(SECTORS, -1)
+        farthest[sectors[outwards]] = outwards  # in each sector the last one, the farthest, remains
+        return farthest[farthest >= 0]
 
     @property
     def distances(self) -> Array:

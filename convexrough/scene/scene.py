@@ -76,7 +76,7 @@ class Scene(Record):
     def __len__(self) -> int:
         return len(self.asperities)
 
-    @property
+    @cached_property
     def curved(self) -> list[tuple[float, slice]]:
         """Pairs of a finite radius [length] and the slice of the axes (0: x, 1: y) that have it."""
         return base.curved(self.sphere_radius)
