@@ -276,7 +276,9 @@ def assembled(
     influence: Kind | None = None,
     highest: float | None = None,
 ) -> NormalProblem:
-    """The problem that `press` solves; Newton's method includes all of few under a load."""
+    """The problem that `press` solves. Newton's method under a prescribed load includes all
+    asperities if these are at most `FEW`; else those that can touch are included.
+    """
     few = len(scene) <= FEW and isinstance(solver, solvers.Newton)
     if few and highest is None and load is not None:
         highest = np.inf

@@ -1,9 +1,10 @@
 """`prove`: proofs of contacts and friction states, for `convexrough.checker` or another checker.
 
 docs/theory/proof-file.md describes the files. A proof needs an argument why the energy is convex on
-a box of loads. `TrialState` computes candidates in floating point, which need not be valid: the
-checker verifies each in exact arithmetic, and if it refuses one, the next is tried.
-docs/theory/proof-file-steps.md, "Convexity on the box", defines box, shells and convexity number.
+a box of loads. `TrialState` computes possible arguments in floating point. They may be wrong, so
+the checker verifies them in exact arithmetic, one after another, until it accepts one.
+docs/theory/proof-file-steps.md defines the box and, in (2) and (3), the convexity number theta and
+the shells.
 """
 
 from __future__ import annotations
@@ -123,8 +124,8 @@ def prove(
         shear force Q [force], and the `NearState` of the contact without shear at the load P - Q/f,
         with the coefficient of friction f (docs/theory/proof-file.md)
 
-    The function runs the checker, which computes the bounds, so it takes as long as a check: about
-    a minute for 3,000 asperities.
+    The function runs the checker, which computes the bounds, so it takes as long as a check (times:
+    docs/theory/proof-file.md).
 
     Raises InputError for invalid values and for scenes too large for the checker; ProofError if no
     solution is proved, because the loads are too inaccurate or the contacts overlap too much.
@@ -300,7 +301,8 @@ class TrialState:
     def ceiling(self) -> tuple[float | None, float]:
         """`Argument.ceiling`, and an upper bound [length] on the approach of every solution.
 
-        The bound follows from the ceiling; if the approach is prescribed, they are None and D0.
+        The bound follows from the ceiling. If the approach D0 is prescribed, the ceiling is None
+        and the bound is D0.
         """
         if self.approach is not None:
             return None, self.approach

@@ -1,8 +1,8 @@
 """Balls: numbers known to within a radius. A formula evaluated on balls also gives an error bound.
 
-The midpoint of a ball is a pair of float64 numbers, the radius a float64 number. Every operation
-returns a ball that contains the result for every choice of numbers in the operands. The radius is
-infinite where nothing is known: after an overflow, or if a divisor may be 0.
+The midpoint of a ball is the sum of a pair of float64 numbers, the radius is one float64 number.
+Every operation returns a ball that contains the result for every choice of numbers in the operands.
+The radius is infinite where nothing is known: after an overflow, or if a divisor may be 0.
 """
 
 from __future__ import annotations
@@ -209,7 +209,11 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """`function` of arrays, or of the matching arrays of which pairs or balls consist."""
+    """The result of `function` on arrays.
+
+    Pairs and balls consist of several arrays: `function` is applied to the first array of all
+    values, to the second of all, and so on.
+    """
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
@@ -331,7 +335,9 @@ def _lost(result: Pair) -> Array:
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, offsets: Ball, approach: Ball) -> Ball:
-    """k P^(2/3) + v - d - D for loads P (0 if negative), displacements v and offsets d."""
+    """k P^(2/3) + v - d - D for coefficients k, loads P (0 if negative), displacements v, offsets d
+    and the approach D.
+    """
     return elementwise(_residual, k, loads, displacement, offsets, approach)
 
 

@@ -64,8 +64,8 @@ def sweep(
     quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
     Exit status: 0 if all computed scenes are certified; 2 if the input is wrong; 3 if a scene is
-    undecided; 4 if a scene failed, or if the sweep stopped because worker processes died or use
-    other versions of packages than this process; 130 if interrupted. If the command stops early,
+    undecided; 4 if a scene failed, or if the sweep stopped because worker processes died or had
+    other versions of packages than this command; 130 if interrupted. If the command stops early,
     the rows computed so far are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):

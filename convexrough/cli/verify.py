@@ -118,11 +118,11 @@ def verify(
     without it, each row is a pixel of a regular grid. With --out the command writes a table, a
     figure and verdict.json.
 
-    Exit status: 0 if it is proved that exactly the claimed asperities touch (and with --shear, that
-    exactly the claimed ones slide), and that the errors of loads and shear forces, and of their
-    totals where --shear-force or the scene prescribes these, are at most --within; 2 wrong input; 3
-    if a claim is wrong or not proved, or if --proof finds no proof; 4 if the shear problem could
-    not be solved. With --explain nothing is checked, and the status is 0 if the files can be read.
+    Exit status: 0 if it is proved that exactly the claimed asperities touch (with --shear also that
+    exactly the claimed ones slide), and that no error exceeds its limit under --within; 2 wrong
+    input; 3 if a claim is wrong or not proved, or if --proof finds no proof; 4 if the shear problem
+    could not be solved. With --explain nothing is checked, and the status is 0 if the files can be
+    read.
     """
     import numpy as np
 

@@ -63,7 +63,9 @@ class Law(Protocol):
     def unit(self) -> str: ...
 
     def evaluate(self, unknown: Array) -> Iterate | None:
-        """The state at `unknown`, eta, moved onto the constraints; None if that is impossible."""
+        """The state at eta = `unknown`, which is changed where needed to satisfy the constraints,
+        such as a prescribed total; None if that is impossible.
+        """
         ...
 
     def direction(self, state: Iterate, left: float) -> Array:
@@ -92,10 +94,10 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class Stopping:
-    """The conditions that end Newton's method. Residuals are relative to their scale.
+    """The conditions that end Newton's method. Residuals are divided by `Iterate.scale`.
 
     accurate  : unless the method ends by `linear`, an answer is accepted only if its residual is at
-        most this, or `tolerance` if larger
+        most the larger of `accurate` and `tolerance`
     tolerance : residual at which the method ends at once; 0 for the least possible residual
     most      : largest number of steps
     linear    : the method also ends if the next step is expected to leave a defect of at most this
@@ -113,8 +115,8 @@ def solve(law: Law, state: Iterate, stopping: Stopping) -> tuple[Iterate, int]:
 
     The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
     residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does
-    not halve the residual; then the better of the two states is returned. Raises SolverError after
-    `most` steps.
+    not halve the residual; in this last case the better of the states before and after the step is
+    returned. Raises SolverError after `most` steps.
     """
     before = np.inf  # the 2-norm of the last defect
     for step in range(1, stopping.most + 1):

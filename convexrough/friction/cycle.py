@@ -1,11 +1,12 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
 The path is a closed curve of the load P and the shear force Q. With the coefficient of friction f,
-let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. The memory curve
-(docs/theory/paths.md) is a function of the normal load s: the shear force that the layers of the
-contact up to s carry, divided by f. From the second cycle on, it passes at every moment through
-the point (L*, T*) with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below L* the curve no longer
-changes. Above L* it repeats in each cycle and does not depend on the start of the path.
+let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. The layers of a
+contact are the parts by which it grows as the normal load rises. The memory curve
+(docs/theory/paths.md) gives, as a function of a normal load s, the shear force, divided by f, that
+all layers up to the load s carry. From the second cycle on, it passes at every moment through the
+point (L*, T*) with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below L* the curve no longer changes.
+Above L* it repeats in each cycle and does not depend on the start of the path.
 docs/theory/losses.md derives the loss.
 """
 
@@ -51,7 +52,8 @@ from convexrough.sphere.smooth import smooth_reference
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Where the load varies, the ways of the slip fronts are cut into about this many cells in all.
+#: Where the load varies, the ranges of load through which the slip fronts move are cut into about
+#: this number of cells in total.
 CELLS = 64
 
 
@@ -76,7 +78,8 @@ class Cycle(Table, Plottable):
     level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
         L* is the same at every moment from the second cycle on
     balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
-        docs/theory/losses.md, as a check of rounding; nan if P varies or order fails
+        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps give the
+        results
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere
     smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
@@ -88,7 +91,8 @@ class Cycle(Table, Plottable):
         loss and statuses are proved; "proved for one step": statuses hold for the result of one
         general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
         nothing is proved, and general steps give the results. If the normal solution at the highest
-        P is not proved, `order` is "fails", too, but the memory curve gives the results
+        P is not proved, `order` is "fails" as well, but then the results come from the memory
+        curve, not from general steps
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
 
@@ -158,10 +162,10 @@ class Cycle(Table, Plottable):
         """(n,) [force length] energy lost at each asperity per cycle.
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
-        the ways of the slip fronts are cut into about 64 cells in all. The losses are sums over the
-        cells, computed from the normal solutions at the ends of each cell. Their relative errors
-        are about 0.1 %, except where a front hardly moves while the load changes much; the proved
-        bounds on the relative errors are some per cent.
+        the ranges of load through which the slip fronts move are cut into cells, about 64 in total.
+        The losses are sums over the cells, computed from the normal solutions at the ends of each
+        cell. Their relative errors are about 0.1 %, except where a front hardly moves while the
+        load changes much; the proved bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -247,7 +251,8 @@ class Loop(Table):
     displacements : (m,) [length] relative tangential displacement of distant points of the two
         bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] own deflection plus drift of each asperity
+    asperity_displacements : (m, k) [length] own deflection (the displacement that its own force
+        causes) plus drift of each asperity: docs/theory/paths.md
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape

@@ -1,16 +1,19 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
 Shear forces are divided by the coefficient of friction f, tangential displacements by c_t f with
-Mindlin's ratio c_t. Each asperity i keeps its own memory curve, in the plane of its indentation and
-its deflection. A straight step to the load P and the shear force T computes the normal solution at
-P. Then Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i
-and x: the displacements of the asperities and of the bodies in the step.
+Mindlin's ratio c_t. Each asperity i has its own memory curve (docs/theory/paths.md): its
+deflection, the tangential displacement that its own shear force causes, as a function of its
+indentation. In a straight step the load and the shear force change linearly, to P and T. First the
+normal solution at P is computed. Then Newton's method solves (1) of docs/theory/without-order.md,
+"The general step", for eta_i and x: the displacements of the asperities and of the bodies in the
+step.
 
-For the curves of asperities, one formula replaces docs/theory/paths.md, "The rules". The curve
-after a straight step follows from the old curve and the end (s1, t1) of the step alone: the slip
-front only moves down, and the part of a curve above the present indentation is dropped. Cut the old
-curve at the smaller of the old and the new indentation, and let h be its heights. If the asperity
-slips, the new curve ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
+For the curves of asperities, one formula replaces the section "The rules" of docs/theory/paths.md.
+During a straight step the slip front (the point down to which slip replaces the old curve) only
+moves down, and the part of a curve above the present indentation is dropped. So the new curve
+depends only on the old curve and on the end (s1, t1) of the step. Cut the old curve at the smaller
+of the old and the new indentation, and let h be its heights. If the asperity slips, the new curve
+ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
 
     L - c h(L) = s1 - c t1,
 
@@ -158,7 +161,8 @@ class OwnCurves:
 class OwnStep(NamedTuple):
     """A straight step of n asperities from their curves `old`; arrays are (n,).
 
-    front     : where the old curves end;  end : indentations and deflections after the step
+    front     : the point up to which each old curve is kept; from it a line leads to `end`
+    end       : indentations and deflections after the step
     fronts    : indentation at the slip front; the whole indentation where nothing slips
     forces    : shear forces T_i
     stiffness : derivatives of the forces with respect to the deflections
@@ -185,7 +189,7 @@ class Bundle(NamedTuple):
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
     forces    : (n,) T_i, the shear forces of the asperities divided by f
-    positions : (n,) own deflection plus drift, divided by c_t f
+    positions : (n,) own deflection plus drift (docs/theory/paths.md), divided by c_t f
     displacement : X / (c_t f), with the relative displacement X of the bodies
     work      : work of the shear force along X, divided by c_t f^2
     """
@@ -232,12 +236,12 @@ class Step(NamedTuple):
         return cls(now, total, indentations, own, loads, curves, parts)
 
     def taken(self, deflections: Array) -> Array:
-        """(n,) the eta_i after which these are the own deflections; 0 where open."""
+        """(n,) the displacements eta_i that lead to these own deflections; 0 where open."""
         wanted, nothing = deflections - self.now.deflections, np.zeros(len(deflections))
         return np.divide(wanted, self.parts, out=nothing, where=self.parts > 0)
 
     def at(self, eta: Array) -> OwnStep:
-        """The step of each asperity that is displaced by eta."""
+        """The step of each asperity i if it is displaced by eta_i."""
         targets = self.now.deflections + eta * self.parts
         return self.curves.step(self.own, np.clip(targets, -self.own, self.own))
 
@@ -392,11 +396,11 @@ def followed(
 ) -> SteppedPath:
     """The results of general steps along a path.
 
-    The loss W_n by n steps has an error of about e / n^2, with some constant e. The loss returned
-    is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
+    The loss W_n by n steps has an error of about e / n^2, with some constant e. By default the loss
+    returned is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
 
-    steps : number n of steps per segment; the loss returned is then W_n. None doubles the number
-        until losses and displacements settle, up to 64
+    steps : number n of steps per segment; the loss returned is then W_n. With None, the number is
+        doubled until losses and displacements settle, to at most 64
     """
     by = (stepper or Stepper)(levels)
     f = float(levels.coefficient.value)

@@ -1,6 +1,7 @@
 """Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude.
 
-A smooth path is replaced by chords, with corners where the slip front starts, stops or turns.
+A smooth path is replaced by chords between some of its points. Among these are the extremes of
+P, P + Q/f and P - Q/f, with the load P, the shear force Q and the coefficient of friction f.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ class PhaseLosses(Table, Plottable):
 
         P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    An ellipse has one phase and one factor. Arrays start with all phases of the first factor.
+    An ellipse has one phase and one factor. In all arrays the ellipses with the first factor come
+    first, one for each phase, then those with the second factor, and so on.
 
     phases, factors : (c,) phase [rad], and factor of both amplitudes
     losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that

@@ -117,7 +117,7 @@ class Number:
 
     @cached_property
     def coupled(self) -> Ball:
-        """The sum of  left'A P  over all levels: minus the derivative by log E* at constant k."""
+        """The sum of left^T A P over the parts: minus the derivative by log E* at constant k."""
         return sum((part.slopes.left.dot(part.coupled) for part in self.parts), start=ZERO)
 
     @cached_property

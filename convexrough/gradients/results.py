@@ -1,4 +1,4 @@
-"""Gradients of each result: its parts at load levels, and how the total loads of these move.
+"""Gradients of results: the parts at each load level, and the derivatives of the levels' loads.
 
 A result is a sum over levels (`gradients.parts`): a contact has one level, its load P; a friction
 state and a cycle have two, P and L = P - T with T = Q / f; a load path has many. Q is the shear
@@ -63,14 +63,14 @@ def level_below(
 
 
 def by_load(units: Units) -> Moves:
-    """The derivative of the load P in scaled units by the load P in the scene's units."""
+    """The derivative of the scaled load P with respect to the load P in the scene's units."""
     return {"load": Ball.exact(1.0) / units.force}
 
 
 def by_forces(known: FrictionLevels, height: Ball, /, **shares: float) -> Moves:
     """Derivatives of the level L = P - T, with T = Q / f, by load, friction and forces.
 
-    shares : derivative of Q by each force, by name
+    shares : for each force, under its name, the derivative of Q with respect to it
     """
     by_force = -1.0 / known.force_unit
     rates = {name: by_force * share for name, share in shares.items()}
@@ -86,7 +86,7 @@ def by_ratio(known: FrictionLevels) -> Ball:
 def at_fixed_levels(
     known: FrictionLevels, loss: Ball = ZERO, displacement: Ball = ZERO, force: Ball = ZERO
 ) -> dict[str, Ball]:
-    """Derivatives of these terms of a sum by f and Poisson's ratio, at fixed levels."""
+    """Derivatives of the sum of these terms by f and by Poisson's ratio, at fixed levels."""
     return {
         "friction": (loss * 2.0 + displacement + force) / known.coefficient,
         "poisson_ratio": (loss + displacement) * by_ratio(known),

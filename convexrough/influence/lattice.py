@@ -1,9 +1,10 @@
 """The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
-The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
-box of sites that holds the asperities is padded with zeros, to at most about twice its size in
-each direction, so that periodic images do not contribute. docs/theory/operators-lattice.md explains
-the method, its rounding errors and the products with more digits ("sharp" products).
+The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij and A_ii = 0,
+where r_ij is the distance between contact points. The smallest box of sites that holds the
+asperities is padded with zeros, so far that periodic images do not contribute. The padded box is at
+most about twice as large in each direction. docs/theory/operators-lattice.md explains the method,
+its rounding errors and the products with more digits ("sharp" products).
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ class LatticeInfluence:
 
     @cached_property
     def spacing(self) -> float:
-        """[length] the shortest distance of two sites."""
+        """[length] the shortest distance between two sites."""
         return self.lattice.spacing
 
     @property
@@ -167,7 +168,7 @@ class LatticeInfluence:
 
     @property
     def _least(self) -> float:
-        """[spacing] lower bound on the shortest distance of two points."""
+        """[spacing] lower bound on the shortest distance between two points."""
         return 1.0 - min(self.site_error, 0.5)
 
     @property

@@ -1,4 +1,4 @@
-"""`shakedown`: the largest factor of a load path at which sliding dies out.
+"""`shakedown`: the largest factor by which a load path may be scaled so that sliding dies out.
 
 In this module, sliding dies out if after some cycles no asperity slides as a whole, and none that
 touches at the mean load opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
@@ -130,7 +130,7 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor of a closed path at which sliding dies out and no asperity opens.
+    """The largest factor by which a closed path may be scaled so that sliding dies out (see above).
 
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 

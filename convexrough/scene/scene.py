@@ -78,7 +78,8 @@ class Scene(Record):
 
     @cached_property
     def curved(self) -> list[tuple[float, slice]]:
-        """Pairs of a finite radius [length] and the slice of the axes (0: x, 1: y) that have it."""
+        """For each finite radius [length], the radius and the slice of the axes (0: x, 1: y) with
+        it."""
         return base.curved(self.sphere_radius)
 
     @property
@@ -126,7 +127,7 @@ class Scene(Record):
     def contact_tails(self) -> Array | None:
         """(n, 2) [length] exact contact points minus `contact_points`; None if all are 0.
 
-        The error of each is at most 2^-96 times the size of the contact point.
+        The error of each number is at most 2^-96 times the absolute value of this coordinate.
         """
         points = self.asperities.positions
         if self.contact_points is points:

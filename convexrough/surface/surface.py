@@ -160,7 +160,7 @@ class Surface(Record, Plottable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on a form that explains most of the variance, and on pixels that look wrong.
+        """Warnings: of a form that explains most of the variance, and of pixels that look wrong.
 
         Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: pixels,
         or pairs of neighbouring pixels, whose heights differ much from the median height of the map
@@ -231,7 +231,8 @@ class Surface(Record, Plottable):
 
         The form is fitted to measured pixels. Pixels that were holes are filled again.
 
-        Raises InputError if nothing is left, or if the measured pixels do not determine the form.
+        Raises InputError if the heights are nothing but this form, up to rounding, or if the
+        measured pixels do not determine the form.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
@@ -271,7 +272,8 @@ class Surface(Record, Plottable):
         return zlib.crc32(np.ascontiguousarray(self.heights).tobytes())
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
-        """The summits of the map as asperities, in descending order of the heights of their maxima.
+        """The summits of the map as asperities, in descending order of the highest pixel of their
+        hills.
 
         prune : hills with a prominence below this fraction of `max_height` are merged into taller
             ones (Wolf pruning, ISO 25178-2)

@@ -110,12 +110,14 @@ class ReadTable(NamedTuple):
     """Columns of a file by known names, and how the file was read.
 
     columns : numbers, or text for the columns read as text
-    rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
+    rows    : name of each row in messages;  lines : text of each row, "" in files of arrays (.npy,
+        .npz, .mat, .parquet)
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
     others  : the columns that were not read. The key is the header, which may be empty, or the
-        number of the column (from 1) if there is no header. The column that `Reading.columns` names
-        as index has the key "index". A column is text if one of its cells is not a number
+        number of the column (from 1) if there is no header. If `Reading.columns` names a column as
+        index, this column is included here, with the key "index". A column is text if one of its
+        cells is not a number
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -165,8 +167,8 @@ def read_table(
         has the first of them
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
-    line : if a file without a header is one line, and has this many numbers or more than 3, it is
-        read as one column (only with `unnamed`)
+    line : a file that is one line without a header is read as one column if it has exactly this
+        number of cells, or more than 3 (only with `unnamed`, and if `how` names no columns)
     table : the cells of the file, if they are read already
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
@@ -422,7 +424,7 @@ def _named(source: _Source) -> str:
 
 
 def in_sheet(style: str) -> str:
-    """The end of a message with the names of the sheet read and of others; "" without sheets."""
+    """The end of a message: the sheet that was read, and others that fit; "" for other files."""
     return f" in {style}" if style.startswith("sheet ") else ""
 
 

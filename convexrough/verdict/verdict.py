@@ -138,7 +138,8 @@ def verify(
     loads : (n,) [force] in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
     within : largest error allowed: of a load, as a fraction of the largest load, and of a
-        prescribed total, as a fraction of this total. 1 checks hardly more than the contact set
+        prescribed total, as a fraction of this total. With `within=1` hardly more than the contact
+        set is checked
     floor  : [force] a load of at most this size, positive or negative, counts as 0, and its
         asperity as open
     influence : compliance operator; None for the cheapest
