@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -31,6 +32,14 @@ from convexrough.gradients.parts import ZERO, Moves, Part
 #: divided by the largest load. SHIFT is less than any difference of two
 #: unequal float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
+
+#: Coordinates of memory curves that differ by less than this part of the largest load count as
+#: equal when ties are looked for: rounded decimals often miss a tie by less.
+ROUNDED = Fraction(1, 2**46)
+
+#: At this distance from a near tie, divided by the largest load, one-sided derivatives are compared.
+#: They count as equal if they differ by at most the part AGREES.
+PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 
 #: The weights of V, D0 and S at one level in a weighted sum.
 Weights: TypeAlias = tuple[Fraction, ...]
@@ -130,23 +139,46 @@ class Along:
             for level, (_, D, _) in moved.items()
         ]
 
-    def _one_side(self, loads: Shifts, heights: Shifts, sign: int, times: Ball) -> Ball:
-        """`times` times the derivative from above (sign 1) or below (-1), along these changes."""
+    @cached_property
+    def nearly_tied(self) -> bool:
+        """True if unequal numbers P, P + T or P - T at vertices of memory curves nearly agree."""
+        curve, vertices = MemoryCurve.pressed(self.start), set[tuple[Fraction, Fraction]]()
+        for point, _, _ in self.steps:
+            curve = curve.go(self.loads[point], self.heights[point])[0]
+            vertices.update(zip(curve.levels, curve.heights, strict=True))
+        least = ROUNDED * max(self.loads)
+        along = ({P + turn * T for P, T in vertices} for turn in (-1, 0, 1))
+        return any(b - a < least for each in along for a, b in pairwise(sorted(each)))
+
+    def _shifted(self, loads: Shifts, heights: Shifts, by: Fraction) -> Along:
+        """The path after changes, times `by`, of P and T at all points."""
+        return replace(
+            self,
+            loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
+            heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
+        )
+
+    def _one_side(
+        self, loads: Shifts, heights: Shifts, sign: int, times: Ball, off: Fraction = Fraction(0)
+    ) -> Ball:
+        """`times` times the derivative from above (sign 1) or below (-1), along these changes.
+
+        off : [force] if it is not 0, the derivative of a path that is first shifted by this much to
+            the same side; the error bound does not cover this shift
+        """
         unit, force = max(self.loads), self.known.units.force
-        longest = max(map(abs, (*loads, *heights)))
-        by = sign * SHIFT * unit / longest if longest else SHIFT
+        longest = max(map(abs, (*loads, *heights))) or Fraction(1)
+        by = sign * SHIFT * unit / longest
         try:
-            shifted = replace(
-                self,
-                loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
-                heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
-            ).sums
+            origin = self._shifted(loads, heights, sign * off / longest) if off else self
+            both = origin.sums, origin._shifted(loads, heights, by).sums
         except InputError:  # |T| > P, or a negative load
             return NONE
         total = ZERO
         factors = self.known.loss_unit, self.known.travel_unit * force
-        for base, there, factor in zip(self.sums, shifted, factors, strict=True):
-            for level, (V, D, S) in _slopes(base, there, unit, by).items():
+        for mine, base, there, factor in zip(self.sums, *both, factors, strict=True):
+            slopes = _slopes(base, there, unit, by)
+            for level, (V, D, S) in (_near(slopes, mine, 4 * off) if off else slopes).items():
                 if level == 0 and S:
                     return NONE
                 here = self.known.at(level)
@@ -162,12 +194,19 @@ class Along:
         """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
 
         The one-sided values are those from below and from above. A derivative is the mean of both
-        if they agree within their error bounds. It is nan if they differ or one does not exist.
+        if they agree within their error bounds. It is nan if they differ or one does not exist. A
+        path that misses a tie by rounding is also shifted past the tie, to both sides of it.
 
         directions : changes of P and of T at all points
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]
+        off = PAST * max(self.loads)
+        for k, each in enumerate(directions if self.nearly_tied else ()):
+            past = [self._one_side(*each, sign, factor, off) for sign in (-1, 1)]
+            below, above = (float(side.value) for side in past)
+            if abs(above - below) > AGREES * max(abs(below), abs(above)):
+                found[k], sides[k] = NONE, past
         return Ball.stacked(found), np.array([[float(s.value) for s in both] for both in sides])
 
 
@@ -178,6 +217,23 @@ def _one(below: Ball, above: Ball) -> Ball:
     return Ball.around((below + above).mid, apart.size) * 0.5 if apart.size else below
 
 
+def _moved(weights: Weights, off: Fraction) -> Weights:
+    """The weights at the level `off` below; V, D0 and S are expanded about this level."""
+    V, D, S = weights
+    return V, D + V * off, S + D * off + V * off * off / 2
+
+
+def _near(weights: dict[Fraction, Weights], levels: Sums, reach: Fraction) -> Sums:
+    """The weights moved to the nearest of these levels if it is within `reach`."""
+    found = Sums()
+    for level, each in weights.items():
+        nearest = min(levels, key=lambda place: abs(place - level), default=level)
+        place = nearest if abs(nearest - level) <= reach else level
+        both = zip(found.get(place, NOTHING), _moved(each, level - place), strict=True)
+        found[place] = tuple(b + m for b, m in both)
+    return found
+
+
 def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fraction, Weights]:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
@@ -185,16 +241,14 @@ def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fract
     """
     places, found = sorted(base), dict[Fraction, Weights]()
     for sign, weights in ((-1, base), (1, moved)):
-        for level, (V, D, _) in weights.items():
+        for level, each in weights.items():
             near = bisect(places, level)
             around = [*places[max(near - 1, 0) : near + 1], level]
-            at = next(each for each in around if abs(each - level) <= NEAR * unit)
+            at = next(place for place in around if abs(place - level) <= NEAR * unit)
             if at is level:  # no level of the original path corresponds
                 insort(places, at)
-            off = level - at
-            before = found.get(at, NOTHING)
-            more = (V, D + V * off, D * off + V * off * off / 2)
-            found[at] = tuple(b + sign * m for b, m in zip(before, more, strict=True))
+            both = zip(found.get(at, NOTHING), _moved(each, level - at), strict=True)
+            found[at] = tuple(b + sign * m for b, m in both)
     slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
     sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
     least = NEAR * max(sizes, default=Fraction(0))

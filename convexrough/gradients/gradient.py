@@ -212,7 +212,8 @@ class Gradient(Table, Plottable):
     force           : derivative by the shear force of a friction state
     maximum, minimum : derivatives by the largest and smallest shear force of a cycle
     forces, loads   : (m,) derivatives by the forces and loads of a history or path; nan where the
-        derivatives from below and above differ, as at a repeated point
+        derivatives from below and above differ, as at a point that repeats an earlier one, up to
+        rounding
     force_sides, load_sides : (m, 2) the derivatives by `forces` and `loads` from below and above
     balance_defect  : difference between two formulas for the derivative by the modulus, divided by
         the largest term of both formulas; a check of rounding

@@ -313,3 +313,26 @@ def test_where_order_fails_there_is_no_sum_of_levels() -> None:
     with pytest.raises(cr.InputError, match='order: found "fails", expected a result whose'):
         cycle.gradient()
     assert contact.gradient(approach=1.0).height_errors.max() < 1e-15
+
+
+@pytest.mark.parametrize("off", [-1, 1])
+def test_a_path_that_misses_a_tie_by_rounding_has_the_same_sides(off: int) -> None:
+    contact = small()
+    unit = 2.0 ** np.floor(np.log2(contact.load))  # products with whole numbers / 64 are exact
+    loads = unit * np.array([64, 58, 51, 58, 64, 64, 58]) / 64
+    forces = FRICTION * unit * np.array([8, 14, 20, 14, 8, 20, 14]) / 64
+
+    def gradient(loads: Any, forces: Any) -> cr.Gradient:
+        return cr.load_path(contact.scene, loads=loads, forces=forces).gradient()
+
+    tied = gradient(loads, forces)
+    for name in ("loads", "forces"):
+        moved = {"loads": loads.copy(), "forces": forces.copy()}
+        moved[name][4:] = np.nextafter(moved[name][4:], off * np.inf)
+        missed = gradient(**moved)
+        for one in ("force", "load"):
+            sides, there = (getattr(each, f"{one}_sides") for each in (tied, missed))
+            np.testing.assert_allclose(there, sides, rtol=0, atol=1e-8 * np.abs(sides).max())
+            gone = np.isnan(getattr(tied, f"{one}s"))
+            assert 0 < gone.sum() < len(gone)
+            np.testing.assert_array_equal(np.isnan(getattr(missed, f"{one}s")), gone)
