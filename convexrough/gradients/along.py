@@ -37,7 +37,7 @@ SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 #: equal when ties are looked for: rounded decimals often miss a tie by less.
 ROUNDED = Fraction(1, 2**46)
 
-#: At this distance from a near tie, divided by the largest load, one-sided derivatives are compared.
+#: One-sided derivatives are compared at this distance from a near tie, divided by the largest load.
 #: They count as equal if they differ by at most the part AGREES.
 PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 
