@@ -139,9 +139,10 @@ def prove(
     if load is not None and not any(loads.loads):
         raise InputError("loads", found="none", expected="a load on some asperity")
     modulus = scene.material.contact_modulus
-    rounded = np.array(loads.loads, dtype=np.float64)
-    radii = hertz.contact_radius(rounded, modulus, scene.relative_radii)
-    trial = TrialState(scene, radii, approach, None if load is None else load / modulus)
+    states = np.array([loads.loads, *(near.loads for _, near in sheared)], dtype=np.float64)
+    radii = hertz.contact_radius(states, modulus, scene.relative_radii)
+    share = None if load is None else load / modulus
+    trial = TrialState(scene, radii[0], radii.max(axis=0), approach, share)
     document = _document(trial, {"approach": approach} if load is None else {"load": load})
     document["pressed"] = _place(trial, document, loads, approach)
     document["sheared"] = [
@@ -259,10 +260,14 @@ class Argument(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution, and the prescribed approach or load / E*."""
+    """Contact radii (n,) [length] near a solution, and the prescribed approach or load / E*.
+
+    largest : (n,) [length] the largest contact radii in this and in all friction states
+    """
 
     scene: Scene
     radii: Array
+    largest: Array
     approach: float | None
     load: float | None
 
@@ -321,7 +326,7 @@ class TrialState:
         for beyond, least in ROOM:
             yield from self._on(self._box(beyond, least))
         for beyond in LEEWAY:
-            yield from self._on(self.radii * (1 + beyond))
+            yield from self._on(self.largest * (1 + beyond))
 
     def _on(self, box: Array) -> Iterator[Argument]:
         """At most two arguments on a box: by shells that do not overlap, and one for crowds."""
@@ -344,8 +349,8 @@ class TrialState:
         deepest = self.ceiling[1] + offsets
         size = np.abs(offsets) + abs(self.ceiling[1])
         box: Array = np.sqrt(R * np.maximum(deepest, 0.0)) * (1 + beyond)
-        box = np.maximum(box, least * max(box.max(), self.radii.max()))
-        box[(deepest < -ROUNDING * size) & (self.radii == 0)] = 0.0
+        box = np.maximum(box, least * max(box.max(), self.largest.max()))
+        box[(deepest < -ROUNDING * size) & (self.largest == 0)] = 0.0
         return box
 
     def _crowded(self, box: Array) -> Argument | None:

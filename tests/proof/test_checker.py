@@ -246,6 +246,9 @@ def test_an_asperity_that_is_dragged_along_is_refused() -> None:
     state = SimpleNamespace(force=0.01 * 0.5 * contact.load)
     with pytest.raises(cr.ProofError, match="dragged along"):
         contact.proof(sheared=[state])
+    far = cr.press(replace(shaded(), friction=0.5), load=2.96)  # its load grows much in shear
+    with pytest.raises(cr.ProofError, match="dragged along"):
+        far.proof(sheared=[cr.shear(far, force=0.15 * far.load)])
 
 
 def test_a_loss_is_claimed_in_order_alone() -> None:
