@@ -220,7 +220,7 @@ def array_extent(scene: Scene, load: float) -> float | None:
 
 
 def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
-    """A warning if units are named and the contact modulus is that of a gel, or of no solid."""
+    """A warning if units are named and the contact modulus is below rubber or above diamond."""
     unit = units.unit("pressure")
     if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
         limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"

@@ -32,12 +32,13 @@ FITTED_FROM = 10_000
 class Row:
     """One task on one scene.
 
-    task    : "solve" (a point of the diagram of time against error: `solver` with the settings that
-        `setting` describes), "sweep", or a name in `convexrough.bench.measure.TASKS`
+    task    : "solve" (a press by `solver` with the settings that `setting` describes; each row
+        gives a point in a diagram of `seconds` against `error`), "sweep", or a name in
+        `convexrough.bench.measure.TASKS`
     outcome : "refused" means that the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
-    product : [s] time of a plain product of the same size, from `measure.plain_product`; nan
-        without a lattice
+    product : [s] time of the Fourier transforms of one product with the compliance operator of the
+        lattice, from `measure.plain_product`; nan without a lattice
     error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
     memory  : [bytes] largest increase of the memory of the process; None where unknown
     """
@@ -87,13 +88,15 @@ class Bench:
         return found
 
     def presses(self, family: Family, least: int = 0) -> list[Row]:
-        """Rows of "press" with an answer, of a family and at least so many asperities."""
+        """Rows of the task "press" with an answer, for scenes of a family with at least `least`
+        asperities."""
         wanted = "press", family, "answered"
         rows = [row for row in self.rows if (row.task, row.family, row.outcome) == wanted]
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes.
+        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes from
+        `FITTED_FROM` on.
 
         It is that of the least-squares fit  log time = a + b log n.
         """
@@ -147,9 +150,10 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points as accurate as the default solver's and faster by more than `NOISE`; or all points.
+    """Points as accurate as the default solver's, and faster by more than `NOISE`.
 
-    All points are better if the default solver has none."""
+    All points if the default solver has none.
+    """
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:
@@ -202,7 +206,7 @@ def machine_line(bench: Bench) -> str:
 
 
 def size_table(bench: Bench) -> list[list[str]]:
-    """A heading, and a row for each scene: the times [s] of tasks; a press also in products."""
+    """A heading, and a row for each scene: times [s] of tasks, and of presses also in products."""
     on = f"in products on {bench.machine['cores']} cores"
     other = [it for it in dict.fromkeys(row.task for row in bench.rows) if it not in NOT_OTHER]
     heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *other]

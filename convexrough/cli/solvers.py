@@ -91,8 +91,8 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
     contact law, and its dual, which bounds the energy from below. The format mps and a second npz
     (qpsolvers) contain the quadratic program of bristles (springs that together approximate Hertz's
-    law). index.json gives the minimum of each program, the unit of its loads, and the asperities
-    that they belong to.
+    law). For each program, index.json gives the minimum, the unit of its loads, and the indices of
+    its asperities.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

@@ -1,13 +1,15 @@
-"""The general step as one second-order cone program, which checks the solution by Newton's method.
+"""The general step as one second-order cone program: a check of the solution by Newton's method.
 
-The elastic energy W(T) of an asperity is the integral of its deflection over its shear force T. It
-consists of pieces: one stuck piece, and one slipping piece for each direction of slip and each
-layer of the old memory curve in which the slip front may end. W is convex, so it is the convex hull
-of its pieces. The cones of `convexrough.convex.cones` represent each piece exactly. Piece j has a
-weight w_j, which replaces the 1 in its cones. The weights of an asperity add up to 1. The forces
-and energies of its pieces add up to those of the asperity. Forces are in units of the coefficient
-of friction f, displacements in units of c_t f with Mindlin's ratio c_t:
-docs/theory/without-order.md, "The step as one cone program".
+The general step is a step along a load path without the assumption of order. The elastic energy
+W(T) of an asperity is the integral of its deflection over its shear force T. It consists of pieces:
+one on which the asperity sticks, and others on which it slips. There is one of these for each
+direction of slip and each straight part (layer) of the memory curve before the step in which the
+slip front may end (docs/theory/without-order.md). W is convex, so it is the convex hull of its
+pieces. The cones of `convexrough.convex.cones` represent each piece exactly. Piece j has a weight
+w_j >= 0, which replaces the constant 1 in the cones of this piece (its perspective). The weights of
+an asperity add up to 1. The forces and energies of its pieces add up to those of the asperity.
+Forces are in units of the coefficient of friction f, displacements in units of c_t f with Mindlin's
+ratio c_t: docs/theory/without-order.md, "The step as one cone program".
 """
 
 from __future__ import annotations

@@ -55,7 +55,8 @@ class Fretting(Table, Plottable):
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
         bounds on their errors. If the load varies, these losses are less exact than `Cycle.loss`;
         see `Cycle.asperity_losses`
-    mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
+    mean_tractions   : [force / length^2] shear force of the asperity divided by the area of its
+        contact disc, at the point of the path where this is largest
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
 
@@ -137,7 +138,7 @@ def _largest(bends: Array, radii: Sequence[Array]) -> Array:
 
 
 def rim_gap(x: Array) -> Array:
-    """h(x): the gap of a Hertz contact at the distance r, divided by r^2 / R; x r is its radius."""
+    """h(x): the gap of a Hertz contact of radius x r at the distance r, divided by r^2 / R."""
     root = np.sqrt((1.0 - x) * (1.0 + x))
     return np.maximum(0.5 - x**2 + ((2.0 * x**2 - 1.0) * np.arcsin(x) + x * root) / np.pi, 0.0)
 

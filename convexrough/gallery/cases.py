@@ -70,8 +70,9 @@ class HardCase(Record):
     exact_approach, exact_load : digits [length], [force]
     shear_force : [force] the shear force at the end
     history     : (m,) [force] shear forces up to `shear_force`; empty if it is applied from rest
-    forces, slips : (n,) digits [force], [length] under `shear_force`; empty if an asperity would be
-        dragged along, where the theorem of Ciavarella and Jaeger gives no answer
+    forces, slips : (n,) digits [force], [length] under `shear_force`; empty if an asperity loses
+        load as the total load rises: in shear the others would drag it along, and the theorem of
+        Ciavarella and Jaeger gives no answer
     displacement  : digits [length] of the relative displacement of the bodies, or ""
 
     >>> case = cr.gallery.case("grazing-gap-1e-9")
@@ -112,7 +113,7 @@ class HardCase(Record):
         """The comparison of loads (n,) [force] with the answer.
 
         within : largest error allowed, over the largest load
-        floor  : [force] a load up to this claims that its asperity is open
+        floor  : [force] an asperity with a load up to this counts as open
         """
         given = checks.array("loads", loads, length=len(self))
         claimed = given > checks.non_negative("floor", floor)

@@ -105,10 +105,10 @@ class Box(NamedTuple):
 
         The solution at the other load or approach may lie outside this box. So `faces` holds the
         upper ends, and the proof must show that the loads are below them. If shells prove the
-        convexity on this box, each upper end above 0 is raised to the load at which shell_i / h_i
-        equals the convexity number of the box, if that load is larger. So also asperities at the
-        rim of the contact, with small loads, get upper ends far above the error bounds of their
-        loads.
+        convexity on this box, each upper end above 0 is raised to the load at which shell_i / h_i,
+        with shell_i = 1 / (pi E* s_i) and the radius s_i of the shell, equals the convexity number
+        of the box, if that load is larger. So asperities at the rim of the contact, whose loads are
+        small, get upper ends far above the error bounds of their loads, too.
         """
         it, theta = self.problem, self.convexity_number
         ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
@@ -204,8 +204,8 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity.
 
     They are the asperities of pairs that are too close for convexity. If there is no such pair,
-    they are the asperities whose shells, of the radii t, meet other shells; if no shells meet, all
-    with a load.
+    they are the asperities whose shells of radius t_i meet another shell; if no shells meet, they
+    are all loaded asperities.
     """
     which = np.flatnonzero(loads)
     if len(which) < 2:

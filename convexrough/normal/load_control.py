@@ -63,13 +63,14 @@ def approach_bound(
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
-    It is (2) of docs/theory/certificate.md with q = weights / sum(weights), alpha = q k, c = A q,
-    and nearly the lambda for which this bound is least.
+    It is (2) of docs/theory/certificate.md with q = weights / sum(weights), and nearly the lambda
+    for which this bound is least. In the code, c is A q and alpha is q k.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) upper bounds on A times weights
     coefficients, offsets : (n,) k, and lower bounds on d
-    load         : L; or (m, 1), if the other arrays are (m, n) for m problems; then so is the bound
+    load         : L. For m problems the other arrays are (m, n), and the load and the bound are (m,
+        1)
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
@@ -132,8 +133,9 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 def smooth_loads(scene: Scene, load: float) -> Array:
     """(n,) [force] estimated loads with the total `load`.
 
-    From each offset the displacement by a smooth sphere under this load is subtracted. Hertz's law
-    gives the loads at these indentations plus one number, which is chosen to fit the total.
+    From each offset the displacement by a smooth sphere under this load is subtracted. To all these
+    differences one number is added, so that the loads that Hertz's law gives at these indentations
+    have the total `load`.
     """
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
@@ -144,7 +146,7 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
     """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    Other shapes are replaced by a sphere of mean curvature. Under a flat the result is 0.
+    Other shapes are replaced by a sphere of the same mean curvature. Under a flat the result is 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)

@@ -105,7 +105,7 @@ def draw_values(
     most: float | None = None,
     signed: bool = False,
 ) -> ScalarMappable:
-    """Draw discs in the colours of `values`, and a named colour bar; return the colours.
+    """Draw discs coloured by `values`, and a named colour bar; return what assigns the colours.
 
     values : (n,), one for each contact disc; or (k, n), for k discs of each asperity, the later
         drawn over the earlier

@@ -65,8 +65,8 @@ class Program(Record):
         nan if OSQP fails
     constant    : the energy, in energy_unit, minus the objective; for the dual, the energy plus the
         objective. It is 0 for bristles, and if the approach is prescribed
-    load_error_estimate : estimated error of the loads that minimise the objective exactly, as a
-        fraction of the largest load
+    load_error_estimate : estimated difference between the exact minimiser and the solution of the
+        contact law, as a fraction of the largest load; 0 for cones and dual
 
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
     >>> program.what, len(program.asperities)
@@ -155,7 +155,8 @@ def program(
     """The contact problem of a scene as a convex program in standard form.
 
     form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
-        program; without coupling its error is about 0.4 / bristles^2 of the largest load)
+        program; if asperities did not interact, loads would have errors of about 0.4 / bristles^2
+        of the largest; `load_error_estimate` includes the interaction)
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 

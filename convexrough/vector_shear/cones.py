@@ -3,9 +3,10 @@
 docs/theory/vector-friction.md, "Cones", derives it. For the shear force q and the load P of an
 asperity, |q| / P = 1 - t^3 defines t, and u = 1 - t. The kernel becomes positive semidefinite if a
 diagonal, the shift, is added; S is the shift divided by the local compliance. epsilon is an
-estimate of |q| / P for asperities that all stick. The variables are q / (epsilon P), and those of
-order u^k divided by epsilon^k. The multiplier of the total is the rigid displacement. The
-multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope of the local energy.
+estimate of |q| / P for asperities that all stick. The variables are q / (epsilon P), and the
+variables of the cones; one of order u^k is divided by epsilon^k. The multiplier of the total is the
+rigid displacement. The multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope
+of the local energy.
 """
 
 from __future__ import annotations
@@ -158,7 +159,9 @@ class FrictionProgram:
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
-        """The program: (1/2) q'(B + shift) q and the local energies; the total, and the cones."""
+        """Minimise (1/2) q'(B + shift) q plus the local energies less the shift, subject to the
+        prescribed total and the cones.
+        """
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]

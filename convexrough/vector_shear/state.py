@@ -30,7 +30,8 @@ from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 class FrictionSolver(Protocol):
-    """The interface of solvers of `shear_vector`; an inaccurate result must raise SolverError."""
+    """The interface of solvers of `shear_vector`; it must raise SolverError for an inaccurate
+    result."""
 
     @property
     def name(self) -> str: ...
@@ -56,10 +57,9 @@ class VectorShearState(Table, Plottable):
         length of the difference
     solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P the forces are f P_i along Q. If the displacements by these forces, in the
-    direction across Q, are not the same at all asperities, this state is reached only in the limit
-    of an infinite displacement. The displacement, the slips, `residual` and `duality_gap` are then
-    infinite.
+    At |Q| = f P the forces are f P_i along Q. If these forces displace the asperities by different
+    amounts perpendicular to Q, this state is reached only in the limit of an infinite displacement,
+    and the displacement, the slips, `residual` and `duality_gap` are infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.holds
@@ -95,7 +95,7 @@ class VectorShearState(Table, Plottable):
 def shear_vector(
     contact: Contact, *, force: ArrayLike, solver: FrictionSolver | None = None
 ) -> VectorShearState:
-    """The friction state with the full tangential kernel, after loading from rest at constant load.
+    """The friction state with the full tangential kernel: Q grew from 0 at constant normal load.
 
     force  : [force] the pair (Qx, Qy), or a number along x
     solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
