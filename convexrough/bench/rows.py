@@ -88,17 +88,15 @@ class Bench:
         return found
 
     def presses(self, family: Family, least: int = 0) -> list[Row]:
-        """Rows of the task "press" with an answer, for scenes of a family with at least `least`
-        asperities."""
+        """Rows of answered presses of a family, with at least `least` asperities."""
         wanted = "press", family, "answered"
         rows = [row for row in self.rows if (row.task, row.family, row.outcome) == wanted]
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n asperities; nan for fewer than two sizes from
-        `FITTED_FROM` on.
+        """The exponent b of the time n^b to press n >= `FITTED_FROM` asperities.
 
-        It is that of the least-squares fit  log time = a + b log n.
+        The least-squares fit is  log time = a + b log n;  nan for fewer than two sizes.
         """
         large = self.presses(family, FITTED_FROM)
         if len({row.asperities for row in large}) < 2:

@@ -6,8 +6,9 @@ A *level* is the normal solution at one total load L: the approach D0, loads P_i
 n_i, which are minus the gap where asperity i is open. Let A be the compliance matrix, d the
 offsets, and C the diagonal matrix of c_i = dP_i / dn_i, which is 0 where i is open. By the contact
 law n + A P = D0 + d, the *rates* y = dn / dD0 solve (I + A C) y = 1. There is order from the load
-L1 down to L0 if at all loads between, y_i >= 0 for each asperity i that may touch at the highest
-load of the path, and all others are open. The level at L1 can prove order. Symbols of the proof:
+L1 down to L0 if the following holds at all loads between them: y_i >= 0 for each asperity i that
+may touch at the highest load of the load path, and all other asperities are open. By (a) and (b),
+the level at L1 and the approach D0(L0) can suffice to prove order. Symbols of the proof:
 - The *support* is the set of asperities that are not proved open at L1.
 - C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for all diagonal 0 <= C' <= C~.
 - delta is diagonal, 0 <= delta <= C~. From here on C is any diagonal matrix, C~ - delta <= C <= C~,
@@ -22,7 +23,8 @@ Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
     y_i (1 - t_i C_i) <= 1 - sum_k (w_k - max(v_k, 0) delta_k m_k - r_k C~_k).                  (3)
 
 1. Let z = C y. Then y + A z = 1, so sum_k t_k z_k = sum_k w_k - sum_k v_k (C~_k - C_k) y_k.
-2. Row i is 1 - y_i = (A z)_i, and differs from that sum by t_i z_i and at most sum_k r_k z_k.
+2. Row i of y + A z = 1 is 1 - y_i = (A z)_i. As A_ii = 0, sum_k t_k z_k differs from it by t_i z_i
+   and a number of size at most sum_k r_k z_k over k != i.
 3. (2) and (3) follow from 0 <= z_k <= C~_k and 0 <= (C~_k - C_k) y_k <= delta_k m_k.
 
 (a) Start from m = 1 and decrease m by (3). Suppose that for all i on the support the right side of
@@ -47,9 +49,10 @@ the support down to L0, and all other asperities stay open.
    that there is one solution. So the continued solution is the level of each load.
 5. If L0 = 0, this holds down to every L > 0.
 
-Asperities that are open at L1 but touch at the highest load need u_i <= 0. Weights with t_k = A_ik
-follow from the inverse X of I + C~ A: the row v = (A X)_i - x X_i, with the x that makes v_i = 0.
-If too many asperities touch for an inverse, `friction.sweeping` finds weights of near neighbours.
+Asperities that are open at L1 but touch at the highest load need u_i <= 0. Let X be the inverse of
+I + C~ A. Weights with t_k = A_ik for k != i are v = (row i of A X) - s (row i of X), with the
+number s that makes v_i = 0. If too many asperities touch for an inverse, `friction.sweeping` finds
+weights of near neighbours.
 """
 
 from __future__ import annotations

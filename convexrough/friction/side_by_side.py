@@ -1,9 +1,9 @@
 """Comparison of three methods for a load path: agreement and time.
 
 The memory curve holds only if no indentation falls as the load rises. The general step
-(docs/theory/without-order.md) holds without this condition; Newton's method solves it. The conic
-step minimises the energy of the same step as a cone program. Both take one step per segment, which
-is exact if no indentation falls as the load rises.
+(docs/theory/without-order.md) needs no such condition; Newton's method computes this step. The
+conic step minimises the energy of the same step as a cone program. Both take one step per segment,
+which is exact if no indentation falls as the load rises.
 """
 
 from __future__ import annotations

@@ -46,7 +46,8 @@ class Order:
 
     places : (n,) original indices of the sorted points
     points : (n, 2) [length] the sorted points
-    tails  : (n, 2) [length] low parts of the sorted points, or None
+    tails  : (n, 2) [length] exact minus rounded coordinates of the sorted points; None if they are
+        0
     cells  : (n, 2) mesh cell of each sorted point
     shares : (n, 2) position of each sorted point in its cell, from 0 to 1
     keys   : (b,) numbers of the blocks that contain points, sorted
@@ -122,7 +123,7 @@ class NearPairs:
     upper   : (n, n) sparse, the entries for pairs of sorted points i < j
     own     : the number on the diagonal, -L(0), because a point does not displace itself
     terms   : largest number of near neighbours of a point
-    nearest : [length] least distance of a near pair that is not 0
+    nearest : [length] smallest distance between the points of a near pair, except 0
     """
 
     upper: Any
@@ -164,7 +165,8 @@ class NearPairs:
 class Interpolation:
     """The interpolation W from nodes to points.
 
-    x, y    : (n, width) weights in each direction; an entry of W is the product of one of each
+    x, y    : (n, width) weights in x and in y; each entry of W is the product of a weight in x and
+        one in y
     patches : for each group of consecutive points in one block of mesh cells: the first point, the
         point after the last, and the indices i and j of the first node
     shape   : numbers of nodes of the mesh in both directions
@@ -264,7 +266,8 @@ class Product:
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums.
 
-        A second thread computes the product with S, because both parts release the GIL.
+        A second thread computes the product with S while this one computes the product with
+        W G W^T. They run in parallel, because both release Python's global interpreter lock.
         """
         ordered = loads[self.order.places]
         with ThreadPoolExecutor(1) as other:
@@ -275,10 +278,11 @@ class Product:
         return self.order.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
-        """(n,) bounds on the interpolation error of near pairs in sums of `strengths` (n,) >= 0.
+        """(n,) bounds on errors of sums of strengths_j / r_ij^q over j, for `strengths` (n,) >= 0.
 
-        Pairs within the reach plus `Softened.sway` count as near. The relative error of
-        other pairs is part of `rounding`.
+        These are the errors by interpolation for near pairs, and by entries left out of S.
+        Pairs within the reach plus `Softened.sway` count as near. The relative error of other pairs
+        is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
         points, ordered = self.order.points, strengths[self.order.places]
@@ -327,8 +331,8 @@ class Product:
     def slopes(self, values: Array) -> Array:
         """(n, 2) the sums over j of (c_i - c_j) v_j / r_ij^3 for points c and `values` v.
 
-        They have no error bounds. The smooth part of the kernel is -grad L, which is the distance
-        vector times the smooth part of 1 / r^3 with the order p - 1.
+        They have no error bounds. The smooth part of the kernel is -grad L. It is the distance
+        vector times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
         ordered = values[self.order.places]
         total = self._near_slopes(ordered)

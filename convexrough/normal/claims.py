@@ -50,9 +50,10 @@ class Claim(ABC):
     proved    : what messages put before "proved", "not proved" or "wrong", such as "contact set"
     kinds     : names of the attributes that hold indices of wrong statuses, with a text on each
     claimed   : (n,) True where the asperity is claimed to touch or, in a verdict on shear, to slide
-    claims    : the two statuses that are thus claimed, where `claimed` is True and where it is
-        False
-    within : largest error allowed, as a fraction of the largest force, and of the total
+    claims    : the status claimed where `claimed` is True, and that where it is False, such as
+        ("contact", "open")
+    within : largest error allowed: of a force, as a fraction of the largest force; of the total, as
+        a fraction of the prescribed total
     total_prescribed : [force] None where it is not prescribed
     certificate : the certificate of the given forces
     solution    : a solution with its own statuses; None where it is not needed or not found
@@ -202,7 +203,7 @@ class Claim(ABC):
 
     @property
     def largest(self) -> float:
-        """[force] the size of the largest given force, or that of the solution if it is smaller."""
+        """[force] the largest |force|: of those given, or of the solution if that is smaller."""
         given, nearby = float(np.abs(self.values).max()), self.nearby()
         return given if nearby is None else min(given, float(np.abs(nearby[0]).max()))
 

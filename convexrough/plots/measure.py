@@ -1,10 +1,10 @@
 """Units of the axes of figures: SI units with prefixes, or quantities of the smooth contact.
 
-Where the scene names its units, axes are in SI units with suitable prefixes. Where it does not,
-lengths are in a_H and pressures in p0 (contact radius and peak pressure of the smooth sphere under
-the same load), shear forces in f P, and displacements and energies in X0 and W0 of `Scale`. Where
-there is no finite smooth contact, lengths are in the radius r_c of the circle that holds all
-contacts, and pressures in the mean pressure on this circle.
+Where the scene names its units, axes show metric units as SI units with suitable prefixes, and
+other units unchanged. Where it does not, lengths are in a_H and pressures in p0 (contact radius and
+peak pressure of the smooth sphere under the same load), shear forces in f P, and displacements and
+energies in X0 and W0 of `Scale`. Where there is no finite smooth contact, lengths are in the radius
+r_c of the circle that holds all contacts, and pressures in the mean pressure on this circle.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 class Measure(NamedTuple):
     """The unit of an axis: `size` divides the values, and the label names this divisor.
 
-    symbol : formula of the divisor; "" if `said` is a unit
-    said   : unit of the axis, or the value of the symbol
+    symbol : formula of the divisor, such as a_H; "" if the axis shows a unit
+    said   : this unit; or, if there is a symbol, the value of the divisor
     """
 
     size: float = 1.0
@@ -57,7 +57,11 @@ class Measure(NamedTuple):
 
 
 def measure(size: float, unit: str, symbol: str = "") -> Measure:
-    """The unit of an axis of values up to `size`: SI with prefix, or another `unit`, or `size`."""
+    """The measure of an axis with values up to `size`.
+
+    A metric `unit` becomes an SI unit with a prefix, and another unit stays. Without a unit, `size`
+    is the divisor, and `symbol` its formula; without a symbol, too, the numbers stay.
+    """
     if known := _metric(unit):
         name, exponent = known
         si, step = abs(size) * 10.0**exponent, 0  # a power of a thousand scales it to 1 to 1000
@@ -138,7 +142,7 @@ class Scale:
 
     @cached_property
     def travel(self) -> float:
-        """[length] X0: displacement at gross sliding, of the smooth contact or else of this one."""
+        """[length] X0: displacement at gross sliding of a smooth contact; if none, of this one."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
         scene = self.contact.scene  # X0 = c_t f times the approach from first touch

@@ -108,7 +108,8 @@ class SmoothSphere(Record):
     def traction(self, distance: ArrayLike, force: ArrayLike) -> Any:
         """[force / length^2] shear traction after loading from rest, at a distance r from the axis.
 
-        It is f p0 [sqrt(1 - r^2/a_H^2) - (c/a_H) sqrt(1 - r^2/c^2)], the last root 0 for r > c.
+        For Q >= 0 it is f p0 [sqrt(1 - r^2/a_H^2) - (c/a_H) sqrt(1 - r^2/c^2)], where the last root
+        counts as 0 for r > c. The force -Q gives the opposite traction.
         """
         peak = self._friction * self.peak_pressure
         return surface_shear.traction(
@@ -118,7 +119,7 @@ class SmoothSphere(Record):
     def displacement(self, force: ArrayLike) -> Any:
         """[length] displacement along the shear after loading from rest.
 
-        X = (3 (2 - nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)].
+        X = (3 (2 - nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)] for Q >= 0;  X(-Q) = -X(Q).
         """
         return self._largest_displacement * mindlin.deflection(self._share("force", force))
 
