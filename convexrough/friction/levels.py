@@ -32,7 +32,7 @@ from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
-#: A shear force within this many roundoffs of f P counts as f P: gross sliding.
+#: A shear force that exceeds f P by at most this many roundoffs counts as f P: gross sliding.
 AT_THE_END = 16
 
 
@@ -117,7 +117,7 @@ class FrictionLevels:
             expected = f"at most X = {farthest:.17g}, where the last asperity slides"
             raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
-        if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:
+        if not (room - lowered).positive:
             return Fraction(0)
         if displacement == 0.0:
             return self.load
@@ -187,9 +187,9 @@ class FrictionLevels:
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
-    """T = Q / f as an exact fraction; P or -P if |T| differs from P only by rounding."""
+    """T = Q / f as an exact fraction; P or -P if |T| exceeds P, but only by rounding."""
     height = Fraction(force) / Fraction(checks.friction(scene.friction))
-    if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
+    if not load < abs(height) <= (1 + AT_THE_END * Fraction(ROUNDOFF)) * load:
         return height
     return load if height > 0 else -load
 

@@ -160,8 +160,8 @@ def shear(
 
     Prescribe one of the two:
 
-    force        : [force] shear force Q. If its relative difference from the friction limit f P is
-        at most 16 * 2^-53, it counts as f P, which means gross sliding
+    force        : [force] shear force Q. If it exceeds the friction limit f P by a rounding error,
+        at most 16 * 2^-53 of f P, it counts as f P, which means gross sliding
     displacement : [length] relative tangential displacement of distant points
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if the displacement
@@ -203,8 +203,10 @@ def shear(
         total = (levels.top.load - level.load) * levels.force_unit
         total = total if (displacement or 0.0) >= 0 else -total
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
-    most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
-    slip_errors = np.where(loaded, drifts.error, 0.0) + np.where(unsure, most, 0.0)
+    off = 0.0 if displacement is None else float((moved - displacement).size)  # past gross sliding
+    slips = drifts.error + off
+    most = np.abs(drifts.value) + slips  # the slip is 0 if the asperity does not touch
+    slip_errors = np.where(loaded, slips, 0.0) + np.where(unsure, most, 0.0)
     unknown = np.inf if order == "fails" else 0.0
     status = walk.status()[0]
     certificate = ShearCertificate(

@@ -276,3 +276,41 @@ def test_energies_never_fall() -> None:
     for seed in range(5):
         loads, forces = random_path(seed)
         assert (np.diff(cr.load_path(PAPER, loads=loads, forces=forces).losses) >= 0).all()
+
+
+@pytest.mark.parametrize("below", range(-2, 18, 3))
+def test_forces_that_miss_gross_sliding_by_roundings(below: int) -> None:
+    """One asperity, whose approach is k L^(2/3) at the load L, in closed form."""
+    rng = np.random.default_rng(20 + below)
+    friction, load = float(rng.uniform(0.05, 2.0)), float(10 ** rng.uniform(-40, 10))
+    contact = cr.press(cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL, friction), load=load)
+    force = friction * load * (1 - below * 2.0**-53)
+    with ctx.workdps(80):
+        f, P, third = arb(friction), arb(load), arb(1) / 3
+        radius, nu = 1 / (1 + 1 / arb(0.02)), arb(MATERIAL.poisson_ratio)
+        k = (3 / (4 * arb(MATERIAL.contact_modulus) * radius.sqrt())) ** (2 * third)
+        travel = f * (2 - nu) / (2 * (1 - nu))
+        L = max(P - arb(force) / f, arb(0))
+        moved = travel * k * (P ** (2 * third) - L ** (2 * third))
+        stored = k * (P ** (5 * third) - L ** (5 * third)) * 3 / 5
+        loss = 8 * travel * f * (stored - (P - L) / 2 * k * (P ** (2 * third) + L ** (2 * third)))
+        cycle = cr.cycle(contact, maximum=force)
+        past = cr.history(contact, forces=[force, 0.5 * force])
+        state = cr.shear(contact, force=force)
+        for value, error, true in (
+            (cycle.loss, cycle.loss_error, loss),
+            (cycle.displacement_amplitude, cycle.displacement_error, moved),
+            (past.displacements[0], past.displacement_errors[0], moved),
+            (state.displacement, state.certificate.displacement_error, moved),
+        ):
+            assert abs(arb(value) - true) <= arb(error) * (1 + arb(2) ** -40)
+        far = state.displacement
+        for _ in range(abs(below)):
+            far = float(np.nextafter(far, 0.0 if below > 0 else np.inf))
+        pushed = cr.shear(contact, displacement=far)
+        rest = P ** (2 * third) - arb(far) / (travel * k)
+        slip = max(-rest, arb(0)) * travel * k
+        left = max(rest, arb(0)) ** (arb(3) / 2)
+        proof = pushed.certificate
+        assert abs(arb(pushed.slips[0]) - slip) <= arb(proof.slip_errors[0]) * (1 + arb(2) ** -40)
+        assert abs(arb(pushed.force) - f * (P - left)) <= arb(proof.force_error)
