@@ -105,8 +105,8 @@ def assert_agree(
 
     Two results contradict each other if proved statuses differ, or if values differ by more than
     the sum of their error bounds (`compare.contradictions`). Raises AssertionError with the
-    asperities concerned, and InputError if the numbers of asperities or the prescribed quantities
-    differ.
+    asperities concerned; InputError if the numbers of asperities differ, or the prescribed
+    quantities of two contacts.
     """
     __tracebackhide__ = True
     within = tolerance("within", within)

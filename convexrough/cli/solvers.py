@@ -143,8 +143,8 @@ def gallery(
     A case is a scene; a family has cases that are hard in the same way. NAMES are names of cases or
     families; default: all cases. --export writes each case as a quadratic program (.npz for
     qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index; --force replaces
-    an earlier export. --profile prints how often each solver is right, and how fast; with --solver
-    it times only Newton's method and the named solvers. Loads are right if all errors are at most
+    an earlier export. --profile prints how often each solver is right, and how fast; with --solver,
+    only Newton's method and the named solvers are timed. Loads are right if all errors are at most
     0.1 % of the largest load; the contact set is right if exactly the asperities that touch have a
     load.
     """

@@ -36,9 +36,10 @@ STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """The load at which an asperity first touches, and two loads [force] that enclose it.
+    """The load at which an asperity first touches, and two loads [force] below and above it.
 
-    The enclosure is proved if no indentation falls as the load rises.
+    If no indentation falls as the load rises, it is proved that the first touch is between `lower`
+    and `upper`.
     """
 
     load: Fraction

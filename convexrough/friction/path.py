@@ -207,7 +207,7 @@ class LoadPath(Table, Plottable):
 
     @property
     def slips(self) -> Array:
-        """(m, n) [length] gross slip of the asperities that touch; 0 for others."""
+        """(m, n) [length] gross slip of each asperity that touches; 0 for open asperities."""
         return frozen(np.where(self.asperity_loads > 0, self.drifts, 0.0))
 
     def gradient(
@@ -220,7 +220,7 @@ class LoadPath(Table, Plottable):
         """Derivatives of a weighted sum of losses and displacements by the scene and the path.
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
-            of the last loss is 1, and all others are 0
+            of the last loss is 1, and all other weights are 0
         holding : quantity kept constant, as in `Contact.gradient`. Derivatives by other quantities
             than `forces` are taken at constant forces Q, not at constant Q / (f P)
 
@@ -249,15 +249,14 @@ def load_path(
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
-    influence : how the compliance matrix is stored, as in `press`; with None, the cheapest way is
-        chosen
+    influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
     general_steps : number of general steps per segment. General steps also apply if an indentation
         falls as the load rises, that is, if order fails (docs/theory/without-order.md), but their
         results are not proved. With None, the states come from the memory curve; if order fails in
         a proved contact, they come from 16, 32 or 64 general steps per segment
 
-    Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
-    SolverError if a normal problem is not solved.
+    Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
+    without friction, or a `start` of another scene; SolverError if a normal problem is not solved.
 
     >>> P = contact.load
     >>> path = cr.load_path(scene, loads=[P / 2, P, P / 2], forces=[0.0, 0.3 * P, 0.1 * P])

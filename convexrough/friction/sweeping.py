@@ -100,7 +100,7 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
 def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
     """make(*rows), computed in parts of about NUMBERS numbers; each row needs `cost` numbers."""
     some = max(1, NUMBERS // cost)
-    parts = range(0, max(1, len(rows[0])), some)  # one at least, if empty
+    parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
     return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
 
 

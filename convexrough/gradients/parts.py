@@ -42,7 +42,7 @@ class Slopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a result that comes from one level: a weighted sum of V, D0, P and n.
+    """The part of a result that belongs to one level: a weighted sum of V, D0, P and n.
 
     energy, approach : weights of V and D0
     loads, indentations : (n,) weights of P and n

@@ -64,7 +64,7 @@ class Coupling(Protocol):
         ...
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bound on the error of `apply` for these float64 loads."""
+        """Bound on the error of `apply` for float64 loads."""
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:
@@ -83,8 +83,8 @@ class Influence(Coupling, Protocol):
     points : (n, 2) [length] the contact points
     scale  : 1 / (pi E*) with the contact modulus E*, in the units of loads and displacements
     stored : True if the matrix is stored; if False, products with float32 loads are cheaper
-    cheap_sums : True if `sums` takes only a few times as long as `apply`. Newton's method then ends
-        early, and `normal.refine` makes the last steps with these sums
+    cheap_sums : True if `sums` takes only a few times as long as `apply`. Then Newton's method ends
+        early, and `normal.refine` makes the last steps with `sums`
     """
 
     @property
@@ -156,7 +156,7 @@ class Influence(Coupling, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class JointCoupling:
-    """The map from loads on the last points of an operator to displacements of the first ones.
+    """The map from loads on the last points of an operator to displacements of the first points.
 
     joint : the operator among all points
     targets : number of first points; displacements are computed at these points

@@ -69,7 +69,7 @@ def describe(results: Iterable[Result]) -> list[str]:
 
 
 def warnings(results: Iterable[Result]) -> Iterator[str]:
-    """Warnings about results that are not proved and about limits of the model."""
+    """Yield warnings about results that are not proved, and about limits of the model."""
     for result in results:
         yield from result.doubts()
         yield from result.cautions()
@@ -215,7 +215,7 @@ def _moved(new: Path, folder: Path) -> None:
 
 
 def remove_earlier(folder: Path) -> None:
-    """Remove the files that `files.json` in the folder lists, and `files.json` first."""
+    """Remove `files.json` from the folder, and then the files that it lists."""
     files = _manifest(folder).get("files")
     for name in [MANIFEST, *map(str, files)] if isinstance(files, list) else []:
         path = folder / Path(name).name  # only the name: inside the folder, even for "../x"

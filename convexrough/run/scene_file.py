@@ -99,7 +99,7 @@ def read_summits(
         raise InputError("tip radii", found=found, expected=expected, where=str(path))
     positions = np.column_stack((columns["x"], columns["y"]))
     radii = tip_radius if given is None else given
-    assert radii is not None  # one of the two
+    assert radii is not None  # one of the two is given
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
 
@@ -126,7 +126,7 @@ def is_permuted(cells: NDArray[Any]) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Task(Record):
-    """A scene, its prescribed approach or load, and the stages (steps of the study) to compute."""
+    """A scene, its prescribed approach or load, and the stages to compute, such as [cycle]."""
 
     scene: Scene
     approach: float | None
@@ -169,7 +169,7 @@ class SceneFile(Task):
         has all asperities that can touch up to this approach. None if the pattern is limited in
         another way, or if the asperities are not in a pattern
     influence : how the compliance matrix is stored; None for the cheapest way
-    stages : the tables that request results, by name; the first is [normal]
+    stages : the tables of the file that request results, by name; the first table is [normal]
     text   : text of the file;  seed : seed of its random heights and radii, or None
     convert : True to convert columns in other units than those of the scene, False to refuse them
     inputs : the SHA-256 of each file that was read, by the path of the file

@@ -275,7 +275,7 @@ def sweep(
         the friction limit (coefficient of friction times load)
     measure  : names of numbers in summary.json, such as "cycle.loss", or their last parts ("loss");
         replaces the list of a sweep file
-    out      : folder for the results; default: they are only returned
+    out      : folder for the results; default: the results are only returned
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: the number of cores that this process may use
     resume   : continue an interrupted sweep in the folder
@@ -286,8 +286,8 @@ def sweep(
     interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice while computing the same scenes, if they died too often, if no worker is
-    left, or if a worker has other versions of packages than this process.
+    workers died twice while computing the same scenes, if workers died too often, if the executor
+    is broken, or if a worker has other versions of packages than this process.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)

@@ -165,7 +165,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
             path.mkdir(parents=True, exist_ok=True)
-            # Meanwhile another process may write the manifest of this sweep or of another one.
+            # Meanwhile another process may write the manifest of this sweep or of another sweep.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
@@ -342,7 +342,7 @@ class SweepTable(Record):
 
         Raises InputError if nothing is swept, if there are no rows, and for unknown names.
         """
-        from convexrough.plots.style import label, literal  # it loads matplotlib
+        from convexrough.plots.style import label, literal  # only when it draws: loads matplotlib
         from convexrough.sweeps.figures import draw_quantiles
 
         if not self.swept or not len(self):
