@@ -1,4 +1,4 @@
-"""Files that replace earlier ones only when they are complete, and JSON without infinities."""
+"""Files that replace earlier files only when they are complete, and JSON without infinities."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from typing import Any
 
 from convexrough.errors import file_errors
 
-#: The name of an unfinished file, which contains its final name and the number of its process.
+#: The name of an unfinished file contains its final name and the number of the process.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
 
 
 def unfinished(path: Path) -> Path:
-    """The path at which this process writes the file `path` until it is complete."""
+    """The path under which this process writes the file `path` until the file is complete."""
     return path.with_name(f".{path.name}.{os.getpid()}.unfinished")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path; its file replaces `path` if the body succeeds, and is removed otherwise.
+    """A context manager that yields a temporary path, to which the body writes a file.
 
-    Raises FileError if `path` cannot be written. A killed process leaves the temporary file.
+    If the body succeeds, this file replaces `path`; otherwise it is removed. A killed process
+    leaves the temporary file. Raises FileError if `path` cannot be written.
     """
     temporary = unfinished(path)
     try:
@@ -40,7 +41,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str | bytes) -> Path:
-    """Write a text as UTF-8, or bytes, to a file; return the path of the file."""
+    """Write a text (as UTF-8) or bytes to a file; return the path of the file."""
     with replacing(path) as temporary:
         temporary.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path

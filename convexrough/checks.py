@@ -1,4 +1,4 @@
-"""Checks of arguments, which raise an InputError with the value found and what is expected."""
+"""Checks of arguments; they raise an InputError that says what was found and what is expected."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array, even
 from convexrough.errors import InputError
 
-#: Smallest and largest size of a number in a scene's units; float64 holds products of such numbers.
+#: Smallest and largest absolute value of a number in a scene's units, so that products of such
+#: numbers do not underflow or overflow.
 SMALLEST, LARGEST = 1e-60, 1e60
 
 #: The description of valid numbers in the error message for a number outside these limits.
@@ -23,14 +24,14 @@ class Kind(NamedTuple):
     """A check of a number. Calling it with a name and a value returns the value as a float.
 
     expected : description of valid numbers, for error messages
-    holds    : function that is True for a finite number if this number is valid
+    holds    : function that returns True for a valid number; called with finite numbers only
     """
 
     expected: str
     holds: Callable[[float], bool]
 
     def __call__(self, what: str, value: float | None) -> float:
-        """The value of `what` as a float; raises InputError if it is not valid or `is_sized`."""
+        """The value of `what` as a float; raises InputError unless it is valid and `is_sized`."""
         number = _number(what, value, self.expected)
         if not (math.isfinite(number) and self.holds(number)):
             raise InputError(what, found=number, expected=self.expected)
@@ -46,14 +47,14 @@ variation = Kind(
     "a standard deviation over the mean, from 0 to 1: not in per cent",
     lambda number: 0 <= number <= 1,
 )
-#: The limit is a little above pi, because pi may be rounded up.
+#: The limit is a little above pi, because the user may round pi up.
 phase = Kind(
     "a phase in radians, from -pi to pi; 90 degrees are 1.5708", lambda number: abs(number) < 3.15
 )
 
 
 def is_sized(number: float) -> bool:
-    """True for 0 and for numbers of a size from `SMALLEST` to `LARGEST`."""
+    """True for 0 and for numbers of an absolute value from `SMALLEST` to `LARGEST`."""
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
@@ -72,7 +73,7 @@ def whole(what: str, value: int, least: int = 1) -> int:
 
 
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
-    """A float64 copy, of any shape; raises InputError for text, dates and complex numbers."""
+    """A float64 copy, of any shape; raises InputError unless all values are real numbers."""
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
         found = f"{values.mask.sum()} masked values"
         raise InputError(what, found=found, expected=f"{expected} without gaps")
@@ -93,11 +94,12 @@ def array(
     smallest: float = 0.0,
     one: str = "asperity",
 ) -> Array:
-    """A read-only copy of a vector; raises InputError for values that are not valid.
+    """A read-only copy of a vector; raises InputError for values that are not valid or finite.
 
     length : required number of values; a single number stands for this many equal values
-    sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
-    one  : noun in messages for that which has one value, as in "one per asperity"
+    sign : "", "positive" or "not negative"
+    smallest : smallest absolute value of values that are not 0
+    one  : noun for messages such as "one per asperity"
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
@@ -135,7 +137,7 @@ def same_index(**given: Any) -> None:
 
 
 def in_order(what: str, values: Any) -> None:
-    """Raise InputError for a pandas object whose index is 0, 1, ..., n - 1 in another order."""
+    """Raise InputError for a pandas object with the index 0, 1, ..., n - 1 in another order."""
     if hasattr(values, "iloc"):
         index = np.asarray(values.index)
         counts = index.dtype.kind in "iu" and (np.sort(index) == np.arange(len(index))).all()
@@ -188,7 +190,7 @@ def instance(what: str, value: object, kind: type) -> None:
 
 
 def _short(value: object) -> str:
-    """A value on one line of an error message: its text, shortened, or its type."""
+    """A value for one line of an error message: its text, shortened, or its type."""
     text = repr(value)
     return f"type {type(value).__name__}" if "\n" in text else text[:60]
 
@@ -200,7 +202,7 @@ def sequence(what: str, values: object, expected: str) -> None:
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
-    """Raise InputError unless exactly one of two alternatives is given (the other is None)."""
+    """Raise InputError unless exactly one of two values is None."""
     if (a is None) == (b is None):
         found = "neither" if a is None else "both"
         raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
@@ -225,7 +227,7 @@ def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """A suggestion for an unknown name: the most similar valid name, or else all valid names."""
+    """A suggestion for an unknown name: the most similar valid name or, if none is, all names."""
     import difflib  # only when something is misspelt
 
     names = {each.lower(): each for each in valid}

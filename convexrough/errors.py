@@ -1,4 +1,4 @@
-"""The errors of the package; each message says what is wrong and what is expected."""
+"""The errors of the package. Each message says what is wrong and, for input, what is expected."""
 
 from __future__ import annotations
 
@@ -41,16 +41,17 @@ class InputError(ConvexroughError, ValueError):
         super().__init__(f"{place}{what}: found {found}, expected {expected}")
 
     def within(self, where: str) -> InputError:
-        """The same error with the place `where` (a file, for example) in front."""
+        """The same error, with `where` (a file, for example) in front of the message."""
         place = f"{where}: {self.where}" if self.where else where
         return InputError(self.what, found=self.found, expected=self.expected, where=place)
 
 
 @contextmanager
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
-    """Put the place `where` (a file, a table) in front of each InputError that the body raises.
+    """A context manager: put `where` (a file, a table) in front of InputErrors of the body.
 
-    unless_known : True to leave errors that name a place unchanged; a MistakesError never changes
+    unless_known : True to leave errors unchanged that name a place already. A MistakesError never
+        changes
     """
     try:
         yield
@@ -85,7 +86,10 @@ class FileError(ConvexroughError):
 
 @contextmanager
 def file_errors(path: Path, what: str) -> Iterator[None]:
-    """Turn an OSError of the body into a FileError that says what failed with this path and why."""
+    """A context manager: turn an OSError of the body into a FileError about `path`.
+
+    what : what could not be done, such as "be read"
+    """
     try:
         yield
     except OSError as error:
@@ -118,14 +122,14 @@ class ProofError(ConvexroughError):
     """Nothing could be proved; the message says why."""
 
 
-#: Packages to install for the extras that are not named after their package.
+#: Packages to install for an extra, if their names differ from that of the extra.
 PACKAGES = {"parquet": "pyarrow", "dask": "'dask[dataframe]' distributed"}
 
 
 class ExtraError(ConvexroughError, ImportError):
     """An optional package is missing; the message says what to install.
 
-    extra : the name of the extra that contains it
+    extra : the name of the extra that contains the package
     """
 
     def __init__(self, extra: str) -> None:
@@ -137,7 +141,7 @@ class ExtraError(ConvexroughError, ImportError):
 def needed(module: str, extra: str = "") -> Any:
     """The module of an optional package. Raises ExtraError if it is not installed.
 
-    extra : the name of the extra, by default that of the module
+    extra : the name of the extra; default: the name of the module
     """
     try:
         return import_module(module)

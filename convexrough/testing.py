@@ -1,8 +1,8 @@
 """Assertions for the tests of other software: forces are certified, or two results agree.
 
-Each function raises AssertionError with the asperities concerned, their errors and statuses. No
-function needs a test framework. Each raises InputError for values that are not finite, for negative
-loads, and for a wrong number of values.
+Each function raises AssertionError with the asperities concerned, their errors and statuses, and
+InputError for values that are not finite, for negative loads, and for a wrong number of values. No
+function needs a test framework.
 """
 
 from __future__ import annotations
@@ -37,13 +37,16 @@ def assert_certified(
     within: float = WITHIN,
     floor: float = 0.0,
 ) -> Certificate:
-    """The certificate of loads, after a check that exactly the asperities with a load touch.
+    """The certificate of loads, after a check that they are right.
+
+    The check is passed if it is proved that exactly the asperities with a load touch, and that all
+    errors are within the limit.
 
     loads  : (n,) [force] from any source, in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed: of a load, as a fraction of the largest load; and of a
+    within : largest error allowed for a load, as a fraction of the largest load, and for a
         prescribed total, as a fraction of this total
-    floor  : [force] a load up to this size counts as 0, and its asperity as open
+    floor  : [force] a load up to this size counts as 0, that is, its asperity is claimed to be open
 
     Raises AssertionError with the asperities concerned.
     """
@@ -63,11 +66,15 @@ def assert_shear_certified(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearCertificate:
-    """The certificate of shear forces, after a check that exactly the claimed asperities slide.
+    """The certificate of shear forces, after a check that they are right.
+
+    The check is passed if it is proved that exactly the claimed asperities slide, and that all
+    errors are within the limit.
 
     forces  : (n,) [force] shear force of each asperity on first loading, from any source
-    force   : [force] their prescribed sum
-    within  : largest error of a force, as a fraction of the largest force
+    force   : [force] the prescribed sum of the shear forces
+    within  : largest error allowed for a force, as a fraction of the largest force, and for the
+        sum, as a fraction of the prescribed sum
     sliding : (n,) True where sliding is claimed; default: where the force is the coefficient of
         friction times the load, within a fraction 1e-4
 
@@ -88,15 +95,18 @@ def assert_agree(
     load: float | None = None,
     within: float = WITHIN,
 ) -> None:
-    """Check that two results of one problem are certified and do not contradict each other.
+    """Check that two results of one problem are certified and agree.
+
+    They agree if no loads differ by more than `within`, and if they do not contradict each other.
 
     first, second : contacts, or loads (n,) [force] in the order of the scene's asperities
-    scene, approach or load : the problem, required for loads without a contact
+    scene, approach or load : the problem, required if `first` or `second` is an array of loads
     within : largest difference of two loads of one asperity, as a fraction of the largest load
 
-    A contradiction is what `compare.contradictions` reports: proved statuses differ, or values
-    differ by more than the sum of their error bounds. Raises AssertionError with the asperities
-    concerned, and InputError if the numbers of asperities or the prescribed quantities differ.
+    Two results contradict each other if proved statuses differ, or if values differ by more than
+    the sum of their error bounds (`compare.contradictions`). Raises AssertionError with the
+    asperities concerned; InputError if the numbers of asperities differ, or the prescribed
+    quantities of two contacts.
     """
     __tracebackhide__ = True
     within = tolerance("within", within)
@@ -134,7 +144,7 @@ def assert_agree(
 
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
-    """What a function returns; the traceback of an InputError shows no frames of the package."""
+    """The result of a function; the traceback of an InputError shows no frames of the package."""
     __tracebackhide__ = True
     try:
         return question(*arguments, **options)

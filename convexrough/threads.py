@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
-#: Work on at most this many numbers takes less time than the start of threads.
+#: Work on at most this many numbers takes less time than starting threads.
 MANY = 2**18
 
 
@@ -27,9 +27,10 @@ def worthwhile(numbers: int) -> int:
 
 
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
-    """Call work(part) for each part, in any order; no call may write what another one reads.
+    """Call work(part) for each part, in any order; no call may write what another call reads.
 
-    This thread works, too. The others have ended when this returns, so the process may be forked.
+    The calling thread works, too. When `each` returns, all other threads have ended, so the process
+    may be forked. If calls raise errors, `each` raises one of these errors.
     """
     todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
 
@@ -64,8 +65,8 @@ _inside: list[Any] = []
 def one_thread() -> Iterator[None]:
     """A context in which linear algebra uses one thread.
 
-    Several threads would round sums differently and slow down the threads of `each`. When the last
-    thread leaves the context, the former limits are restored.
+    Several threads would round sums differently and slow down the threads of `each`. The former
+    number of threads is restored when the last thread leaves the context.
     """
     with _lock:
         if not _inside:
@@ -97,5 +98,8 @@ def _free() -> None:
 
 
 def one_where(numbers: int) -> AbstractContextManager[object]:
-    """The context `one_thread` if `each` uses several threads for this many numbers."""
+    """The context `one_thread` if arrays of this many numbers use several threads.
+
+    For other arrays, a context without effect.
+    """
     return one_thread() if worthwhile(numbers) > 1 else nullcontext()

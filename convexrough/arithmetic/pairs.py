@@ -1,8 +1,8 @@
 """Double-double numbers: unevaluated sums of two float64 numbers, with about 31 decimal digits.
 
-The errors of float64 sums and products are computed as by Knuth and Dekker (Numer. Math. 18 (1971)
-224), without fused operations or longer numbers. Error bounds are relative; they hold if nothing
-underflows or overflows (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
+The errors of float64 sums and products are computed by the methods of Knuth and Dekker (Numer.
+Math. 18 (1971) 224), without fused operations or longer numbers. Error bounds are relative. They
+hold if nothing underflows or overflows (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ import numpy as np
 from convexrough import threads
 from convexrough.arrays import Array, Number, frozen
 
-#: Bound on the relative error of one operation on pairs. In squared roundoffs, the error is at most
-#: 3 for a sum, 5 for a product, and 64 for a quotient or root (one Newton step from float64).
+#: Bound on the relative error of one operation on pairs. In units of the squared roundoff, the
+#: error is at most 3 for a sum, 5 for a product, and 64 for a quotient or root (one Newton step
+#: from float64).
 PAIR_ROUNDOFF = 2.0**-98
 
 #: Largest number of terms that are summed at once.
 MANY = 2**18
 
-#: Number of elements that are processed together, which fit in a cache.
+#: Number of elements that are processed together, so that they fit in a cache.
 CHUNK = 2**14
 
 #: Mask of the sign, the exponent and the first 26 significant bits of a float64 number.
@@ -31,14 +32,14 @@ _FIRST_BITS = np.int64(-(1 << 27))
 
 
 class Pair(NamedTuple):
-    """Numbers high + low with |low| <= ROUNDOFF |high|: two arrays of one shape, or two floats."""
+    """Numbers high + low with |low| <= ROUNDOFF |high|; two arrays of one shape, or two floats."""
 
     high: Number
     low: Number
 
     @classmethod
     def exact(cls, values: Number) -> Pair:
-        """float64 numbers as pairs whose low parts are 0."""
+        """Pairs that are equal to float64 numbers; the low parts are 0."""
         high = np.asarray(values, dtype=np.float64)
         return cls(high, np.zeros(high.shape))
 
@@ -89,8 +90,8 @@ class Pair(NamedTuple):
     def inverse_root(self) -> Pair:
         """1 / sqrt(x) with a relative error below 2^-98; 0 where x is 0.
 
-        Let y be 1 / sqrt(x) in float64, and e = 1 - x y^2, computed to within 2^-104. The result is
-        y (1 + e / 2), with an error of about 3 e^2 / 8, and |e| < 2^-51.
+        Let y be 1 / sqrt(x) in float64, and e = 1 - x y^2. Then |e| < 2^-51, and e is computed to
+        within 2^-104. The result y (1 + e / 2) has a relative error of about 3 e^2 / 8.
         """
         with np.errstate(divide="ignore"):
             first = 1.0 / np.sqrt(self.high)
@@ -106,7 +107,7 @@ class Pair(NamedTuple):
         return Pair(*_settled(root, left / (3.0 * square)))
 
     def two_thirds(self) -> Pair:
-        """x^(2/3) of positive numbers x: c^2 + 2 c d, where c + d is the cube root and d tiny."""
+        """x^(2/3) of positive numbers x: c^2 + 2 c d, where c + d is the cube root, d tiny."""
         root, square, rest, left = self._cube_root()
         return Pair(*_settled(square, rest + left / (1.5 * root)))
 
@@ -118,9 +119,9 @@ class Pair(NamedTuple):
         return root, square, rest, ((self.high - near) - less) + (self.low - rest * root)
 
     def total(self) -> Pair:
-        """The sum along the last axis, with an error of at most 2^-97 of the sum of magnitudes.
+        """The sum along the last axis; the error is at most 2^-97 times the sum of absolute values.
 
-        The numbers are cut into parts of so few bits that float64 sums of them are exact.
+        The numbers are cut into parts of so few bits that float64 sums of these parts are exact.
         """
         high, low = np.asarray(self.high), np.asarray(self.low)
         n = high.shape[-1]
@@ -142,7 +143,7 @@ class Pair(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
-    """(length,) read-only numbers, slices of which `part` computes in several threads."""
+    """(length,) read-only numbers; `part` computes slices of them, in several threads."""
     if length <= CHUNK:
         return Pair(*map(frozen, part(slice(0, length))))
     found = Pair(np.empty(length), np.empty(length))
@@ -176,13 +177,13 @@ def two_square(a: Number) -> tuple[Number, Number]:
 
 
 def rounded(values: Array, unit: Array) -> Array:
-    """The multiples of `unit`, a power of two, nearest to values below 2^51 `unit`."""
+    """The multiples of `unit`, a power of two, that are nearest to values below 2^51 `unit`."""
     shift = 1.5 * 2.0**52 * unit
     return np.asarray((values + shift) - shift)
 
 
 def square_sum(x: Array, *others: Array) -> Pair:
-    """x^2 + y^2 for two arrays of coordinates, or x^2 for one."""
+    """x^2 + y^2 for two arrays of coordinates, or x^2 for one array."""
     total = Pair(*two_square(x))
     for y in others:
         total = total + Pair(*two_square(y))
@@ -195,7 +196,7 @@ def _settled(high: Number, low: Number) -> tuple[Number, Number]:
 
 
 def _halves(a: Number) -> tuple[Number, Number]:
-    """Two parts of numbers: the first 26, and the other 27 significant bits."""
+    """Two parts of numbers: the first 26 significant bits, and the other 27."""
     bits = np.asarray(a, dtype=np.float64)
     first = (bits.view(np.int64) & _FIRST_BITS).view(np.float64)
     return first, bits - first

@@ -1,4 +1,4 @@
-"""Commands about solvers: compare, export, gallery, bench; and paper, a published example."""
+"""Commands about solvers (compare, export, gallery, bench), and paper, a published example."""
 
 from __future__ import annotations
 
@@ -36,13 +36,14 @@ def compare(
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
-    SCS and QOCO also solve the cone program if they are installed. With --solver, only the named
+    If SCS and QOCO are installed, they solve the cone program, too. With --solver, only the named
     solvers are compared with Newton's method.
 
     Exit status, by the first case that applies: 2 if the input is wrong; 3 if a certified result
-    contradicts another that is proved to be the only solution; 4 if a solver failed; 3 if no result
-    is certified, if a load differs from Newton's by more than --within, or if a solver does not
-    accept the scene; else 0. A contradiction would reveal a mistake in the mathematics or the code.
+    contradicts another result that is proved to be the only solution; 4 if a solver failed; 3 if no
+    result is certified, if a load differs from Newton's by more than --within, or if a solver does
+    not accept the scene; else 0. A contradiction would reveal a mistake in the mathematics or the
+    code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
@@ -142,8 +143,8 @@ def gallery(
     A case is a scene; a family has cases that are hard in the same way. NAMES are names of cases or
     families; default: all cases. --export writes each case as a quadratic program (.npz for
     qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index; --force replaces
-    an earlier export. --profile prints how often each solver is right, and how fast; with --solver
-    it times only Newton's method and the named solvers. Loads are right if all errors are at most
+    an earlier export. --profile prints how often each solver is right, and how fast; with --solver,
+    only Newton's method and the named solvers are timed. Loads are right if all errors are at most
     0.1 % of the largest load; the contact set is right if exactly the asperities that touch have a
     load.
     """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
-    """The pair (K, N) of the text K/N, which asks for the K-th of N shares, counted from 1."""
+    """The pair (K, N) from the text K/N, which asks for share K of N shares, counted from 1."""
     if value is None:
         return None
     k, _, n = value.partition("/")
@@ -80,7 +80,7 @@ def sweep(
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
     from convexrough.sweeps.sweep import read_sweep, run
 
-    assert sweep is not None  # one of the two
+    assert sweep is not None  # SWEEP or --summary is given
     folder = output.out or Path(f"{sweep.stem}-sweep")
     with progress("reading the first scene"):
         plan = read_sweep(sweep)

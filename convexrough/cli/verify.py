@@ -112,11 +112,11 @@ def verify(
 
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
     Columns x and y, or an index, assign each row to an asperity; without them the rows are in the
-    order of the scene. An asperity with a positive load is claimed to touch, one with the load 0 to
-    be open. If there is a column pressure and no column load, rows are nodes or pixels. Pressure
-    times area is added to the load of the nearest asperity. The areas are in the column named area;
-    without it, each row is a pixel of a regular grid. With --out the command writes a table, a
-    figure and verdict.json.
+    order of the scene. An asperity with a positive load is claimed to touch; an asperity with the
+    load 0 is claimed to be open. If there is a column pressure and no column load, rows are nodes
+    or pixels. Pressure times area is added to the load of the nearest asperity. The areas are in
+    the column area; if there is no such column, each row is a pixel of a regular grid. With --out
+    the command writes a table, a figure and verdict.json.
 
     Exit status: 0 if it is proved that exactly the claimed asperities touch (with --shear also that
     exactly the claimed ones slide), and that no error exceeds the limit set with --within; 2 if the
@@ -197,7 +197,7 @@ def verify(
 
 @contextmanager
 def _reported(path: Path | None, files: str) -> Iterator[None]:
-    """Write errors of the body as JUnit XML, and raise them again."""
+    """A context manager: write an error of the body as JUnit XML, and raise it again."""
     from convexrough.verdict.report import junit
 
     try:
@@ -218,12 +218,12 @@ def _write(new: Writer, summary: dict[str, Any], claims: Sequence[Claim]) -> Non
 
 
 def _proof(file: SceneFile, loads: Array, holds: bool, scene: Path) -> Proof:
-    """The proof from the claimed loads, or if the claim holds, from the solution near them."""
+    """The proof that starts from the claimed loads or, if the claim holds, from the solution."""
     from convexrough.contact import solve
     from convexrough.proof import prove
 
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        if holds:  # loads may be too inaccurate for a proof in exact arithmetic
+        if holds:  # claimed loads may be too inaccurate for an exact proof
             loads = solve(file.problem(), start=loads).loads
         return prove(file.scene, loads, **control)

@@ -1,9 +1,9 @@
-"""Powers of a number between 0 and 1 as second-order cones.
+"""Powers of a number between 0 and 1, represented by second-order cones.
 
 A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
 the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
-the four cones (1) and the five cones (2). The section "Why it is exact" proves up to which S, the
-convexity number of a box, each form is exact: 21/25 with four cones, 1 with five.
+the four cones (1) and the five cones (2). Each form is exact up to some convexity number S of a
+box: 21/25 with four cones, 1 with five cones. The section "Why it is exact" proves this.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from convexrough.arrays import Array, Indices
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-#: The largest S for which four cones are exact, and the largest for which five cones are.
+#: The largest S for which four cones are exact, and the largest S for which five cones are exact.
 FOUR_CONES_LIMIT, FIVE_CONES_LIMIT = 21 / 25, 1.0
 
-# Each cone x y >= w^2 as a row for x, y and w, in the columns 1, y1, y2, y3, y4, y5, z.
+# Each cone x y >= w^2 is given by rows for x, y and w, in the columns 1, y1, y2, y3, y4, y5, z.
 _Y1_AND_Y3 = [[1, -1, 0, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0, 0], [0, 1, -1, 0, 0, 0, 0]]
 _Y2_AND_Y4 = [[0, 1, -1, 0, 0, 0, 0], [0, 0, 0, 1, -1, 0, 0], [0, 0, 1, -1, 0, 0, 0]]
 _SQUARE = [[1, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0], [0, 0, 1, 0, 0, 0, 0]]
@@ -29,7 +29,7 @@ _Y3_AND_Y5 = [[0, 0, 1, -1, 0, 0, 0], [0, 0, 0, 0, 1, -1, 0], [0, 0, 0, 1, -1, 0
 _PRODUCT = [[0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, 0]]
 _WITH_Z = [[0, 0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 1, -1, 0]]
 
-#: (cones, 3, 7): the forms x, y, w of each cone in the columns 1, y1, ..., y5, z.
+#: (cones, 3, 7): for each cone, rows for x, y and w, in the columns 1, y1, ..., y5, z.
 FOUR_CONES = np.array([_SQUARE, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64)
 FIVE_CONES = np.array([_Y1_AND_Y3, _Y2_AND_Y4, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64)
 
@@ -40,7 +40,7 @@ SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 class ConeRows(NamedTuple):
     """Rows of a program:  constant - matrix @ variables  lies in second-order cones.
 
-    cones : number of these cones, which have dimension 3
+    cones : number of these cones, each of dimension 3
     """
 
     matrix: csc_array  # (3 cones, width)
@@ -51,8 +51,8 @@ class ConeRows(NamedTuple):
 def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
     """The cones of n lifts as rows of  A x + s = b  with s in second-order cones.
 
-    lifts : the columns of y2, y3, y4, y5 and z, (n,) each, for four cones; those of y1, ..., y5 and
-        z for five cones
+    lifts : for four cones, the columns of y2, y3, y4, y5 and z, (n,) each; for five cones, the
+        columns of y1, ..., y5 and z
     width : number of variables of the program
     ones  : (n,) columns of variables, one for each lift, that replace the constant 1 in its cones
 
@@ -63,7 +63,7 @@ def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = Non
     columns = np.stack(lifts)
     names, n = columns.shape
     cones = SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
-    rows = cones.reshape(-1, 7)  # of one lift
+    rows = cones.reshape(-1, 7)  # rows of one lift
     constant, coefficients = rows[:, 0], rows[:, 7 - names :]
     if ones is not None:
         columns = np.vstack((ones, columns))

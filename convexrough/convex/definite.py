@@ -1,9 +1,9 @@
 """Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
 
-docs/theory/certificate.md, "Which box", 2, gives the proof for an (n, n) matrix in float64. It
-needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u, which is true if the matrix fits in memory.
-LAPACK need not report overflow or entries that are not finite. These make the diagonal of the
-factor nan or infinite, so the diagonal is checked.
+docs/theory/certificate.md, "Which box", 2, gives the proof for an (n, n) matrix in float64. The
+proof needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u. This holds for all matrices that fit in
+memory. LAPACK need not report overflow or entries that are not finite. Such entries make the
+diagonal of the factor nan or infinite, so the diagonal is checked.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from convexrough.roundoff import ROUNDOFF
 
 
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
-    """The largest of the increasing `margins` for which `proved` is true; 0 if it is for none.
+    """The largest of the increasing `margins` for which `proved` is true; 0 if there is none.
 
-    The search is by bisection: if `proved` is true for a margin, it should be for smaller ones.
+    The search is by bisection. It assumes that `proved` is true for all margins below one for which
+    it is true.
     """
     low, high = -1, len(margins)
-    middle = 0  # begin with the smallest: if it is not proved, no other needs a test
+    middle = 0  # begin with the smallest margin: if it is not proved, no other margin needs a test
     while high - low > 1:
         if proved(margins[middle]):
             low = middle
@@ -34,7 +35,7 @@ def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
 
 
 def is_definite(matrix: Array) -> bool:
-    """True if Cholesky's factorisation of a symmetric matrix succeeds; not a proof by itself."""
+    """True if Cholesky's factorisation of a symmetric matrix succeeds; by itself no proof."""
     from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only when asked
 
     # The transpose of a symmetric matrix is equal to it and has LAPACK's memory order.
@@ -48,7 +49,7 @@ def proved_margin(
     """The first margin mu for which  I + M >= (mu + spare) I  is proved; 0 if there is none.
 
     couplings   : (n, n) computed symmetric M, with 0 on the diagonal
-    margins     : each from 0 to 1, in the order in which they are tried
+    margins     : numbers from 0 to 1, in the order in which they are tried
     entry_error : bound on the relative error of each entry of M
     """
     n = len(couplings)
@@ -69,18 +70,19 @@ def proved_sparse_margin(
     margins: Sequence[float],
     errors: Array,
 ) -> float:
-    """The largest margin mu for which  S >= mu I  is proved for a sparse symmetric S; else 0.
+    """The largest margin mu for which  S >= mu I  is proved for a sparse symmetric S; 0 if none.
 
     diagonal : (n,) the diagonal of S
-    pairs, values, errors : indices of the entries of S above the diagonal, these entries, and
+    pairs, values, errors : the indices of the entries of S above the diagonal, the entries, and
         bounds on their errors
     margins  : in increasing order
 
     1. Elimination without exchange of rows gives L and U with S = L U + E and
        |E| <= g / (1 - g) |L| |U|, where g = n u with the roundoff u (Higham, Accuracy and
        Stability, theorem 9.3).
-    2. Let D, the diagonal of U, be positive. Then L D L' is positive definite, and
-       S - L D L' = E + L (U - D L') is symmetric, so its norm is at most its largest row sum.
+    2. Let D, the diagonal of U, be positive. Then L D L' is positive definite. The difference
+       S - L D L' = E + L (U - D L') is symmetric, so its norm is at most e, the largest row sum of
+       its absolute values. Therefore S >= -e I.
     """
     from scipy.sparse import coo_array
 

@@ -1,11 +1,11 @@
 """The memory curve: the tangential state under varying normal load, as plane geometry.
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
-after any path of (P, T) is a polygonal line: heights Th(s) over load levels 0 <= s <= P, from
-(0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes
-this line by the rules of docs/theory/paths.md, "The rules". The slip front is the level above which
-the segment has changed the line. The rules do not depend on elasticity. All numbers are exact
-fractions, so no rule rounds.
+after any path of (P, T) is a polygonal line: the heights Th(s) at load levels 0 <= s <= P. It leads
+from (0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path
+changes this line by the rules in docs/theory/paths.md, "The rules". The slip front is the level
+above which the segment has changed the line. The rules do not depend on elasticity. All numbers are
+exact fractions, so no rule rounds.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from convexrough.record import Along, Table, in_text
 
 
 class Piece(NamedTuple):
-    """A part of a segment on which the slip front falls through one layer (segment) of the curve.
+    """A part of a path's segment on which the slip front falls through one layer of the curve.
 
     sign   : the direction c of slip, 1 or -1
     slope  : slope th of the layer; the loss is proportional to 1 - c th
-    top, bottom : [force] levels of the front before and after
-    load_before, load_after : [force] P before and after; P changes linearly with the front's level
+    top, bottom : [force] levels of the front at the beginning and the end of the part
+    load_before, load_after : [force] P at the beginning and the end; P is linear in the level of
+        the front
     """
 
     sign: int
@@ -47,12 +48,12 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Plottable):
-    """The friction state after a path, as a polygonal line over load levels (docs/theory/paths.md).
+    """The friction state after a path: a polygonal line of load levels (docs/theory/paths.md).
 
     levels, heights : (m + 1,) [force] coordinates s and Th of the vertices, from the origin
     slopes : (m,) slope of each layer, between a vertex and the next
-    front  : [force] level of the slip front at the end of the last segment; above it, this segment
-        has changed the line. None if nothing slips
+    front  : [force] level of the slip front at the end of the last segment, which has changed the
+        line above the front. None if nothing slips
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])
@@ -99,7 +100,7 @@ class MemoryCurve(Table, Plottable):
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:
-        """The level s_k of each vertex, and its bend c_k: the slope below it minus that above."""
+        """Each vertex's level s_k and bend c_k: the slope below the vertex minus that above."""
         slopes = (Fraction(0), *self.slopes, Fraction(0))
         bends = [below - above for below, above in pairwise(slopes)]
         return list(zip(self.levels, bends, strict=True))
@@ -122,11 +123,11 @@ class MemoryCurve(Table, Plottable):
         return curve, pieces
 
     def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after the part of a segment that one rule covers, and the pieces of loss."""
+        """The state after the first part of a segment, which one rule covers, and its pieces."""
         added, shear = load - self.load, height - self.height
         if added > 0 and abs(shear) <= added:
             return self._with(shear / added, load, height), []
-        # If the load falls, this is positive if the path starts above the old curve.
+        # If the load falls, `lean` is positive where the path starts above the old curve.
         lean = shear if added >= 0 else shear - self.slopes[-1] * added
         if lean != 0:
             return self._slip(1 if lean > 0 else -1, load, height)
@@ -135,13 +136,12 @@ class MemoryCurve(Table, Plottable):
         return below if load <= below.load else below._with(self.slopes[last], load, height), []
 
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after slip of this sign on the segment, and the pieces of its loss.
+        """The state after slip of this sign on a segment, and the pieces of its loss.
 
         The line of slope `sign` through the moving point (P, T) meets the old curve at the front.
-        The front reaches the lower end of a layer when a fraction `reach` of the segment is
-        covered. Within a layer this fraction is linear in the level of the front. The front passes
-        a layer of slope `sign` at once. If the load falls, the point itself may meet the curve
-        again; the slip then ends.
+        The front reaches the lower end of a layer at the fraction `reach` of the segment. Within a
+        layer, this fraction is linear in the level of the front. The front passes a layer of slope
+        `sign` at once. If the load falls, the point may meet the curve again. Then slip ends.
         """
         added, shear = load - self.load, height - self.height
         rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0

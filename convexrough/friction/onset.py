@@ -1,9 +1,9 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
 P is the load, Q the shear force and f the coefficient of friction. The onset of asperity i is the
-total load L at which its indentation n_i(L) is 0. On first loading the asperity slides once
-P - Q / f is below its onset. Newton's method finds the onset, and two proofs enclose it: the
-asperity is open at a slightly smaller load, and it touches at a slightly larger one.
+total load L at which its indentation n_i(L) rises to 0. On first loading the asperity slides once
+P - Q / f is below its onset. Newton's method finds the onset. Two proofs enclose it: that the
+asperity is open at a slightly smaller load, and that it touches at a slightly larger load.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ from convexrough.friction.levels import FrictionLevels
 #: The largest number of onsets in one call if no compliance matrix is stored.
 MOST_ONSETS = 256
 
-#: Relative distances from the computed onset at which proofs are tried, the closest first.
+#: Relative distances of loads from the computed onset at which proofs are tried, smallest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: A level (normal solution) that is known already is tried first if its relative distance from the
-#: onset is at most TRIED[ENOUGH].
+#: A level (normal solution) that is known already is tried first if the relative distance of its
+#: load from the onset is from TRIED[0] to TRIED[ENOUGH].
 ENOUGH = 2
 
-#: The largest number of Newton steps, and the change of L, relative to P, that ends them.
+#: The largest number of Newton steps, and the change of L, relative to P, at which they end.
 STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """The load at which an asperity first touches, and two loads [force] that enclose it.
+    """The load at which an asperity first touches, and two loads [force] below and above it.
 
-    The enclosure is proved if no indentation falls as the load rises.
+    If no indentation falls as the load rises, it is proved that the first touch is between `lower`
+    and `upper`.
     """
 
     load: Fraction
@@ -50,11 +51,11 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
     In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
-    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. It
-    is also nan if the order (see `prove_order`) "fails" between the load of the asperity's first
-    touch and the load of the contact: the asperity may then start to slide at another force.
+    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. The
+    result is also nan if `prove_order` gives "fails" between the load of the asperity's first touch
+    and the load of the contact: the asperity may then start to slide at another force.
 
-    which : indices of the asperities, in the order of the result; default all. Each asperity needs
+    which : indices of asperities, in the order of the result; default: all. Each asperity takes
         several normal solutions
 
     Raises InputError if the scene has no friction, or if more than 256 loaded asperities are chosen
@@ -88,13 +89,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
-    """The onsets of asperities that touch at P; 0 or P replaces a bound that is not proved."""
+    """The onsets of asperities that touch at P, by index. Bounds not proved become 0 or P."""
     depths = levels.top.indentation.value[levels.top.problem.places[which]]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """The onset of one asperity, enclosed by levels near it; known levels are tried first."""
+    """The onset of one asperity, with bounds. Levels that are known already are tried first."""
     place = int(levels.top.problem.places[asperity])
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -112,7 +113,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
 
-    if not levels.at(Fraction(0)).open[place]:  # it may be the first asperity to touch
+    if not levels.at(Fraction(0)).open[place]:  # it may touch first
         return Fraction(0)
     known = [load for load in levels.known if depth(load) > 0]
     low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)
@@ -139,7 +140,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
-    """The index and the onset of the last asperity to touch among those that touch at P."""
+    """The index and the onset of the asperity that touches last, of those that touch at P."""
     touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
     depths = levels.top.indentation.value[touching]
     last = int(touching[np.argmin(depths)])

@@ -1,14 +1,16 @@
 """`load_path` computes friction states along a path of load P and shear force Q.
 
-`history` does so at constant P. With the coefficient of friction f, the points of a path are
-(P, T = Q / f). The memory curve stores the friction state: the shear force that the layers of the
-contact up to the normal load s carry, divided by f, as a function of s. It is a polygonal
-line (docs/theory/paths.md). A level is a total load, or the normal solution at this load. Forces
-and displacements are sums over the vertices of the memory curve. Losses are sums over pieces of
-each segment; on a piece the slip front falls through one layer of the curve (`curve.Piece`).
+`history` does so at constant P. With the coefficient of friction f, the points of a path are the
+pairs P, T = Q / f. The memory curve stores the friction state (docs/theory/paths.md). It is a
+polygonal line: for each load s up to P, the shear force carried by the layers of the contact up to
+s, divided by f. A level is a total load, or the normal solution at this load. Forces and
+displacements are sums over the vertices of the memory curve. The slip front is the level down to
+which slip has reached. The loss of a segment is a sum over pieces; on each piece the front falls
+through one layer of the curve (`curve.Piece`).
 
-If an indentation falls as the load rises, the memory curve does not apply: `general_step` then
-computes the states step by step (docs/theory/without-order.md), without proofs.
+Order holds if no indentation falls as the load rises. If order fails, the memory curve does not
+apply. Then `general_step` computes the states step by step (docs/theory/without-order.md), without
+proofs.
 """
 
 from __future__ import annotations
@@ -80,12 +82,12 @@ class Walk:
 
     @property
     def pieces(self) -> list[list[Piece]]:
-        """The parts of each segment (`Piece`) whose losses add up to that of the segment."""
+        """The pieces of each segment; their losses add up to the loss of the segment."""
         return [pieces for _, pieces in self._segments]
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """The loads of all levels needed for states, statuses and losses."""
+        """The loads of all levels that states, statuses and losses need."""
         bent = {load for curve in self.curves for load, bend in curve.bends if bend}
         fronts = {curve.front for curve in self.curves if curve.front is not None}
         return bent | fronts | {x for each in self.pieces for piece in each for x in piece[2:]}
@@ -99,8 +101,8 @@ class Walk:
     def general(self) -> SteppedPath | None:
         """Results of general steps, or None.
 
-        They are taken if they are requested, or if order fails and the normal solution of the
-        contact is proved.
+        General steps are taken if the caller asks for them, or if order fails and the normal
+        solution of the contact is proved.
         """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
@@ -135,23 +137,26 @@ class LoadPath(Table, Plottable):
     """The friction states at m points of a path (P, Q) with straight segments between them.
 
     loads, forces  : (m,) [force] load P and shear force Q
-    displacements  : (m,) [length] relative tangential displacement X of distant points
+    displacements  : (m,) [length] tangential displacement X of one body relative to the other, at
+        distant points
     approaches     : (m,) [length] approach D0; at the load 0, the approach of the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] own deflection plus drift of each asperity
+    asperity_displacements : (m, n) [length] of each asperity: drift, plus deflection by its own
+        force
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] the load level down to which slip has reached at the end of the
-        latest segment along which P or Q changes; nan if nothing slips there, also if slip ended
-        on the segment because the load fell below this level
-    status         : (m, n) at the end of the latest segment: "stuck" (no slip), "partial" (a disc
-        sticks), "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
+    fronts         : (m,) [force] level of the slip front at the end of the latest segment along
+        which P or Q changes. nan if nothing slips at this end, for example if the load has fallen
+        below the front
+    status         : (m, n) of each asperity at the end of the latest segment: "stuck" (no slip),
+        "partial" (a disc sticks), "sliding" (the whole asperity slides), "open" (no contact) or
+        "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
-    order          : "proved": no indentation falls as the load rises, between any two total loads
-        at which normal solutions are used; other values as in `Cycle`
+    order          : "proved" if it is proved, for all total loads at which normal solutions are
+        used, that no indentation falls from one load to a higher one; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
 
@@ -202,7 +207,7 @@ class LoadPath(Table, Plottable):
 
     @property
     def slips(self) -> Array:
-        """(m, n) [length] gross slip of the asperities that touch; 0 for others."""
+        """(m, n) [length] gross slip of each asperity that touches; 0 for open asperities."""
         return frozen(np.where(self.asperity_loads > 0, self.drifts, 0.0))
 
     def gradient(
@@ -212,14 +217,12 @@ class LoadPath(Table, Plottable):
         displacements: ArrayLike | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum of losses and displacements.
-
-        They are derivatives with respect to the scene and the path.
+        """Derivatives of a weighted sum of losses and displacements by the scene and the path.
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
-            of the last loss is 1, and all others are 0
-        holding : quantity kept constant, as in `Contact.gradient`. All derivatives except those
-            with respect to `forces` are at constant forces Q, not at constant Q / (f P)
+            of the last loss is 1, and all other weights are 0
+        holding : quantity kept constant, as in `Contact.gradient`. Derivatives by other quantities
+            than `forces` are taken at constant forces Q, not at constant Q / (f P)
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
 
@@ -246,15 +249,14 @@ def load_path(
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
-    influence : how the compliance matrix is stored, as in `press`; with None, the cheapest way is
-        chosen
-    general_steps : number of general steps per segment. General steps are valid also if an
-        indentation falls as the load rises (docs/theory/without-order.md), but their results are
-        not proved. With None, the memory curve gives the states or, if order fails in a proved
-        contact, 16, 32 or 64 general steps per segment do
+    influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
+    general_steps : number of general steps per segment. General steps also apply if an indentation
+        falls as the load rises, that is, if order fails (docs/theory/without-order.md), but their
+        results are not proved. With None, the states come from the memory curve; if order fails in
+        a proved contact, they come from 16, 32 or 64 general steps per segment
 
-    Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
-    SolverError if a normal problem is not solved.
+    Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
+    without friction, or a `start` of another scene; SolverError if a normal problem is not solved.
 
     >>> P = contact.load
     >>> path = cr.load_path(scene, loads=[P / 2, P, P / 2], forces=[0.0, 0.3 * P, 0.1 * P])
@@ -293,7 +295,7 @@ def walk(
     general_steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
-    """The result of `load_path`, with a choice of the solver of general steps."""
+    """The result of `load_path`; `stepper` is the solver of the general steps."""
     points = points_of(scene, loads, forces)
     if general_steps is not None:
         checks.whole("general_steps", general_steps)
@@ -312,7 +314,7 @@ def walk(
 
 
 def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
-    """The contact at the highest of these loads; at the first touch if this load is 0."""
+    """The contact at the highest of these loads; at the first touch if all loads are 0."""
     if highest := float(max(loads)):
         if (least := float(min(load for load in loads if load))) < LEAST_PART * highest:
             expected = f"0, or at least {LEAST_PART:g} of the largest load, {highest:g}"

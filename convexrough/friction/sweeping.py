@@ -1,8 +1,9 @@
 r"""Proof of order for many asperities: charges at near neighbours bound the rates from below.
 
-C~, the support and the rates y(C) = (I + A C)^-1 1 are those of `friction.order`, and I + A C is
-regular for 0 <= C <= C~. Give asperity i weights w_j >= 0 for some neighbours j != i on the
-support, with the sum 1. Let q_i be a number such that for all k != i on the support
+The diagonal matrices C and C~, the support (the asperities with C~ > 0) and the rates
+y(C) = (I + A C)^-1 1 are those of `friction.order`. I + A C is regular for 0 <= C <= C~. For an
+asperity i, choose weights w_j >= 0 of some neighbours j != i on the support; the sum of the weights
+is 1. Let q_i be a number such that for all k != i on the support
 
     A_ik <= q_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
 
@@ -10,16 +11,17 @@ If 1 - q_i is positive for all i on the support, it is a lower bound on the rate
 of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
 
 (1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
-of radius R_j = scale C~_j with scale = 1 / (pi E*). Multiplied by q_i, the potential of these
-charges is at no asperity k != i of the support below that of the unit charge.
+of radius R_j = scale C~_j with scale = 1 / (pi E*). By (1), q_i times the potential of these
+charges is at least the potential of the unit charge, at all asperities k != i of the support.
 
 There are three ways to find weights:
 
-- Where neighbours are all around i: weights of least energy whose first and second moments vanish,
-  sum w_j d_j = sum w_j d_j^2 = 0, with complex numbers d_j for the vectors from i to j.
-- At an edge of the contact: a barrier method, which minimises the sum of the weights (before it is
-  scaled to 1) under (1) with q_i = 1, at near asperities and at some far ones.
-- Outside the contact: one neighbour alone, if all others are nearer to it than to i.
+- Where neighbours are all around i: weights of least energy whose first and second moments vanish:
+  sum w_j d_j = sum w_j d_j^2 = 0, where the complex number d_j is the vector from i to j.
+- At an edge of the contact: a barrier method. It minimises the sum of the weights under (1) with
+  q_i = 1, at near asperities and at some far ones. Then the weights are scaled to the sum 1.
+- Outside the contact: one neighbour alone, if the whole support is nearer to this neighbour than to
+  i.
 """
 
 from __future__ import annotations
@@ -38,34 +40,36 @@ from convexrough.roundoff import ROUNDOFF
 
 # All numbers here are heuristics.
 
-#: Numbers of neighbours: for weights of least energy, and for each of several searches for weights
-#: of least total. Each search adds the constraint that the last search's result violated most.
+#: NEIGHBOURS: number of neighbours for weights of least energy. MORE: number for each search for
+#: weights of least total. A search adds the constraint that the last result violated most.
 NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
 
-#: The constraints of weights of least total are at the NEAR nearest asperities, and at one in each
-#: of SECTORS sectors of RINGS rings. CENTRED is a factor in the estimate of the distance to the
-#: least total.
+#: Weights of least total are constrained at the NEAR nearest asperities, and at one asperity in
+#: each of SECTORS sectors of RINGS rings. CENTRED is a factor in the estimate of how far the total
+#: is above the least one.
 NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
 
-#: Largest number of Newton steps for weights of least total, and the gap at which the steps end.
+#: Largest number of Newton steps for weights of least total, and the estimated excess of the total
+#: at which the steps end.
 STEPS, LEAST = 40, 1e-8
 
-#: Largest number of searches for weights of least energy; each drops neighbours of weights below 0.
+#: Largest number of searches for weights of least energy; each drops the neighbours whose weights
+#: are negative.
 SEARCHES = 8
 
-#: Number of directions in which the extent of the support is computed, and the approximate number
-#: of float64 numbers that are in memory at once.
+#: DIRECTIONS: number of directions in which the extent of the support is computed. NUMBERS: about
+#: the number of float64 numbers that are in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
     """(n,) lower bounds on the rates y(C) for all diagonal C with 0 <= C <= C~.
 
-    All are -inf if any bound on the support is not positive, or if the support has fewer than two
-    asperities (then row sums of A C~ are enough).
+    All bounds are -inf if a bound on the support is not positive, or if the support has fewer than
+    two asperities (then row sums of A C~ suffice for a proof).
 
     c     : (n,) diagonal of C~, 0 where open
-    spare : (n,) for an open asperity a bound above -spare is enough, and is not improved
+    spare : (n,) at an open asperity, a bound above -spare is not improved further
     most  : largest number of asperities for which weights of least total are sought
     """
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
@@ -94,15 +98,15 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
 
 
 def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
-    """make(*rows), computed in parts of so many rows that about NUMBERS numbers are in memory."""
+    """make(*rows), computed in parts of about NUMBERS numbers; each row needs `cost` numbers."""
     some = max(1, NUMBERS // cost)
-    parts = range(0, max(1, len(rows[0])), some)  # one at least, if empty
+    parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
     return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
 
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """Sweeping of unit charges at asperities onto shells about their neighbours, as in (1).
+    """Sweeping of unit charges at asperities onto shells around neighbours, as in (1).
 
     support : indices of the asperities on the support
     shells  : (n,) radii R_j of the shells; 0 off the support
@@ -114,13 +118,13 @@ class _Swept:
 
     @cached_property
     def places(self) -> NDArray[np.complex128]:
-        """(n,) the points relative to their middle, as complex numbers."""
+        """(n,) the points as complex numbers, relative to the middle of all points."""
         x, y = self.influence.points.T
         return np.asarray((x - (x.min() + x.max()) / 2) + 1j * (y - (y.min() + y.max()) / 2))
 
     @cached_property
     def extent(self) -> float:
-        """An upper bound on all distances."""
+        """An upper bound on the distance of any two points."""
         return 2.01 * float(np.abs(self.places).max())
 
     @cached_property
@@ -140,7 +144,7 @@ class _Swept:
         return np.column_stack((places.real, places.imag))
 
     def neighbours(self, which: Indices, count: int) -> Indices:
-        """(m, count) the nearest asperities on the support, without the asperity itself."""
+        """(m, count) the nearest asperities on the support to each asperity, without itself."""
         count = min(count, len(self.support) - 1)
         _, found = self._tree.query(self._plane(self.places[which]), count + 1)
         nearest = self.support[found]
@@ -148,7 +152,7 @@ class _Swept:
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
 
     def potentials(self, charges: Indices, places: Indices) -> Array:
-        """Potentials of unit charges at places; on a charge itself, the potential of its shell."""
+        """Potentials of unit charges at places; at a charge itself, the potential of its shell."""
         apart = self.places[charges] - self.places[places]
         squares = apart.real**2 + apart.imag**2
         return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
@@ -163,7 +167,7 @@ class _Swept:
         return np.where(found, self.lost / 2, -np.inf)
 
     def lightest(self, which: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and their weights of least energy; 0 if no such weights are found."""
+        """(m, s) neighbours, and their weights of least energy; 0 where none are found."""
         near = self.neighbours(which, NEIGHBOURS)
         return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
 
@@ -248,7 +252,7 @@ class _Swept:
         return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) bounds 1 - q_i, -inf where all weights are 0; and the k at which (1) is tight."""
+        """(m,) bounds 1 - q_i (-inf where all weights are 0), and the k that determine q_i."""
         from scipy.sparse import csr_array
 
         total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
@@ -271,7 +275,7 @@ class _Swept:
         return rates, worst
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
-        """(m, k) distances between asperities; from one to itself, the entry of `themselves`."""
+        """(m, k) distances of asperities; from an asperity to itself, its entry in `themselves`."""
         from scipy.spatial.distance import cdist
 
         apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))
@@ -280,7 +284,7 @@ class _Swept:
         return apart
 
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
-        """(...) lower bounds on Re(conj(p) z) for directions p and all points z of the support."""
+        """(...) for each direction p, a lower bound on Re(conj(p) z) of all z on the support."""
         step = 2 * np.pi / DIRECTIONS
         around = np.exp(1j * step * np.arange(DIRECTIONS + 1))
         least = np.array([(side.conj() * self.places[self.support]).real.min() for side in around])

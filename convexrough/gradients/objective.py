@@ -23,7 +23,7 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
 
-#: The possible values of `of`, each with the quantity that must be prescribed for it.
+#: The possible values of `of`, each with a quantity that must then be prescribed.
 NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
 
 #: The possible parameters: of asperities, of the scene, of the material, and prescribed quantities.
@@ -48,9 +48,8 @@ class Objective(Record):
     influence : how the compliance matrix is stored, as in `press`
 
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
-    For scipy, divide both by the initial value: its tolerances are absolute, and a loss may be
-    1e-13.
-    `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
+    For scipy, divide value and gradient by the initial value: scipy's tolerances are absolute, and
+    a loss may be 1e-13. `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
     >>> value, slopes = loss(loss.start)
@@ -95,7 +94,7 @@ class Objective(Record):
                 raise InputError("by", found=repr(name), expected=expected)
 
     def _listed(self) -> tuple[str, ...]:
-        """The names in `by`, after a check that none is repeated."""
+        """The names in `by`, after a check that there is at least one and none is repeated."""
         try:
             by = tuple(self.by)
             once = 0 < len(by) == len(set(by))
@@ -123,7 +122,7 @@ class Objective(Record):
         return gradient.value, np.concatenate(slopes)
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
-        """The `Gradient` of the result at these parameters (m,), by all parameters of the scene."""
+        """The `Gradient` of the result at parameters (m,), with derivatives by all parameters."""
         own = [np.asarray(self._own(name)) for name in self.by]
         ends = np.cumsum([each.size for each in own])
         vector = checks.array("parameters", parameters)
@@ -150,8 +149,8 @@ class Objective(Record):
     def to_jax(self) -> Callable[[Any], Any]:
         """The result as a function for jax.grad, jax.jit and jax.vmap, without second derivatives.
 
-        The result is computed outside of jax in float64. Without the option `jax_enable_x64` it is
-        rounded to float32. Raises ExtraError if jax is not installed.
+        The result is computed outside of jax in float64. Without the option `jax_enable_x64`, value
+        and gradient are rounded to float32. Raises ExtraError if jax is not installed.
         """
         try:
             import jax
@@ -175,7 +174,8 @@ class Objective(Record):
     def to_torch(self) -> Callable[[Any], Any]:
         """The result as a function for torch that supports `backward`, without second derivatives.
 
-        The result is computed in float64 on the CPU. Raises ExtraError if torch is not installed.
+        The result is computed in float64 on the CPU, and rounded to the type of the argument.
+        Raises ExtraError if torch is not installed.
         """
         try:
             import torch
@@ -221,7 +221,7 @@ class Objective(Record):
         return found
 
     def _own(self, name: str) -> Any:
-        """The value of a parameter in the given scene, or the prescribed quantity."""
+        """The value of a parameter in `scene`, or the prescribed quantity of this name."""
         if name == "friction":
             return checks.friction(self.scene.friction)
         owner: Any = self if name in PRESCRIBED else self.scene
@@ -232,7 +232,7 @@ class Objective(Record):
         return getattr(owner, name)
 
     def _scene(self, given: dict[str, Array]) -> Scene:
-        """The scene with these parameters instead of its own."""
+        """The scene with the given parameters in place of its own."""
         scene = self.scene
         each = {name: given.get(name, getattr(scene.asperities, name)) for name in EACH}
         elastic = {name: float(given[name]) for name in ELASTIC if name in given}
@@ -244,7 +244,7 @@ class Objective(Record):
 def gradient_of(
     contact: Contact, of: str, force: float | None, holding: Holding | None = None
 ) -> Gradient:
-    """The gradient of one of `NUMBERS`; a loss is that of the cycle between -force and force."""
+    """The gradient of the result `of`; a loss is that of the cycle between -force and force."""
     if of == "loss":
         return cycle(contact, maximum=force).gradient(holding=holding)
     if of == "displacement":
@@ -255,7 +255,11 @@ def gradient_of(
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter; for a loss by `force`, twice that by the cycle's maximum."""
+    """The derivative by a parameter.
+
+    The derivative of a loss by `force` is twice that by the cycle's maximum, because `force` also
+    changes the minimum.
+    """
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

@@ -2,9 +2,9 @@
 
 Parts and derivatives are balls (numbers with error bounds). A level is the normal solution at a
 total load L (`normal.level`): loads P, approach D0, indentations n (the negative of the gap where
-open), and energy V, in scaled units. It depends on the offsets d, the coefficients k of Hertz's law
-and the compliance matrix A. (1), (2) and (4) of docs/theory/gradients.md give its derivatives. The
-names v, w and lambda in this module are those of (4).
+open), and energy V, in scaled units. A level depends on the offsets d, the coefficients k of
+Hertz's law and the compliance matrix A. Its derivatives are (1), (2) and (4) of
+docs/theory/gradients.md. The names v, w and lambda in this module are those of (4).
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Slopes(NamedTuple):
     """The derivative of a `Part`:  offsets^T dd + local^T dlog k + left^T dA P + load dL.
 
     offsets, local, left : (n,) coefficients in this derivative
-    load  : coefficient of the change dL of the total load L; for L = 0 without the part due to D0,
-        whose derivative dD0/dL is infinite there
+    load  : coefficient of the change dL of the total load L. At L = 0 the term of D0 is left out,
+        because dD0/dL is infinite there
     """
 
     offsets: Ball
@@ -42,14 +42,14 @@ class Slopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a result that comes from one level: a weighted sum of V, D0, P and n.
+    """The part of a result that belongs to one level: a weighted sum of V, D0, P and n.
 
     energy, approach : weights of V and D0
     loads, indentations : (n,) weights of P and n
     moves : derivatives of the level's total load with respect to the prescribed load and forces and
         the coefficient of friction, by name
 
-    The weights also convert scaled units of the level into the unit of the result.
+    The weights include the conversion from the scaled units of the level to the unit of the result.
     """
 
     level: Level
@@ -63,7 +63,8 @@ class Part:
     def scaled(self) -> Ball:
         """The terms with V and P.
 
-        If the modulus and all prescribed forces are multiplied by one factor, so are these terms.
+        If the modulus and all prescribed forces are multiplied by one factor, these terms are
+        multiplied by the same factor.
         """
         total = self.energy * self.level.energy if self.energy.size > 0.0 else ZERO
         return total if self.loads is None else total + self.loads.dot(self.level.loads)
@@ -84,7 +85,7 @@ class Part:
     def weight(self) -> Ball:
         """The total weight of D0: `approach` plus the sum of `indentations`.
 
-        The reason is n_i = D0 + d_i - (A P)_i.
+        D0 also enters through the indentations n_i = D0 + d_i - (A P)_i.
         """
         v = self.indentations
         return self.approach if v is None else self.approach + v.sum()
@@ -99,8 +100,8 @@ class Part:
     def slopes(self) -> Slopes:
         """The derivative of the sum.
 
-        Raises InputError if it does not exist: at the load 0, if several asperities may touch
-        first.
+        Raises InputError if the sum has no derivative: at the load 0, if several asperities may
+        touch first.
         """
         level, v, w, weight = self.level, self.indentations, self.loads, self.weight
         zero = Ball.exact(np.zeros(len(level.problem)))
@@ -129,7 +130,7 @@ class Part:
 
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
-    """Coefficients of dd and dL at the load 0: there D0 is -d_i of the first asperity to touch."""
+    """Coefficients of dd and dL at the load 0, where D0 is -d_i of the first asperity to touch."""
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
@@ -143,7 +144,8 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 def product(level: Level, weights: Ball) -> Ball:
     """A times weights, as balls.
 
-    The radii of the weights increase the error bounds: by their sum times the largest entry of A.
+    The radii of the weights increase each error bound by the sum of the radii times the largest
+    entry of A.
     """
     problem = level.problem
     coupled = problem.product(weights.mid)

@@ -2,7 +2,8 @@
 
 A unit point force displaces the surface at the distance r by 1 / (pi E* r), with the contact
 modulus E* (Boussinesq; equation (3) of Dini and Hills, 2009). The diagonal of an operator is 0: the
-contact law adds the displacement of an asperity by its own load, from Hertz's law.
+contact law adds the displacement of an asperity by its own load, by Hertz's law. A is the operator,
+P the loads, r_ij the distance of the points i and j.
 """
 
 from __future__ import annotations
@@ -19,23 +20,24 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 
-#: Bound on the relative error of a computed 1 / (pi E* r), in roundoffs, for exact points. The
-#: error of a difference of coordinates is at most 1, of its square 3, of the sum of squares 4, of
-#: the root 3, and of the result 8.
+#: Bound on the relative error of a computed 1 / (pi E* r) for exact points, in units of the
+#: roundoff. In these units, the error of a difference of coordinates is at most 1; that of its
+#: square 3, of the sum of squares 4, of the root 3, and of the result 8.
 ENTRY_ROUNDOFFS = 8
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
 
-#: A function of r that returns estimates of (I + W A W)^-1 r and of the 2-norm of A W r.
+#: A function of a vector r that returns estimates of (I + W A W)^-1 r and of the 2-norm of A W r,
+#: with the diagonal matrix W of `Influence.smoother`.
 Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 
 
 class Rounding(NamedTuple):
     """Bounds on the error of a computed product A P, for loads of either sign.
 
-    The error of component i is at most  relative * (A |P|)_i + each.  docs/theory/operators.md
-    calls the two numbers eta and rho.
+    The error of component i is at most  relative * (A |P|)_i + each.  In docs/theory/operators.md,
+    `relative` is eta and `each` is rho.
     """
 
     relative: float
@@ -46,7 +48,7 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """A 2-norm of the residual so far below these bounds that solvers can stop there.
+        """A 2-norm of the residual at which solvers can stop, as it is far below these bounds.
 
         displacement : A P as computed
         """
@@ -58,11 +60,11 @@ class Coupling(Protocol):
     """A linear map from loads at the asperities to displacements at some points."""
 
     def apply(self, loads: Array) -> Array:
-        """(m,) A P for loads (n,); in float32 if the loads are float32 and that is faster."""
+        """(m,) A P for loads (n,); in float32 if the loads are float32 and float32 is faster."""
         ...
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bound on the error of `apply` for these float64 loads."""
+        """Bound on the error of `apply` for float64 loads."""
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:
@@ -80,9 +82,9 @@ class Influence(Coupling, Protocol):
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length] the contact points
     scale  : 1 / (pi E*) with the contact modulus E*, in the units of loads and displacements
-    stored : True if the matrix is stored; if not, products with float32 loads are cheaper
-    cheap_sums : True if `sums` takes only a few times as long as `apply`. Newton's method then ends
-        early, and `normal.refine` makes the last steps with these sums
+    stored : True if the matrix is stored; if False, products with float32 loads are cheaper
+    cheap_sums : True if `sums` takes only a few times as long as `apply`. Then Newton's method ends
+        early, and `normal.refine` makes the last steps with `sums`
     """
 
     @property
@@ -117,11 +119,11 @@ class Influence(Coupling, Protocol):
         ...
 
     def onto(self, points: Array) -> Coupling:
-        """The map from loads to displacements at other points; 0 from a point to itself."""
+        """The map from loads to displacements at other points; a load on the same point adds 0."""
         ...
 
     def slopes(self, loads: Array) -> Array:
-        """(n, 2) derivatives of (A P)_i with respect to the point c_i of the asperity.
+        """(n, 2) derivatives of (A P)_i with respect to the contact point c_i of asperity i.
 
         They are -scale sum_j (c_i - c_j) P_j / r_ij^3, without a bound on the rounding error.
         """
@@ -132,11 +134,11 @@ class Influence(Coupling, Protocol):
         ...
 
     def crowding(self, radii: Array) -> float:
-        """The largest (a_i + a_j) / r_ij over all pairs, for contact radii a (n,), 0 where open."""
+        """The largest (a_i + a_j) / r_ij of all pairs, with contact radii a (n,), 0 where open."""
         ...
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite; False off lattices."""
+        """True if A + (scale / radius) I is proved positive semidefinite; on lattices only."""
         ...
 
     def sums(self, loads: Pair) -> Ball:
@@ -144,19 +146,20 @@ class Influence(Coupling, Protocol):
         ...
 
     def smoother(self, root: Array) -> Smoother | None:
-        """A symmetric positive definite approximation of (I + W A W)^-1, with W = diag(root).
+        """A function that applies an approximation of (I + W A W)^-1, with W = diag(root).
 
-        None if nothing better than the identity is known.
+        The approximation is symmetric and positive definite. None if no better one than the
+        identity is known.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class JointCoupling:
-    """The map from loads on the last points of an operator to displacements of the first ones.
+    """The map from loads on the last points of an operator to displacements of the first points.
 
-    joint : the operator among all points;  targets : number of first points, whose displacements
-        are computed
+    joint : the operator among all points
+    targets : number of first points; displacements are computed at these points
     """
 
     joint: Influence
@@ -184,9 +187,9 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
 
 
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
-    """The points (n, 2) as pairs, with `tails` as low parts, and a bound on errors of coordinates.
+    """The points (n, 2) as double-double numbers, and a bound on the errors of their coordinates.
 
-    Without tails this bound is `point_error`.
+    tails : the low parts of the numbers; if None, they are 0 and the bound is `point_error`
     """
     if tails is None:
         return Pair.exact(points), point_error

@@ -1,12 +1,13 @@
 """A lower bound on the eigenvalues of the compliance operator of points on a lattice.
 
-Such a bound, in units of scale / spacing, is the minimum over wave vectors k of the symbol f(k),
-the Fourier transform of 1 / |d| over the lattice. docs/theory/operators-lattice.md, "The symbol",
-calls it sigma(q). With any alpha > 0 and E(q) = erfc(q / 2 alpha) / q,
+In units of scale / spacing, such a bound is the least value of the symbol f(k) at all wave vectors
+k. The symbol is the Fourier transform of 1 / |d| on the lattice. docs/theory/operators-lattice.md,
+"The symbol", calls it sigma(q). With any alpha > 0 and E(q) = erfc(q / 2 alpha) / q,
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 
-over all lattice vectors d except 0 and all vectors G of the dual lattice; V is the area of a cell.
+where d are all lattice vectors except 0, G all vectors of the dual lattice, and V the area of a
+cell.
 """
 
 from __future__ import annotations
@@ -17,20 +18,24 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Largest difference of the lower bound from the least value found. A smaller one takes longer.
+#: Largest difference of the lower bound from the least value found. A smaller difference takes
+#: longer.
 TOLERANCE = 1e-3
 
 #: Ratio of the longer to the shorter basis vector above which the sums have too many terms.
 LONGEST = 50.0
 
-#: Terms with alpha |d| or |k + G| / 2 alpha above this are omitted; their erfc is below 3e-17.
+#: All terms with alpha |d| or |G| / 2 alpha up to this are included. In omitted terms of the first
+#: sum, erfc is below 3e-17. Omitted terms of the second sum are positive, so a lower bound holds
+#: without them.
 REACH = 6.0
 
-#: Bound on the omitted terms and on the rounding of some hundred terms below 10.
+#: Bound on the omitted terms of the first sum and on the rounding errors of some hundred terms
+#: below 10.
 LOST = 1e-9
 
-#: First number of cells along each direction of a cell of the dual lattice, and largest number of
-#: times that these cells are halved.
+#: Number of cells into which each side of a cell of the dual lattice is divided first, and largest
+#: number of times that these cells are halved.
 FIRST, MOST_HALVINGS = 8, 12
 
 #: Vectors from the middle of a cell to the middles of its quarters, in units of a quarter's size.
@@ -40,8 +45,9 @@ QUARTERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) / 2.0
 def least_symbol(basis: Array) -> float:
     """A lower bound on f for a reduced basis (2, 2) whose shorter vector has length 1.
 
-    Cells of the dual lattice are halved until the bounds in all cells are within the tolerance of
-    the least value found. The result is -inf if the longer vector exceeds `LONGEST`.
+    The dual lattice is divided into cells, and these are halved until the bounds in all cells are
+    within the tolerance of the least value found. The result is -inf if the longer vector exceeds
+    `LONGEST`, or if `MOST_HALVINGS` halvings are not enough.
     """
     if np.hypot(*basis.T).max() > LONGEST:
         return -np.inf
@@ -73,7 +79,7 @@ class _Symbol:
 
     @classmethod
     def of(cls, basis: Array) -> _Symbol:
-        """The terms for an alpha with which the two sums have about equally many terms."""
+        """The terms for an alpha with which both sums have about the same number of terms."""
         area = abs(float(np.linalg.det(basis)))
         alpha = float(np.sqrt(np.pi / area))
         dual = np.asarray(2.0 * np.pi * np.linalg.inv(basis).T, dtype=np.float64)
@@ -85,9 +91,10 @@ class _Symbol:
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
         """(m,) f in the middles c of cells of the dual lattice, and lower bounds on f in each cell.
 
-        Each bound is the larger of two. The first is f(c) - |grad f(c)| rho - bend rho^2 / 2 for
-        points within rho of c, where no second derivative is below -bend. The second has -1 in
-        place of each cosine, and an upper bound on each |k + G|, because E decreases.
+        Each bound is the larger of two bounds. All points of a cell are within rho of c, and no
+        second derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a
+        bound. For the other bound, each cosine is replaced by -1, and each |k + G| by an upper
+        bound, because E decreases.
 
         cells : (m, 2) middles c in units of g1 and g2
         size  : side of the cells in these units

@@ -1,4 +1,4 @@
-"""The compliance operator of arbitrary points: a mesh and a sparse matrix, with error bounds.
+"""The compliance operator of arbitrary points, by a mesh and a sparse matrix, with error bounds.
 
 `pair_sums` implements the method, which docs/theory/operators-mesh.md derives.
 """
@@ -31,17 +31,18 @@ from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
-#: Target of the relative error of a product that is due to interpolation. This is most of the error
-#: of `sums`, which is about 1e-16.
+#: Target of the relative error that interpolation causes in a product. Most of the error of `sums`,
+#: about 1e-16, is this error.
 TOLERANCE = 5e-17
 
-#: Targets of the relative interpolation errors: for loads in single precision, and for `falloff`.
+#: The same target for loads in single precision, and for `falloff`.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
-#: Up to this number of asperities `sums` uses a matrix, which has 27 digits; for speed only.
+#: Up to this number of asperities, `sums` uses a matrix, which is faster and gives 27 digits.
 FEW = 1500
 
-#: Largest number of pairs (asperity, other point) that `onto` computes one by one; for speed only.
+#: Largest number of pairs (asperity, other point) that `onto` computes one by one. The number
+#: affects the speed only.
 FEW_PAIRS = 10**8
 
 
@@ -50,12 +51,12 @@ class ScatteredInfluence:
     """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
     point_error : [length] bound on the error of each coordinate of the points
-    tails       : (n, 2) [length] the exact points minus `points`, or None if all of these are 0;
-        see `Scene.contact_tails`
+    tails       : (n, 2) [length] the exact points minus `points`, or None if all differences are 0
+        or unknown; see `Scene.contact_tails`
     tolerance   : target for the relative error that interpolation causes in a product; the error
         bounds hold for any value of it
 
-    Few points, or points in dense clusters, have no mesh: their products are those of a matrix.
+    For few points, or points in dense clusters, a matrix takes the place of the mesh.
     """
 
     points: Array
@@ -158,7 +159,7 @@ class ScatteredInfluence:
 
     @cached_property
     def _dense(self) -> DenseInfluence:
-        """The operator as a matrix, for points for which a mesh costs more."""
+        """The operator as a matrix; used if a mesh costs more."""
         return DenseInfluence.assemble(self.points, self.scale, self.point_error, self.tails)
 
     @cached_property
@@ -176,5 +177,5 @@ class ScatteredInfluence:
 
     @property
     def _unknown(self) -> float:
-        """[length] bound on the error of each coordinate of the sum of `points` and `tails`."""
+        """[length] bound on the error of each coordinate of `points` plus `tails`."""
         return known(self.points, self.tails, self.point_error)[1]

@@ -1,10 +1,10 @@
-"""Sums over j of P_j / r_ij by a matrix, to about 27 digits, with products by BLAS.
+"""Sums over j of P_j / r_ij by a matrix, to about 27 digits, with the products of BLAS.
 
-Each entry and each load is divided into a first slice, a second slice and a rest. First slices are
-multiples of one unit for each row and block of columns. They have so few bits that sums of their
-products stay below 2^53 units and are exact in any order; sums of products of first with second
-slices are exact for the same reason. All other products are about 2^-48 of the sum, and their
-rounding error about 2^-101.
+Each entry and each load is the sum of a first slice, a second slice and a rest. In a row and a
+block of columns, first slices are multiples of one unit. They have so few bits that sums of their
+products stay below 2^53 units, and so are exact in any order. For the same reason, sums of products
+of first and second slices are exact. All other products are about 2^-48 of the sum, and their
+rounding errors about 2^-101.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, rounded, two_squar
 from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
 
-#: Number of columns in a block; numbers of bits of the first and of the second slice of an entry.
+#: Number of columns in a block, and numbers of bits of the first and the second slice of an entry.
 BLOCK, FIRST, SECOND = 128, 24, 23
 
-#: Largest number of bits of a first slice of loads; more would not reduce the error.
+#: Largest number of bits of a first slice of loads; more bits would not reduce the error.
 MOST_BITS = 30
 
-#: Largest number of rows of a cached matrix. Its slices then take 0.4 GB.
+#: Largest number of rows of a cached matrix. The slices of such a matrix take 0.4 GB.
 KEPT = 4096
 
-#: For a part of the asperities, the matrix of all is computed if it has at most this many rows, or
-#: at most twice as many as the part, because other parts may be needed later.
+#: For a part of the asperities, the matrix of all asperities is computed, because other parts may
+#: be needed later, if it has at most this many rows or at most twice as many as the part.
 SMALL = 128
 
-#: Number of entries that are computed together: arrays of 64 KB, which fit in the cache, and which
-#: the allocator reuses without returning them to the system.
+#: Number of entries that are computed together. Such arrays of 64 KB fit in the cache, and the
+#: allocator reuses them without returning them to the system.
 PIECE = 2**13
 
-#: Bound on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
+#: Limit on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
 LARGEST = 2.0**300
 
 
 @dataclass(frozen=True, eq=False)
 class SlicedMatrix:
-    """Some rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
+    """Some rows of the matrix 1 / r_ij, as first + second + rest; 0 where two points coincide.
 
     slices : (m, n) the three parts
-    blocks : the columns of each block, and the number of bits of a first slice of their loads
-    losses : (3 blocks, m) three factors for each block. They multiply the largest load in it, the
-        largest rest of a load after two slices, and the largest rest after one slice. The sum of
-        these products over the blocks bounds the error of a product with loads
+    blocks : the columns of each block, and the number of bits of first slices of its loads
+    losses : (3 blocks, m) three factors for each block: of the largest load in the block, of the
+        largest rest of a load after two slices, and of the largest rest after one slice. The sum of
+        these products over all blocks bounds the error of a product with loads
     """
 
     slices: tuple[Array, Array, Array]
@@ -61,7 +61,10 @@ class SlicedMatrix:
 
     @classmethod
     def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
-        """The rows `rows` for points (n, 2) of extent about 1, with errors up to `point_error`."""
+        """The rows `rows` for points (n, 2) of extent about 1.
+
+        point_error : bound on the distance of each point from the exact point
+        """
         here, n = points.at(rows), len(points.high)
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
@@ -98,7 +101,7 @@ class SlicedMatrix:
         return cls(slices, blocks, losses.reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
-        """The matrix among points with increasing indices `which`; its errors are no larger."""
+        """The matrix of the points with the increasing indices `which`; errors are not larger."""
         first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
         columns = (slice(*edges) for edges in pairwise([0, *stops]))
@@ -129,9 +132,9 @@ class SlicedMatrix:
 
 
 class MatrixSums:
-    """The sums over j of P_j / r_ij among points (n, 2) with errors up to `point_error`.
+    """The sums over j of P_j / r_ij of points (n, 2), with coordinate errors up to `point_error`.
 
-    A matrix of up to `KEPT` rows is cached. A larger one is computed again for each product.
+    A matrix of up to `KEPT` rows is cached. A larger matrix is computed again for each product.
     """
 
     def __init__(self, points: Pair, point_error: float = 0.0) -> None:
@@ -140,7 +143,7 @@ class MatrixSums:
         self.which: Indices | None = None
 
     def restricted(self, which: Indices) -> MatrixSums:
-        """The same sums among some of the points."""
+        """The same sums of some of the points only."""
         if len(which) == len(self.points.high) and (which[1:] > which[:-1]).all():
             return self
         part = MatrixSums(self.points.at(which), self.point_error)
@@ -181,7 +184,7 @@ class MatrixSums:
 
     @cached_property
     def _of_whole(self) -> bool:
-        """True if the matrix is taken from that of `whole`, which is cached or small enough."""
+        """True to use the matrix of all points, `whole`, because it is cached or small enough."""
         if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
             return False
         return "_matrix" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
@@ -210,7 +213,7 @@ def _most(values: Array) -> Array:
 
 
 def inverse_distances(points: Pair, others: Pair) -> Pair:
-    """1 / r_ij (m, n) to a relative error of 2^-98; 0 where two points coincide."""
+    """(m, n) 1 / r_ij with a relative error below about 2^-98; 0 where two points coincide."""
     return squared_distances(points.at(np.s_[:, None]), others).inverse_root()
 
 

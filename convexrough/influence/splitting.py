@@ -1,9 +1,9 @@
 """The choice of the splitting of 1 / r^q into L + S, and of the mesh for the smooth part L.
 
 S is 0 for distances r above the reach a. L is interpolated from p x p nodes of a mesh with the
-spacing h: docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics:
-they affect the cost, and how near the error is to the tolerance. The bounds on the error hold for
-any choice.
+spacing h. docs/theory/operators-mesh.md, "Choice of p, h and a", explains the choice. All numbers
+here are heuristics: they affect the cost, and how near the error is to its target, the tolerance.
+The bounds on the error hold for any choice.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from convexrough.arrays import Array
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.softened import Softened
 
-#: The orders p that are tried: numbers of nodes for interpolation in each direction.
+#: The values of p that are tried: numbers of nodes for interpolation in each direction.
 ORDERS = range(4, 30, 2)
 
-#: The sums over all points are estimated from sums at SAMPLE points over at most MORE points.
+#: Sums over all points are estimated: at SAMPLE of the points, by sums over at most MORE points.
 SAMPLE, MORE = 32, 2**15
 
-#: In the estimate of a sum, nearer points count as if at the distance within which a point has this
-#: many neighbours on average.
+#: In these sums, very near points count as if they were at a certain distance: the one within which
+#: a point has this many neighbours on average.
 NEAREST = 8
 
-#: Estimated times [ns] on two cores: of transforms for each node, of a product for each near pair,
-#: and of interpolation for each point, divided by the squared width of a block's nodes.
+#: Estimated times [ns] on two cores: of the transforms per node, of a product per near pair, and of
+#: interpolation per point and node of a block.
 NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 
 
@@ -36,7 +36,7 @@ NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 class Splitting:
     """A splitting of 1 / r^q into L + S, and a mesh for L.
 
-    kernel  : the softened kernel, with q, p and a
+    kernel  : the softened kernel, which has q, p and a
     spacing : [length] spacing h of the mesh
     block   : side of the blocks that are interpolated together, in mesh cells
     """
@@ -47,7 +47,7 @@ class Splitting:
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
-        """The cheapest splitting whose relative error in a product is probably within tolerance.
+        """The cheapest splitting for which the relative error of a product is probably tolerable.
 
         None if sums over all pairs are cheaper.
         """
@@ -78,7 +78,7 @@ class Splitting:
 
     @property
     def cut(self) -> float:
-        """[length] the distance within which pairs are near pairs, with an entry in S."""
+        """[length] the distance up to which a pair of points is a near pair, with an entry in S."""
         return self.kernel.cut(self.spacing)
 
     @property
@@ -91,7 +91,7 @@ class _Sums(NamedTuple):
     """Data of a sample of pairs of points, from which sums over all points are estimated."""
 
     distances: Array  # of the pairs in the sample, sorted
-    share: float  # number of pairs in the sample per point
+    share: float  # number of pairs in the sample, divided by the number of points
     size: float  # median of the sums of 1 / r^q
 
     @classmethod
@@ -100,20 +100,22 @@ class _Sums(NamedTuple):
         some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
         distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
-        # The few nearest pairs count as if at this distance: one pair must not decide the estimate.
+        # Nearer pairs count as if at this distance, so that a single pair does not decide the
+        # estimate.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
         sums = (np.maximum(distances, nearest) ** -power).sum(axis=1)
         return cls(ordered, SAMPLE * share, float(np.median(sums)) / share)
 
     def around(self, distance: float) -> float:
-        """The estimated mean number of points within a distance of a point."""
+        """The estimated mean number of points that lie within this distance of a point."""
         return float(np.searchsorted(self.distances, distance)) / self.share
 
 
 def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
     """The spacing h [length] at which the larger of two interpolation errors is the tolerance.
 
-    One is that of near pairs, by (1) of docs/theory/operators-mesh.md, the other of distant pairs.
+    One error is that of near pairs, by (1) of docs/theory/operators-mesh.md. The other error is
+    that of distant pairs.
     """
     spacing = kernel.reach / (2.0 * kernel.order)
     for _ in range(4):
@@ -125,6 +127,6 @@ def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
 
 
 def _block(order: int, nodes_per_point: float) -> int:
-    """The side, in mesh cells, of a block with some tens of points; from p / 2 to 2 p."""
+    """The side of a block with some tens of points, in mesh cells; from p / 2 to 2 p."""
     wanted = int(np.ceil(np.sqrt(48.0 * nodes_per_point)))
     return int(np.clip(wanted, order // 2, 2 * order))

@@ -1,14 +1,17 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-The points of a path of shear forces are t0 + lambda t_v. Melan's program asks for the largest
-lambda for which constant residual forces r_i exist, with the sum t0, such that the sum of r_i and
-lambda times the elastic forces at t_v is at most the load P_i in size, at every point. This module
-computes a lower bound on it from given r_i, and an upper bound, (3) of docs/theory/shakedown.md,
-from given slips. A solver finds both, and need not be accurate. The bounds include the errors of
-loads and of elastic shares Y: the shear forces of asperities that all stick, per unit of the total
-force. They make all displacements (H + B) Y equal, and sum Y = 1, with the compliances
-H = diag(1/(2 E* a)) of the asperities and the full tangential kernel B; E* is the contact modulus,
-a the contact radius. All shear forces are divided by the coefficient of friction.
+The points of a path of shear forces are t0 + lambda t_v. The elastic forces e_iv at t_v are the
+shear forces of asperities that all stick. Melan's program asks for the largest lambda that admits
+constant residual forces r_i with the sum t0 such that |r_i + lambda e_iv| is at most the load P_i,
+for all asperities i and points v. This module computes a lower bound on lambda from given r_i, and
+from given slips the upper bound (3) of docs/theory/shakedown.md. A solver, which need not be
+accurate, finds the r_i and the slips.
+
+The elastic shares Y are the elastic forces per unit of total force. They make all displacements
+(H + B) Y equal, and their sum is 1. H = diag(1/(2 E* a)) has the compliances of the asperities,
+with the contact modulus E* and the contact radii a; B is the full tangential kernel. The bounds
+include the errors of the loads and of Y. All shear forces are divided by the coefficient of
+friction.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.problem import FrictionProblem
 
-#: The solver's tolerance, and the fraction by which residual forces are moved into the cones.
+#: The solver's tolerance, and the fraction by which residual forces are moved away from the
+#: friction limits.
 TOLERANCE, MARGIN = 1e-10, 1e-9
 
 #: Slips are rounded to multiples of the largest slip / STEPS, so that sums of slips are exact.
@@ -36,7 +40,7 @@ STEPS = 2.0**30
 
 
 class Limit(NamedTuple):
-    """The results of a shakedown theory: fields of `Shakedown`, with forces divided by friction."""
+    """The results of a shakedown theory: fields of `Shakedown`; forces are divided by friction."""
 
     factor: float
     lower: float
@@ -49,7 +53,7 @@ class Limit(NamedTuple):
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
-    """The limit of Melan's program with the full tangential kernel.
+    """The shakedown limit by Melan's program with the full tangential kernel.
 
     mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
     """
@@ -84,7 +88,8 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
 def elastic_shares(problem: FrictionProblem) -> tuple[Array, Array]:
     """(n, 2, 2) the shares Y, and (n, 2) bounds on |error of Y| for total forces along x and y.
 
-    The bounds are infinite without a proof. docs/theory/shakedown.md, "Elastic shares".
+    The bounds are infinite where nothing is proved. docs/theory/shakedown.md, "Elastic shares",
+    derives them.
     """
     n = len(problem)
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
@@ -100,7 +105,7 @@ def elastic_shares(problem: FrictionProblem) -> tuple[Array, Array]:
 
 
 def _errors(problem: FrictionProblem, shares: Array, total: Array) -> Array:
-    """(n,) bounds on the errors of shares (n, 2) of one total force (2,), from their residual."""
+    """(n,) bounds on the errors of the shares (n, 2) of a total force (2,), from their residual."""
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     compliance = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
     moved = exact * compliance + problem.couple(shares).T
@@ -141,7 +146,7 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
 
 def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved a little inwards.
+    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved off the limits P.
 
     limits : (n,) the friction limits P
     """
@@ -153,7 +158,7 @@ def _inwards(limits: Array, state: Array, mean: Array) -> Array:
 def _lower(
     known: FrictionProblem, rest: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
-    """A lower bound on the largest lambda that the residual forces `rest` allow, or 0.
+    """A lower bound on the largest lambda, from residual forces `rest`; 0 if they prove nothing.
 
     elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
     """
@@ -173,7 +178,10 @@ def _lower(
 
 
 def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
-    """The least and largest lambda with |fixed (n, 2) + lambda scaled (m, n, 2)| <= limits (n,)."""
+    """The least and the largest lambda with |fixed + lambda scaled| <= limits; (inf, 0) if none.
+
+    fixed, scaled, limits : (n, 2), (m, n, 2) and (n,)
+    """
     a = (scaled**2).sum(axis=-1)
     b = (fixed * scaled).sum(axis=-1)
     c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
@@ -186,7 +194,7 @@ def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
 
 
 def _closed(slips: Array) -> Array:
-    """(m, n, 2) the slips, changed to whole numbers; the sum over m is equal for all asperities."""
+    """(m, n, 2) the slips as whole numbers, with the same sum over m for all asperities."""
     largest = float(np.abs(slips).max())
     if not largest > 0:
         raise SolverError("the solver found no slips", solver="shakedown")
@@ -201,7 +209,7 @@ def _closed(slips: Array) -> Array:
 def _upper(
     known: FrictionProblem, slips: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
-    """The upper bound (3) on lambda from these slips; infinite if their work may be 0 or less.
+    """The upper bound (3) on lambda, from slips; infinite if the work of the slips may be <= 0.
 
     elastic, errors : as for `_lower`
     """

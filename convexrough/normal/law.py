@@ -1,7 +1,8 @@
 """The contact law in float64, for one problem or for a stack of problems (`normal.stack`).
 
-Arrays are (n,) for one problem and (m, n) for a stack, where quantities with one number per problem
-are (m, 1).
+Arrays are (n,) for one problem and (m, n) for a stack. In a stack, quantities with one number per
+problem are (m, 1). A is the compliance matrix, k are the coefficients of Hertz's law, and D is the
+offsets plus the approach.
 """
 
 from __future__ import annotations
@@ -18,19 +19,20 @@ from convexrough.sphere import hertz
 #: One problem, or a stack with one problem in each row.
 Problem: TypeAlias = NormalProblem | Stack
 
-#: An estimate of the squared contact radius of a rough sphere, divided by that of a smooth one. It
-#: affects speed only.
+#: An estimate of the squared contact radius of a rough sphere, divided by that of a smooth sphere.
+#: The estimate affects speed only.
 WIDER = 1.1
 
 
 class Pressed(NamedTuple):
     """Loads P by Hertz's law at given indentations delta, and the gaps that they leave.
 
-    own      : max(delta, 0) = k P^(2/3), scaled to a prescribed total
+    own      : k P^(2/3), which is max(delta, 0), scaled if a total load is prescribed
     loads, displacement : P and A P
     gap      : k P^(2/3) + A P - D, the gradient of the energy
-    defect   : the residual F of the contact law: the gap where loaded, elsewhere min(gap, 0)
-    approach : D0: the prescribed one, or the one that fits the gaps of touching asperities best
+    defect   : the residual F of the contact law: the gap where P > 0, elsewhere min(gap, 0)
+    approach : D0: prescribed, or the value for which a weighted mean of the gaps of loaded
+        asperities is 0
     """
 
     own: Array
@@ -42,7 +44,7 @@ class Pressed(NamedTuple):
 
     @classmethod
     def at(cls, problem: Problem, indentation: Array) -> Pressed:
-        """The loads at indentations, of which one must be positive if a load is prescribed."""
+        """The loads at indentations; one must be positive if a load is prescribed."""
         own = np.maximum(indentation, 0.0)
         ratio = own / problem.coefficients
         root = np.sqrt(ratio)
@@ -75,13 +77,13 @@ class Pressed(NamedTuple):
 def on_hertz_pressure(problem: Problem) -> Array:
     """Initial indentations D - A P for loads P distributed like the pressure of a sphere.
 
-    P = x^3 s with s = (1 - r^2 / a^2)^(1/2), the distance r from the axis, and the contact radius
-    a. The number x follows from a prescribed load. At a prescribed approach it minimises the
-    energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If there is no such x > 0, s is replaced by 1 at
-    the asperity with the largest offset and 0 at all others.
+    P = x^3 s with s = (1 - r^2 / a^2)^(1/2), where r is the distance from the axis and a an
+    estimated contact radius. The number x follows from a prescribed load. At a prescribed approach,
+    x minimises the energy; the condition is  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If these s give
+    no x > 0, s is replaced by 1 at the asperity with the largest offset and by 0 at all others.
     """
     load, approach = problem.load, problem.approach
-    if approach is None:  # from the highest asperity, so that no digits of small loads are lost
+    if approach is None:  # small loads keep their digits if the highest is at 0
         approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
     prescribed = problem.offsets + approach
     inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))
@@ -104,7 +106,7 @@ def on_hertz_pressure(problem: Problem) -> Array:
 
 
 def smooth_reach(problem: Problem) -> Any:
-    """[length^2] squared contact radius of a smooth body; infinite if flat, (m, 1) for a stack."""
+    """[length^2] squared contact radius of a smooth body; infinite if the body is flat."""
     scene, units = problem.scene, problem.units
     radius = scene.mean_radius
     if radius == np.inf:

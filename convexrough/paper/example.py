@@ -1,8 +1,8 @@
-"""The source paper's example and its published numbers.
+"""The example of the paper by Dini and Hills, and the numbers published there.
 
 Dini and Hills, "Frictional Energy Dissipation in a Rough Hertzian Contact", Journal of Tribology
-131 (2009), doi 10.1115/1.3063697: a hexagonal array of asperities with one under the centre.
-Lengths are in units of the sphere's radius, pressures in units of the contact modulus.
+131 (2009), doi 10.1115/1.3063697: a hexagonal array of asperities, one of them under the centre of
+the sphere. Lengths are in units of the sphere's radius, pressures in units of the contact modulus.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from convexrough.tabular.columns import aligned
 
 APPROACH = 5e-5
 
-#: The paper's rings from the centre outwards, and their numbers of asperities.
+#: The paper's rings, from the centre outwards, each with its number of asperities.
 RINGS = {"F": 1, "E": 6, "D": 6, "C": 6, "B": 12, "A": 6}
 
 
 def scene() -> cr.Scene:
-    """The paper's scene, with every asperity that the undeformed sphere overlaps."""
+    """The paper's scene, with all asperities that the undeformed sphere overlaps."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     return cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")
@@ -44,7 +44,7 @@ def results() -> list[Result]:
 
 
 def crossover(contact: cr.Contact) -> float:
-    """The Q / (f P) above which a rough contact loses more per cycle than a smooth one."""
+    """The Q / (f P) above which the rough contact loses more per cycle than a smooth contact."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     limit = 0.5 * contact.load
@@ -57,7 +57,7 @@ def crossover(contact: cr.Contact) -> float:
 
 
 def compare(found: list[Result]) -> dict[str, Any]:
-    """The paper's numbers (None if not printed) and the computed ones, by name."""
+    """The paper's numbers (None if not published) and the computed numbers, by name."""
     pressed, sheared, cycled = found
     contact, named = pressed.contact, lettered(pressed.contact)
     onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
@@ -91,7 +91,7 @@ def _pair(paper: Any, computed: Any) -> dict[str, Any]:
 
 
 def table(comparison: dict[str, Any]) -> list[str]:
-    """The lines of a table of quantities, the paper's values and the computed ones."""
+    """The lines of a table with quantities, the paper's values and the computed values."""
     rows = [("quantity", {"paper": "paper says", "computed": "computed"}, "")]
     rows.append(("asperities in contact", comparison["contacts"], ""))
     for name, ring in comparison["rings"].items():

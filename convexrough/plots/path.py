@@ -24,11 +24,12 @@ from convexrough.sphere import hertz
 
 MOST_MAPS = 8
 
-#: Largest numbers: of points; of asperities times points; of steps between two given points.
+#: Largest numbers with added points: of points; of asperities times points; of steps between two
+#: given points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
-#: Number of segments at varying load up to which points are added; each point needs a normal
-#: solution.
+#: At varying load, points are added to at most this number of segments, because each point needs a
+#: normal solution.
 MOST_SEGMENTS = 24
 
 
@@ -37,10 +38,12 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
     fine : the path with the additional points of `between`; None to compute them
 
-    "history" : shear force Q against displacement X, with numbered steps if they are few; and the
-        energy lost since the beginning against the step
-    "path" : the same, and the points in the load plane with the memory curve at some of them
-    "path_stick_slip" : which asperities stick and which slide, at some of the points
+    "history" : at constant load: shear force Q against displacement X, with numbered steps if there
+        are few; and energy lost since the beginning against the step
+    "path" : at varying load: the same, and the points in the plane of P and Q, with the memory
+        curve at some points
+    "path_stick_slip" : at varying load: maps of the asperities that stick and that slide, at some
+        of the points
     """
     if path.load_constant and not path.contact.loads.any():
         return style.no_contact("history")
@@ -62,7 +65,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
 
 def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
-    """Draw the loop of a path, or the plane of loads if the normal load varies."""
+    """Draw the loop of a path; at varying load, its points in the plane of P and Q."""
     if path.load_constant:
         draw_loop(axes, path, Scale(path.contact), between(path))
     else:
@@ -97,7 +100,7 @@ def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
 def _draw_darkening(
     axes: Axes, path: LoadPath, fine: LoadPath, x: Array, y: Array
 ) -> ScalarMappable:
-    """Draw a curve that darkens from the origin to its end, and is visible everywhere."""
+    """Draw a curve that darkens from its start at the origin to its end; return the colours."""
     steps = max(1, len(path.forces))
     colours = ScalarMappable(Normalize(0, steps), ListedColormap(style.shades_of(256, low=0.15)))
     points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))
@@ -139,9 +142,9 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
 def between(path: LoadPath) -> LoadPath:
     """The path with points added between the given ones.
 
-    The path is unchanged if these points cost too much, if order fails, or if the path starts from
-    another contact. Figures call this function only if they are not given such a path, because it
-    solves normal problems.
+    The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
+    path of varying load starts from a pressed contact. Figures call this function only if no such
+    path is passed to them, because it may solve normal problems.
     """
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)

@@ -1,4 +1,4 @@
-"""Figures of shakedown limits: of each asperity, and against the amplitudes of load and shear."""
+"""Figures of shakedown limits: a map of asperities, and a map of load and shear amplitudes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ FINE = 240
 
 
 def shakedown_figures(found: Shakedown) -> Figures:
-    """The figures of a shakedown limit, with dimensionless forces.
+    """The figures of a shakedown limit, with dimensionless forces. P0 is the mean load.
 
-    "shakedown" : the largest factor of the path at which the sliding of each asperity dies out; for
-        the kind "vector" the slip of each asperity in the mechanism
-    "shakedown_map" : number of asperities that slide or open in every cycle, if load and shear
-        amplitudes have different factors; at constant load, if the amplitude and the mean of the
-        shear forces vary. Only for the kind "exact"
+    "shakedown" : for each asperity, the largest factor of the path at which its sliding dies out;
+        for the kind "vector", its slip in the mechanism
+    "shakedown_map" : number of asperities that slide or open in every cycle, against the amplitudes
+        of load and shear; at constant load, against mean and amplitude of the shear force. Only for
+        the kind "exact", and if more than one asperity has a factor
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found)
@@ -39,7 +39,7 @@ def shakedown_figures(found: Shakedown) -> Figures:
 
 
 def draw_factors(axes: Axes, found: Shakedown) -> None:
-    """Draw each asperity in the shade of its factor, or of its slip if the kind is "vector"."""
+    """Draw each asperity in a shade for its factor; if the kind is "vector", for its slip."""
     vector = found.kind == "vector"
     known, points = np.isfinite(found.factors), found.scene.contact_points
     values = np.linalg.norm(found.mechanism, axis=-1).max(axis=0) if vector else found.factors
@@ -63,16 +63,18 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
 def _onsets(found: Shakedown) -> Array:
     """(k,) sigma_i / P0 of the asperities whose factor is known, in descending order.
 
-    sigma_i is the load at which asperity i first touches, P0 the mean load.
+    sigma_i is the load at which asperity i first touches.
     """
     fall = _fall(found, np.array(1.0), np.array(1.0))
     return np.sort(1.0 - found.factors[np.isfinite(found.factors)] * float(fall))[::-1]
 
 
 def _fall(found: Shakedown, along: Array, across: Array) -> Array:
-    """(P0 - L*) / P0 for the factors `along` of load amplitudes and `across` of shear amplitudes.
+    """(P0 - L*) / P0 for factors of the load and shear amplitudes.
 
-    Asperities that first touch at loads above L* slide or open in every cycle.
+    Asperities that first touch above the load L* slide or open in every cycle.
+
+    along, across : factors of the load amplitudes and of the shear amplitudes
     """
     f = found.scene.friction or 1.0
     p, t = found.load_amplitudes, found.force_amplitudes / f
@@ -84,7 +86,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """The map of how many asperities slide or open in every cycle, hatched where |Q| > f P."""
+    """The map: how many asperities slide or open in every cycle; hatched where |Q| > f P."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0

@@ -1,4 +1,4 @@
-"""Figures of a measured surface: map with summits, histograms, and results against pruning."""
+"""Figures of a measured surface: a map with summits, histograms, and results against pruning."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowd
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 
-#: Above this number of summits, vector files contain their dots as pixels.
+#: Above this number of summits, vector files contain the dots of the summits as pixels.
 MANY = 1000
 
 #: Colour of summits, bright on every grey.
@@ -48,7 +48,7 @@ SUMMIT = "#ffd24a"
 #: Labelled ticks of the pruning axis, as fractions of Sz.
 PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
-#: Mark of each scope of a certificate. Marks differ in shape for print without colours.
+#: Mark and colour for each scope of a certificate. The shapes differ for print without colours.
 SCOPES = {"global": ("o", ROUGH), "local": ("s", ROUGH), "none": ("X", UNSURE),
           "failed": ("^", UNSURE)}  # fmt: skip
 
@@ -60,13 +60,13 @@ def surface_figures(
     curve: Provability | None = None,
     contact: Contact | None = None,
 ) -> Figures:
-    """The figures of a surface, by stems of file names.
+    """The figures of a surface, each under its file name without extension.
 
-    "map"         : heights, summits, and the contacts of a pressed surface
+    "map"         : heights and summits, and contacts if `contact` is given
     "histograms"  : histograms of summits, with the curves that spectral moments predict
     "provability" : contacts, crowding and model error against pruning, if `curve` is given
 
-    maxima  : all summits of this surface;  summits : those left by pruning
+    maxima  : all summits of this surface;  summits : the summits left by pruning
     contact : the contact of the summits left by pruning
     """
     figures = Figures({"map": _map(surface, summits, contact)})
@@ -122,7 +122,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """Contacts, crowding and model error against pruning, shaded where they are unreliable.
+    """The figure of contacts, crowding and model error against pruning; shaded if unreliable.
 
     chosen : the pruning that a dotted line marks
     """
@@ -154,7 +154,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
 
 
 def _place(prune: Number) -> Number:
-    """The abscissa of a pruning: its square root, which spreads small values and shows 0."""
+    """The abscissa of a pruning: its square root, which spreads small values and includes 0."""
     return np.sqrt(prune)
 
 
@@ -203,7 +203,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """Draw contacts, smooth contact and the most crowded pair; return half the contacts' width."""
+    """Draw contacts, smooth contact and most crowded pair; return half the width of the view."""
     points, radii = contact.scene.contact_points, contact.contact_radii
     touching, scale = contact.loads > 0, Scale(contact)
     reach = np.abs(points - scale.centre).max(axis=1) + radii
@@ -225,7 +225,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     edges = _bins(maxima.heights - level)
     _draw_both(left, edges, maxima.heights - level, summits.heights - level)
     mean, spread = moments.mean_height, moments.height_std
-    if spread > 0:  # else no Gaussian surface has these moments
+    if spread > 0:  # if 0, no Gaussian surface has these moments
         z = np.linspace(edges[0], edges[-1], 200)
         normal = np.exp(-(((z - mean) / spread) ** 2) / 2) / (spread * np.sqrt(2 * np.pi))
         expected = moments.density * summits.origin.area * (edges[1] - edges[0])
@@ -261,7 +261,7 @@ def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
 
 
 def _bins(values: Array) -> Array:
-    """Edges of the bins of a histogram of all values, also if these are equal."""
+    """The edges of the bins of a histogram of the values, which may all be equal."""
     low, high = float(values.min()), float(values.max())
     size = max(abs(low), abs(high)) or 1.0
     room = high - low if high - low > 1e-9 * size else size
@@ -270,7 +270,7 @@ def _bins(values: Array) -> Array:
 
 
 def _count(axis: Axis, name: str, unit: str, size: float) -> str:
-    """The label of an axis for lengths of this size; its ticks are in SI with a prefix."""
+    """The label of an axis for lengths of this size; sets ticks in SI units with a prefix."""
     if not unit:
         return name
     length = measure(size, unit)

@@ -1,10 +1,10 @@
 """Results as a summary, a report and warnings, and the folder to which they are written.
 
-The folder is written under a temporary name and then renamed. If a folder of the final name exists
-already, the complete new files are moved into it one by one, `files.json` last. A folder with
-contents is accepted only with `force`. Before the move, `files.json` of the earlier run is deleted,
-and then the files that it lists. Other files stay. If the process dies while files are moved, the
-folder has only some of the new files, and no `files.json`.
+The new files are written to a temporary folder, which is then renamed. If a folder of the final
+name exists already, the complete new files are moved to this folder one by one, `files.json` last.
+A folder with contents is accepted only with `force`. Before the move, `files.json` of the earlier
+run is deleted, then all files listed there. Other files stay. If the process dies during the move,
+the folder contains only some of the new files, and no `files.json`.
 """
 
 from __future__ import annotations
@@ -38,21 +38,22 @@ if TYPE_CHECKING:
 #: Version of the keys of summary.json and of the columns of tables.
 SCHEMA = 2
 
-#: Tables with more rows are written as .npz.
+#: Tables with more rows than this are written as .npz.
 MOST_CSV_ROWS = 100_000
 
-#: The file that lists the files written, the files read, and the versions of the packages.
+#: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
 
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
-#: The proof leaves out shear forces of at least this fraction of f P: all asperities slide there.
+#: The proof leaves out shear forces of at least this fraction of f P, at which all asperities
+#: slide.
 BELOW_LIMIT = 1 - 1e-9
 
 
 def headed(**contents: Any) -> Summary:
-    """These contents as a summary, with the versions of its keys (`SCHEMA`) and of the package."""
+    """A summary: the versions of its keys (`SCHEMA`) and of the package, then these contents."""
     return {"schema": SCHEMA, "version": __version__, **contents}
 
 
@@ -68,14 +69,17 @@ def describe(results: Iterable[Result]) -> list[str]:
 
 
 def warnings(results: Iterable[Result]) -> Iterator[str]:
-    """Warnings about results that are not proved and about limits of the model."""
+    """Yield warnings about results that are not proved, and about limits of the model."""
     for result in results:
         yield from result.doubts()
         yield from result.cautions()
 
 
 def prove_results(results: Sequence[Result]) -> Proof:
-    """The proof of the contact, and of its states at each shear force and each cycle's amplitude.
+    """The proof of the contact and of its states under shear.
+
+    The shear forces are those of the results, and the amplitudes of cycles, except 0 and forces of
+    at least `BELOW_LIMIT` f P.
 
     Raises InputError for scenes too large for exact arithmetic, ProofError if a proof fails.
     """
@@ -88,8 +92,8 @@ def prove_results(results: Sequence[Result]) -> Proof:
 class Writer:
     """A folder of results that receives files.
 
-    folder  : the folder;  path : its temporary name;  files : the files written so far
-    formats : endings of figures;  dpi : pixels per inch of figures
+    folder  : the final folder;  path : the temporary folder;  files : the files written so far
+    formats : file name extensions of figures;  dpi : pixels per inch of figures
 
     All methods raise FileError if a file cannot be written.
     """
@@ -134,9 +138,9 @@ class Writer:
     def results(
         self, results: Sequence[Result], *, figures: bool, more: Mapping[str, Any] | None = None
     ) -> None:
-        """Write summary.json, to which `more` is added, all tables, and the figures if asked.
+        """Write summary.json, including `more`, all tables and, if `figures` is true, figures.
 
-        Everything is computed before the first file is written.
+        All contents are computed before the first file is written.
         """
         tables = [result.tables() for result in results]
         plotted = [result.figures() for result in results] if figures else []
@@ -160,14 +164,14 @@ def results_folder(
     command: str = "",
     **said: Any,
 ) -> Iterator[Writer]:
-    """A context manager that yields the writer of a temporary folder.
+    """A context manager that yields the writer of a new temporary folder.
 
     If the `with` block ends without an error, the temporary folder is renamed to `folder`; if
     `folder` exists, the files are moved into it.
 
-    force : accept a folder with contents, but not with results of another command
+    force : True to accept a folder with contents; results of another command are refused even then
     reads : files that the block reads; none of them may be in `folder`
-    formats, dpi : of figures;  command : the command that writes, for `files.json`
+    formats, dpi : as for `Writer`;  command : the command that writes, an entry of `files.json`
     said  : entries of `files.json` in addition to the names of the files written
 
     Raises FileError, before the block runs, if `folder` cannot be written or replaced.
@@ -211,7 +215,7 @@ def _moved(new: Path, folder: Path) -> None:
 
 
 def remove_earlier(folder: Path) -> None:
-    """Remove the files that `files.json` in the folder lists, and `files.json` first."""
+    """Remove `files.json` from the folder, and then the files that it lists."""
     files = _manifest(folder).get("files")
     for name in [MANIFEST, *map(str, files)] if isinstance(files, list) else []:
         path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
@@ -229,7 +233,7 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def origin(source: SceneFile) -> Summary:
-    """The origin of results: hashes of the files read, the seed, and the versions of packages."""
+    """The origin of results: scene file, hashes of the files read, seed, versions of packages."""
     return {
         "scene": str(source.path),
         "inputs": dict(source.inputs),

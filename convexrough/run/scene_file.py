@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 #: Names of columns with results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
 
-#: Relative rounding error that is allowed for means and sums in the last row of a table.
+#: Relative rounding error up to which a last row counts as the means or sums of a table.
 ROUNDED = 1e-3
 
-#: Number of mistakes in a scene file that are reported one by one; further ones are counted.
+#: Largest number of mistakes in a scene file that are listed; the other mistakes are counted.
 MOST_MISTAKES = 50
 
 #: [bytes] size of the largest accepted scene file.
@@ -52,23 +52,25 @@ MOST_BYTES = 2**25
 #: Columns of a file of asperities, unless the scene file names others.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
 
-#: Largest number of parts of a dotted key: time and memory of tomllib grow with the square.
+#: A dotted key must have fewer parts: the time and memory of tomllib grow with their square.
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
 def unknown(column: str) -> bool:
-    """True if a column may be heights: its header names no index or result, nor is it a number."""
+    """True if a column may contain heights: its header is not a number, an index or a result."""
     return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
 
 
 def read_summits(
     path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
 ) -> Asperities:
-    """Asperities from the columns x and y of a file, and height (or z) and tip_radius if present.
+    """The asperities in a file with columns x and y, and perhaps height (or z) and tip_radius.
 
-    tip_radius : [length] one number or (n,), if the file has no column tip_radius; else None
+    tip_radius : [length] one number or (n,); None if the file has a column tip_radius
+
+    Raises FileError, or InputError with the column or row, if the table is wrong.
     """
     table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
     columns = table.columns
@@ -97,16 +99,16 @@ def read_summits(
         raise InputError("tip radii", found=found, expected=expected, where=str(path))
     positions = np.column_stack((columns["x"], columns["y"]))
     radii = tip_radius if given is None else given
-    assert radii is not None  # one of the two
+    assert radii is not None  # one of the two is given
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
 
 
 def _summary_in_last_row(columns: list[Array]) -> str:
-    """ "means" or "sums" if the last row has those of the rows above in all columns; else ""."""
+    """ "means" or "sums" if the last row contains those of the rows above; else ""."""
     own = columns[2:]
     if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
-        return ""  # the middle of a regular array is its mean
+        return ""  # the mean of a regular array is an asperity in its middle
     for what, of in (("means", np.mean), ("sums", np.sum)):
         if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
             return what
@@ -124,7 +126,7 @@ def is_permuted(cells: NDArray[Any]) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Task(Record):
-    """A scene, its prescribed approach or load, and the stages to compute."""
+    """A scene, its prescribed approach or load, and the stages to compute, such as [cycle]."""
 
     scene: Scene
     approach: float | None
@@ -164,13 +166,13 @@ class SceneFile(Task):
 
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
-        has all asperities that can touch up to this approach. None if another quantity limits
-        the pattern, or if there is none
-    influence : compliance operator; None for the cheapest
-    stages : the tables that request results, by name; the first is [normal]
+        has all asperities that can touch up to this approach. None if the pattern is limited in
+        another way, or if the asperities are not in a pattern
+    influence : how the compliance matrix is stored; None for the cheapest way
+    stages : the tables of the file that request results, by name; the first table is [normal]
     text   : text of the file;  seed : seed of its random heights and radii, or None
-    convert : True if columns in other units are converted, False if they are refused
-    inputs : the SHA-256 of each file that was read, by path
+    convert : True to convert columns in other units than those of the scene, False to refuse them
+    inputs : the SHA-256 of each file that was read, by the path of the file
 
     >>> file = cr.read_scene(new_scene)
     >>> contact = file.press()
@@ -190,8 +192,8 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
 
     asperities : asperities that replace those of the file
 
-    Raises FileError where a file cannot be read or is not TOML, SceneFileError with every mistake
-    in the tables, and InputError for mistakes found when the scene is built.
+    Raises FileError if a file cannot be read or is not TOML, SceneFileError with every mistake in
+    the tables, and InputError for mistakes found when the scene is built.
 
     >>> file = cr.read_scene(new_scene)  # what `convexrough new` writes
     >>> len(file.scene)
@@ -235,7 +237,7 @@ def read_study(path: Path) -> tuple[Study, str]:
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
-    """Raise InputError unless summits of a map (unit `own`) have the scene's unit (`named`)."""
+    """Raise InputError unless `own`, the unit of a map's summits, is the scene's unit `named`."""
     if own != named:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
@@ -268,7 +270,7 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
         raise FileError(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
     try:
         contents = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # ValueError: also a number of 5000 digits
+    except (ValueError, RecursionError) as error:  # ValueError: for a number of 5000 digits, too
         raise FileError(explained(path, text, error)) from error
     if not contents:
         raise FileError(f"{path}: empty; `convexrough new` writes a scene to start from")
@@ -284,7 +286,7 @@ def has_sweep(path: Path) -> bool:
 def regular(
     pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
 ) -> Asperities:
-    """Asperities in a pattern, without random parts."""
+    """Asperities in the pattern "hexagonal" or "square", without random heights or tip radii."""
     make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
 
@@ -301,7 +303,8 @@ def task_of(
 
     path    : the scene file, for messages; paths in the tables are relative to its folder
     asperities : asperities that replace those of the tables
-    summits, lattice : functions like `read_summits` and `regular`, which make the asperities
+    summits, lattice : functions that make the asperities, with the arguments of `read_summits` and
+        `regular`
 
     Raises InputError for mistakes that the tables alone do not show.
     """
@@ -349,10 +352,10 @@ def _lattice(
     press_on: Callable[[Asperities], Scene],
     lattice: Callable[..., Asperities],
 ) -> tuple[Scene, float | None]:
-    """The scene with asperities up to the distance `within`, or with all that could touch.
+    """The scene with asperities in a pattern, and `highest_approach` of the task.
 
-    An asperity could touch if it can be reached at the approach or load in [normal], or at the
-    largest load that a stage names.
+    The pattern extends to the distance `within` or, without this key, to all asperities that could
+    touch: at the approach or load in [normal], or at the largest load that another stage names.
     """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips

@@ -1,4 +1,4 @@
-"""Programs in standard form, their solution by libraries, and the libraries' answers.
+"""Optimisation programs in standard form, their solution by libraries, and the answers.
 
 `apply` of a reduction such as `conic.LiftedProgram` converts a contact problem to a program, and
 `invert` converts the answer back, as in cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 class ConeProgram(NamedTuple):
     """minimise (1/2) x'P x + q'x  subject to  A x + s = b,  over x and s.
 
-    The first `equalities` entries of s are 0. All others lie in second-order cones of three entries
-    each, s_1 >= || (s_2, s_3) ||. Of the symmetric matrix P only the upper triangle is stored.
+    The first `equalities` entries of s are 0. Each further group of three entries lies in a
+    second-order cone, s_1 >= || (s_2, s_3) ||. P is symmetric, and only its upper triangle is
+    stored.
     """
 
     quadratic: csc_matrix  # P, upper triangle
@@ -40,10 +41,10 @@ class ConeProgram(NamedTuple):
     def dual(self) -> ConeProgram:
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
-        The variables are (v, z). v has one entry for each variable of this program whose diagonal
-        entry in P is not 0. The first `equalities` entries of z are free. At any feasible point,
-        minus the objective is a lower bound on the minimum of this program. At the solution it
-        equals this minimum, and the multipliers of the equations are -x.
+        The variables are (v, z). v has one entry for each x_i of this program with P_ii != 0. The
+        first `equalities` entries of z are free. At any feasible point, the negative of the dual's
+        objective is a lower bound on the minimum of this program. At the solution, this bound
+        equals the minimum, and the multipliers of the equations are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 
@@ -94,7 +95,7 @@ class RawAnswer(NamedTuple):
 
 
 class ProgramAnswer(NamedTuple):
-    """The answer to a `NormalProblem`, converted from the answer to its program; not checked."""
+    """The answer to a `NormalProblem`, converted from a library's answer, and not checked."""
 
     loads: Array  # of the asperities in the program, in the order and units of the problem
     approach: float  # prescribed, or from the multiplier of the total load
@@ -102,7 +103,7 @@ class ProgramAnswer(NamedTuple):
 
 
 def load_library(package: str, solver: str) -> Any:
-    """The module `package`, imported when first used. Raises SolverError if it is not installed."""
+    """The module `package`, imported on first use. Raises SolverError if it cannot be imported."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -116,7 +117,7 @@ def load_library(package: str, solver: str) -> Any:
 def run_clarabel(
     program: ConeProgram, solver: str, tolerance: float, **settings: object
 ) -> RawAnswer:
-    """The answer of Clarabel, an interior-point method; `settings` are Clarabel's."""
+    """The answer of Clarabel, an interior-point method; `settings` are those of Clarabel."""
     clarabel = load_library("clarabel", solver)
     chosen = clarabel.DefaultSettings()
     chosen.verbose = False
@@ -133,7 +134,7 @@ def run_clarabel(
 
 
 def _goes_on(info: Any) -> bool:
-    """Log a step of Clarabel; False means that Clarabel shall continue."""
+    """Log a step of Clarabel. The result, False, tells Clarabel to continue."""
     residual = max(info.res_primal, info.res_dual, info.gap_rel)
     log_step("clarabel", info.iterations, info.cost_primal, residual)
     return False
@@ -146,7 +147,7 @@ def run_osqp(
     max_iterations: int,
     verbose: bool = False,
 ) -> RawAnswer:
-    """The answer of OSQP, a first-order method that at the end solves for the active set."""
+    """The answer of OSQP, a first-order method with a final solution on the active set."""
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
         what = f"OSQP {osqp.__version__} is too old"

@@ -19,10 +19,10 @@ class Solution(Record):
     """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
     iterations : number of steps of the solver
-    residual : residual of the contact law for these loads, as `NormalProblem.residual`; if `trial`
-        is given, an upper bound on the residual of the loads in `trial`
+    residual : residual of the contact law for `loads`, as computed by `NormalProblem.residual`; if
+        `trial` is given, an upper bound on the residual of the loads in `trial`
     refine   : True if the loads may be corrected to more digits; False to certify them unchanged
-    trial    : these loads to more digits, if the solver has computed them; else None
+    trial    : the loads to more digits, if the solver has computed such loads; else None
     """
 
     loads: Array
@@ -42,7 +42,7 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution whose residual is computed from the loads; a residual of nan becomes inf."""
+        """A solution with the residual computed from the loads; a residual nan becomes inf."""
         if np.shape(loads) != (len(problem),):
             raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)
@@ -51,7 +51,7 @@ class Solution(Record):
 
 
 class Solver(Protocol):
-    """The interface of solvers: immutable objects, which hold their settings.
+    """The interface of solvers. Solvers are immutable objects that contain their settings.
 
     A solver that does not reach its tolerance raises SolverError.
     """

@@ -1,7 +1,8 @@
-"""One sphere on an elastically similar half-space: load, indentation, radius, pressure by Hertz.
+"""Hertz's law of one sphere on an elastically similar half-space.
 
-Arguments are scalars or arrays in consistent units: load P, contact modulus E*, relative radius R,
-contact radius a. An indentation delta is the approach of distant points of the two bodies.
+Functions return load, indentation, contact radius, pressure or surface displacement. Arguments are
+scalars or arrays in consistent units: load P, contact modulus E*, relative radius R, contact radius
+a. The indentation delta is the approach of distant points of the two bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 """
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from convexrough.arrays import Number
 
-#: Coefficients of the power series of (x - sin x) / x^3 in -x^2, in descending order of powers.
+#: Coefficients of the power series of (x - sin x) / x^3 in powers of -x^2, highest power first.
 LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
 
 
@@ -28,7 +29,7 @@ def indentation(load: Number, coefficient: Number) -> Number:
 
 
 def load(indentation: Number, coefficient: Number) -> Number:
-    """The load (max(delta, 0) / k)^(3/2); 0 for a separated sphere."""
+    """The load (max(delta, 0) / k)^(3/2); 0 if the sphere is separated from the half-space."""
     ratio = np.maximum(indentation, 0.0) / coefficient
     return ratio * np.sqrt(ratio)
 
@@ -59,7 +60,7 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
 def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
     """The sum of both surfaces' normal displacements at a distance r from the axis (Johnson, 3.42).
 
-    It is a^2/R - r^2/(2R) inside the contact. Outside it is
+    The sum is a^2/R - r^2/(2R) inside the contact. Outside, the sum is
     (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)], which equals
     r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
@@ -71,7 +72,7 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
 
 
 def less_sine(angle: Number) -> Number:
-    """The difference x - sin(x), from its series for x < 1."""
+    """The difference x - sin(x); for x < 1, the sum of its power series."""
     small = np.square(np.minimum(angle, 1.0))
     series = LESS_SINE[0]
     for coefficient in LESS_SINE[1:]:

@@ -15,12 +15,13 @@ class Moments(Record):
     """Moments of the profiles of a surface, and summits of a Gaussian surface with these moments.
 
     m0 : [length^2] variance of the heights
-    m2 : variance of the slope of profiles, mean over profiles along x and along y
-    m4 : [1/length^2] variance of the second derivative of profiles, the same mean
-    slope_ratio : rms slope along y over that along x; 1 if the surface has no preferred direction
+    m2 : variance of the slope of profiles: the mean for profiles along x and along y
+    m4 : [1/length^2] variance of the second derivative of profiles: the same mean
+    slope_ratio : rms slope along y divided by rms slope along x; 1 if the surface has no preferred
+        direction
 
-    The formulas (Nayak 1971, McCool 1987) hold for all maxima, before any pruning, of an isotropic
-    Gaussian surface that its pixels resolve.
+    The formulas (Nayak 1971, McCool 1987) hold for all maxima (summits before any pruning) of an
+    isotropic Gaussian surface that its pixels resolve.
 
     >>> moments = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256).moments
     >>> print(f"{moments.bandwidth:.3g} {moments.m2:.4f}")
@@ -56,12 +57,12 @@ class Moments(Record):
 
     @property
     def height_std(self) -> float:
-        """[length] standard deviation of heights of the maxima, sqrt((1 - 0.8968 / alpha) m0)."""
+        """[length] standard deviation of the maxima's heights, sqrt((1 - 0.8968 / alpha) m0)."""
         return float(np.sqrt(max(1 - 0.8968 / self.bandwidth, 0.0) * self.m0))
 
 
 def moments_of(heights: Array, pixel: tuple[float, float]) -> Moments:
-    """The moments, from differences of neighbours.
+    """The moments of a map of heights, from differences of neighbouring pixels.
 
     Differences underestimate slopes and curvatures of waves that are only a few pixels long.
     """

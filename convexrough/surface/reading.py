@@ -1,7 +1,7 @@
 """`read`: a surface from a file, with all lengths in one unit.
 
-A map is a matrix of heights, or a list of x, y and height, in text, in a file of arrays, or in the
-file of an instrument.
+A map is a matrix of heights, or a list of x, y and height. Text, files of arrays (.npy, .npz, .mat)
+and files of instruments can contain one.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from convexrough.tabular.units import one_unit, parsed
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
-#: Names that the array of heights may have in an .npz file with several arrays.
+#: Names that the array of heights may have in a file with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
 #: STATED: arrays of an .npz or .mat file that state the pixel and the units. SCALES: parts of names
-#: of arrays that probably change the meaning of the heights; even texts and vectors with such names
-#: are an error.
+#: of arrays that probably change the meaning of the heights. An array with such a name is an error,
+#: even if it is a text or a vector.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
@@ -44,15 +44,16 @@ SCALES = re.compile(
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
 
-#: Possible marks of holes are MARKS, numbers whose absolute value is at least HUGE, and the largest
-#: and the smallest number. They mark holes if they differ from the median of the other heights by
-#: more than FAR times the range of the other heights.
+#: Three kinds of numbers may mark holes: those in MARKS, those of absolute value at least HUGE, and
+#: the largest and the smallest number. Such a number marks holes if it differs from the median of
+#: the other heights by more than FAR times their range.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Two pixel sizes count as equal up to this relative difference.
 SAME = 1e-6
 
-#: Steps of x and y, which may be rounded, count as equal up to this relative difference.
+#: A pixel stated in a file of arrays may differ from the steps of x and y, which may be rounded, by
+#: this fraction.
 ROUNDED = 1e-3
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
@@ -60,8 +61,8 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
-#: A unit of length anywhere in a comment ("um" is also a German word), and words that announce a
-#: scale.
+#: _UNIT: a unit of length anywhere in a comment ("um" is also a German word, so it needs a number
+#: or mark before it). _SCALE: words that announce a scale.
 _UNIT = re.compile(
     r"(?<![^\W\d])(?:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)(?!\w)"
     r"|(?:[\d(\[,:=]|\bin)\s*um(?!\w)|纳米|微米|毫米",
@@ -74,12 +75,13 @@ OFF_GRID = 0.05
 
 
 class HeightGrid(NamedTuple):
-    """The heights in a file, with nan for holes, and the pixel and units that the file states.
+    """The heights in a file, and the pixel and units that the file states.
 
-    pixel : size along x and y; None if not stated
+    heights : nan where the file states no height; marks such as -9999 are unchanged
+    pixel : size of a pixel along x and y; None if not stated
     unit, height_unit : units of the pixel and of the heights; "" if not stated
-    unclear : the first comment that states a length or a unit of length, but not in words that
-        `read` knows; "" if there is none
+    unclear : the first comment that seems to state a scale in words that `read` does not know; ""
+        if there is none
     """
 
     heights: Array
@@ -101,23 +103,24 @@ def read(
     """The surface in a file: .npy, .npz, .mat, text, or a format that SurfaceTopography reads.
 
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
-    unit   : unit of the pixel; optional, because the file may state it, or no unit may be known
+    unit   : unit of the pixel; None if the file states it or if it is unknown
     height_unit : unit of the heights; by default that of the pixel. It is an error if `unit` or
-        `height_unit` differs from what the file states. Heights whose unit is not that of the pixel
-        are converted to the unit of the pixel
-    detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None: none
-    fill   : True to fill holes with a harmonic function, after the form is fitted to other pixels;
-        else holes are an error. Holes are nan, masked, BAD in text, and marks such as -9999 or 1e38
-        far from all heights
+        `height_unit` differs from what the file states. Heights in another unit than the pixel are
+        converted to the unit of the pixel
+    detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None to
+        subtract nothing
+    fill   : True to fill holes with a harmonic function, after the form is fitted to the other
+        pixels; False to refuse holes. Holes are nan, masked values, BAD in text, and marks far from
+        all heights, such as -9999 or 1e38
 
     An .npz or .mat file contains `heights`. It may also contain `unit`, `height_unit`, `pixel`, and
-    coordinates x and y: x of each column and y of each row, or both for each height. Other numbers
-    that could change the meaning of the heights are an error. Text contains a matrix, possibly with
-    the comments on its size that Gwyddion writes. A matrix with three columns is a list of x,
-    y and height on a grid. Formats of instruments need the package SurfaceTopography (the extra
-    `surface`).
+    coordinates x and y: either x of each column and y of each row, or x and y of each height. Other
+    numbers that could change the meaning of the heights are an error. Text contains a matrix,
+    possibly with the comments on its size that Gwyddion writes. A matrix with three columns is a
+    list of x, y and height on a grid. Formats of instruments need the package SurfaceTopography
+    (the extra `surface`).
 
-    Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
+    Raises FileError if the file cannot be read, or needs SurfaceTopography, which is not installed;
     InputError if the file contains no usable map.
 
     >>> np.savez(folder / "scan.npz", heights=np.random.default_rng(1).normal(size=(64, 64)))
@@ -159,9 +162,9 @@ def read(
 def _pixel(
     found: tuple[float, float] | None, given: float | tuple[float, float] | None
 ) -> tuple[float, float]:
-    """The pixel in the file or, if it states none, the given one.
+    """The pixel that the file states or, if the file states none, the given pixel.
 
-    Raises InputError if the two differ, or if there is none.
+    Raises InputError if the two differ, or if both are missing.
     """
     if (known := found if given is None else given) is None:
         expected = "its size, which the file does not state: pixel=, or --pixel"
@@ -181,7 +184,10 @@ def _refuse_other(
 
 
 def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
-    """The heights with nan in holes, and a map of the holes, or None if there are none."""
+    """The heights with nan in holes, and a map of the holes (None if there are no holes).
+
+    Raises InputError for holes unless `fill` is true, and if all pixels are holes.
+    """
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
     if (rest := heights[~marks & ~np.isnan(heights)]).size:
@@ -214,9 +220,9 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
 
 
 def _text(path: Path) -> HeightGrid:
-    """The map in a text file: a matrix of heights, a line for each row; or columns x, y and height.
+    """The map in a text file: a matrix of heights, or columns x, y and height.
 
-    Files with three columns are taken as x, y and height. Comments above a matrix may state the
+    A file with three columns is read as x, y and height. Comments above a matrix may state the
     width and height with a unit, and the unit of the values.
 
     Raises FileError if the file is not text, and InputError with row and column if it contains no
@@ -277,7 +283,7 @@ def _refuse_gaps(rows: Sequence[int]) -> None:
 
 
 def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
-    """The error for a row or column `line` with coordinates or numbers in place of heights."""
+    """The error for a row or column of coordinates or counts (`line`) in place of heights."""
     said = ", ".join(f"{each:g}" for each in line[:3])
     expected = (
         "heights alone: leave coordinates and numbers of rows and columns out, with pandas by "
@@ -287,7 +293,7 @@ def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
 
 
 def _even(line: Array) -> bool:
-    """True for numbers at equal distances, if they may be rounded to six digits."""
+    """True for more than four numbers at equal distances, up to rounding to six digits."""
     steps, size = np.diff(line), float(np.abs(line).max())
     return bool(
         len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
@@ -295,7 +301,7 @@ def _even(line: Array) -> bool:
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix `heights`, with the pixel and the units that comments state."""
+    """The matrix `heights`, with the pixel and the units that the comments state."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
         said[found[1].lower().rstrip("s")] = found[2]
@@ -376,7 +382,7 @@ def _chosen(found: dict[str, NDArray[Any]]) -> str:
 
 
 def _placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """The result of `_on_grid`, for x of each column and y of each row, or both of each height."""
+    """The result of `_on_grid`; x and y belong to columns and rows, or to the single heights."""
     vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
     shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
     if heights.shape != shape or not (vectors or y.shape == shape):
@@ -397,7 +403,7 @@ def _numbers(values: NDArray[np.generic]) -> Array:
 def _on_grid(x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
     """The map from heights z in any order, and the pixel (dx, dy); missing points are nan.
 
-    x, y : coordinates of the heights, or of columns (n,) and rows (m, 1)
+    x, y : coordinates of each height, or x of each column (n,) and y of each row (m, 1)
     """
     (column, dx), (row, dy) = steps("x", x), steps("y", y)
     shape = int(row.max()) + 1, int(column.max()) + 1
@@ -426,8 +432,9 @@ def steps(name: str, values: Array) -> tuple[Indices, float]:
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     span = float(levels[-1] - levels[0])
     digit = _last_digit(levels)
-    # Lines of the grid can be missing. If coordinates are rounded, their differences vary; each has
-    # an error below one last digit: half of one, and the rounding of both ends.
+    # Lines of the grid can be missing. If coordinates are rounded, they lie off the lines by less
+    # than one last digit: by their own rounding, half a digit, and by that of the first and last
+    # line.
     for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
         step = span / count
         lines = (values - levels[0]) / step
@@ -451,11 +458,12 @@ def _last_digit(values: Array) -> float:
 
 
 def _instrument(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
-    """The default channel of heights in a file that SurfaceTopography can read.
+    """The heights of the default channel of a file that SurfaceTopography can read.
 
-    pixel : size of a pixel, for files that do not state the size of the map
+    pixel : size of a pixel, used if the file does not state the size of the map
 
-    Raises FileError if SurfaceTopography cannot read the file or is not installed.
+    Raises FileError if SurfaceTopography cannot read the file or is not installed; InputError if
+    the file contains no map of heights.
     """
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
@@ -479,7 +487,7 @@ def _instrument(path: Path, pixel: float | tuple[float, float] | None) -> Height
             topography = reader.topography(**given)
     except ReadFileError as error:
         reason = str(error).partition("\n")[0] or type(error).__name__
-        if reason.startswith("tried"):  # each of its formats, with an error for each
+        if reason.startswith("tried"):  # all of its formats, and lists an error for each
             reason = "it is in none of its formats; export the map as text, for example"
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     if topography.dim != 2:

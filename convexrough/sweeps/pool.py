@@ -27,19 +27,19 @@ from convexrough.errors import InputError, WorkerError, needed
 from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.threads import cores
 
-#: Largest number of batches submitted at a time: to an executor, and for each local process.
+#: Largest number of batches submitted at a time: to a given executor, and for each local process.
 AT_ONCE, EACH = 1000, 2
 
-#: The sweep ends if more than this many batches are lost: their worker died.
+#: The sweep ends if more than this number of batches are lost, that is, if their workers died.
 MOST_LOST = 64
 
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
-    """The rows of batches, in order of completion.
+    """Yield the rows of batches, in order of completion.
 
-    A batch is lost if its worker dies. Lost batches are computed again after all others, one by
-    one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a worker
-    has other versions of packages, or if no worker is left.
+    A batch is lost if its worker dies. Lost batches are computed again after all other batches, one
+    by one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a
+    worker has other versions of packages, or if the executor is broken or cancels a batch.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -53,7 +53,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
 def _together(
     batches: Iterator[Batch], executor: Executor
 ) -> Generator[Columns, None, list[Batch]]:
-    """Yield the rows of batches in any order, and return the batches whose workers died."""
+    """Yield the rows of batches in any order; return the batches whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[Any], Batch] = {}
     lost: list[Batch] = []
@@ -75,7 +75,7 @@ def _together(
                 if other := different(versions):
                     raise WorkerError(f"a worker has other versions: {other}")
                 yield columns
-    except BrokenExecutor as error:  # the caller's executor cannot be restarted here
+    except BrokenExecutor as error:  # only the caller can restart this executor
         raise WorkerError(f"the executor is broken: {error}") from error
     except CancelledError as error:
         raise WorkerError("a batch was cancelled: check that the scheduler runs") from error
@@ -90,7 +90,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 
 class Processes(Executor):
-    """An executor with processes on this machine. If one dies, all are replaced by new ones."""
+    """An executor with processes on this machine. If a process dies, new ones replace all."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()
@@ -118,7 +118,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """Start to watch a pipe whose other end the parent holds; end this process when that closes."""
+    """Start a thread that ends this process when the parent's end of the pipe closes."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -131,7 +131,7 @@ def _end_with(pipe: Any) -> None:
 
 @contextmanager
 def _sheltered() -> Iterator[None]:
-    """Inside this context new processes do not run the user's script, and ignore interrupts."""
+    """A context in which new processes do not run the user's script, and ignore interrupts."""
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     masks = hasattr(signal, "pthread_sigmask")  # false on Windows
@@ -154,7 +154,7 @@ def dask(address: str) -> Iterator[Executor]:
     Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
     """
     client_of = needed("distributed", "dask").Client
-    own = partial(client_of, set_as_default=False)  # a failing client would stay the user's default
+    own = partial(client_of, set_as_default=False)  # a failing client must not stay the default
     try:
         if address == "local":
             client = own(n_workers=cores(), threads_per_worker=1, dashboard_address=None)

@@ -17,13 +17,13 @@ from convexrough.sweeps.sweep import Plan
 from convexrough.sweeps.table import MANIFEST, SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: The quantiles that are printed; and the largest numbers of rows and failures that are printed,
-#: and of figures that are drawn.
+#: The quantiles that are printed, and the largest numbers of printed rows, printed failures and
+#: drawn figures.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, **did: Any) -> Summary:
-    """The contents of the output of `--json`: the state of the table, and what `run` did."""
+    """What `--json` prints: the state of the table, and `did`, what `run` did."""
     said = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
@@ -52,7 +52,7 @@ def describe(summary: Summary) -> list[str]:
 
 
 def describe_quantiles(found: Columns) -> list[str]:
-    """The printed table of quantiles, with its first `MOST_ROWS` rows."""
+    """The printed table of quantiles: its first `MOST_ROWS` rows."""
     heads = [f"{float(name):.0%}" if name[0] in "01" else name for name in found]
     rows = [list(row.values()) for row in rows_of(found)]
     lines = aligned([heads, *rows[:MOST_ROWS]], left=heads.index("quantity") + 1)
@@ -67,11 +67,11 @@ def failures(table: SweepTable) -> list[str]:
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """Warnings about tables with loads of their own, and about certified scenes with a message."""
+    """Warnings about stages with constant loads of their own, and about messages of scenes."""
     own = [
         f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
         f"{name}.reference, a factor on them, with it in [sweep.together]"
-        for name in table.manifest.get("own_loads", [])  # sweeps begun earlier do not have it
+        for name in table.manifest.get("own_loads", [])  # manifests of earlier versions lack it
     ]
     said = _messages(table, "certified")
     first, count = next(said, ""), 1 + sum(1 for _ in said)
@@ -87,7 +87,7 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
 
 
 def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
-    """Write quantiles.csv, and figures of measured numbers over swept keys."""
+    """Write quantiles.csv, and figures of measured numbers against swept keys."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
     new.tables({"quantiles": found})
     figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
@@ -102,7 +102,7 @@ def figures_left_out(table: SweepTable) -> list[str]:
 
 
 def progress_kept(folder: Path, plan: Plan) -> str:
-    """A message about the rows of an interrupted sweep in a folder, and how to continue it."""
+    """A message: how many rows of an interrupted sweep a folder holds, and how to continue."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"
     rows = len(open_sweep(folder))

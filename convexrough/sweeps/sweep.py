@@ -33,23 +33,26 @@ from convexrough.sweeps.table import SweepTable, make_folder, part_from
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Largest number of scenes in a batch; about the largest number of asperities in one; and least
-#: number of batches, if there are enough scenes.
+#: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
+#: LEAST_BATCHES batches or more, if there are enough scenes.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
 #: At most this many scenes are computed in order to find out which numbers can be measured.
 TRIED = 5
 
-#: What `sweep` computes: a sweep file, the tables of one, or scenes.
+#: What `sweep` computes: a sweep file, the tables of a sweep file, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
-#: Largest number of scenes that one call computes; larger sweeps are computed in parts.
+#: Largest number of scenes that one call computes; for more, each call computes a share.
 MOST = 10**8
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The computation of a sweep; `manifest` has the contents of manifest.json."""
+    """What a sweep computes: scenes from `source`, and the numbers in `columns` for each scene.
+
+    manifest : the contents of manifest.json
+    """
 
     source: Source
     columns: tuple[Column, ...]
@@ -60,9 +63,9 @@ class Plan:
 
 
 def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file, whose contents are checked.
+    """The plan of a sweep file, after a check of the file.
 
-    measure : names of numbers, which replace the list in the file
+    measure : names of numbers to measure in place of those in the file
 
     Raises FileError if the file cannot be read or is not TOML; SceneFileError with every mistake.
     """
@@ -107,7 +110,7 @@ def plan_of(
 
 
 def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
-    """A mistake if there are seeds but nothing is random, so that scenes would be the same."""
+    """Yield a mistake if there are seeds but nothing is random: the seeds would change nothing."""
     table = table_in(contents, "sweep")
     given = {*table_in(contents, "asperities")}
     given |= {key.removeprefix("asperities.") for _, key in swept(table)}
@@ -120,7 +123,7 @@ def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The checked tables of the first scene, or None; and the mistakes in all swept values."""
+    """The checked tables of the first scene (None if wrong), and all mistakes in swept values."""
     first, seed = grid.point(0)
     study, mistakes = validate(with_values(tables, first, seed))
     for where, lists in (("together", grid.together), ("over", grid.over)):
@@ -195,13 +198,13 @@ def _planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for the scenes of `source`; the first solved scene shows which numbers exist.
+    """The plan for the scenes of `source`. The first solved scene shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
-    given : all input on which the numbers depend, except `measures` and the version
+    given : all input on which the measured numbers depend, except `measures` and the version
 
-    Raises InputError for an unknown measure and, if the first five scenes all fail, the error of
-    the fifth.
+    Raises InputError for an unknown measure. If the first `TRIED` scenes all fail, raises the error
+    of the last of them.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):
@@ -241,7 +244,7 @@ def _planned(
 
 
 def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables whose loads stay as they are in a sweep over the load of [normal]."""
+    """The measured tables with loads that do not follow a swept load or approach of [normal]."""
     if not {"normal.load", "normal.approach"} & {*swept}:
         return []
     own = [name for name, stage in stages.items() if name in used and stage.highest_load]
@@ -266,25 +269,25 @@ def sweep(
     """A table with a row for each of many scenes, and a column for each measured number.
 
     what     : a sweep file; or its tables, as a mapping; or scenes
-    approach, load : only if `what` is scenes: either approaches [length] or loads [force], one
-        number for all scenes or one for each
+    approach, load : only if `what` is scenes, and only one of the two: approaches [length] or loads
+        [force]; one number for all scenes, or one for each scene
     cycle, shear : only if `what` is scenes: amplitudes of cycles and shear forces, as fractions of
         the friction limit (coefficient of friction times load)
     measure  : names of numbers in summary.json, such as "cycle.loss", or their last parts ("loss");
         replaces the list of a sweep file
-    out      : folder for the results; default: they are only returned
+    out      : folder for the results; default: the results are only returned
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: the number of cores that this process may use
-    resume   : continue an interrupted sweep in the folder;  overwrite : remove its
-        results first
-    part     : (k, n): compute only the k-th of n shares of the scenes, counted from 1
+    resume   : continue an interrupted sweep in the folder
+    overwrite : remove the results of an earlier sweep in the folder first
+    part     : (k, n): compute only share k of n shares of the scenes, where k is from 1 to n
 
     The table is the same, bit for bit, for any executor, any order of computation and any number of
     interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice while computing the same scenes, if they died too often, if no worker is
-    left, or if a worker has other versions of packages than this process.
+    workers died twice while computing the same scenes, if workers died too often, if the executor
+    is broken, or if a worker has other versions of packages than this process.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
@@ -321,10 +324,11 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> tuple[SweepTable, dict[str, Any]]:
-    """Compute what is missing in the table of a plan; arguments as for `sweep`.
+    """Compute the missing rows of the table of a plan; arguments as for `sweep`.
 
-    Returns the table, and a dictionary: `found`, a message about rows that existed already;
-    `computed`, the number of scenes that this call computed; `seconds`, the time that it took.
+    Returns the table, and a dictionary with three entries: `found`, a message about rows that
+    existed already; `computed`, the number of scenes that this call computed; and `seconds`, the
+    time that the call took.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
@@ -349,7 +353,7 @@ def run(
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
-    """The parts that job k of n computes, each as a range of scenes; without `part`, all."""
+    """The parts (ranges of scenes) in share k of n shares, for `part` = (k, n); all for None."""
     given: Any = (1, 1) if part is None else part
     if not isinstance(given, tuple) or len(given) != 2:
         raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")

@@ -1,8 +1,8 @@
 """The table of a sweep, in memory or in a folder: a manifest that never changes, and parts.
 
-A part is a Parquet file of consecutive rows, written once and named by its first scene. All parts
-except the last have the same number of rows, which the manifest states. So the contents of a part
-do not depend on the process that computes it.
+The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
+named by its first scene. All parts except the last have the same number of rows, which the manifest
+states. So the contents of a part do not depend on the process that computes it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MANIFEST, PARTS = "manifest.json", "parts"
 #: The quantiles that are computed by default.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: [bytes] memory for a number of a table and its copy in a data frame.
+#: [bytes] memory for one number of a table together with its copy in a data frame.
 CELL = 24
 
 
@@ -72,7 +72,7 @@ class Folder:
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, by default all.
 
-        Raises FileError if the part is damaged, or has other scenes than its name says.
+        Raises FileError if the part is damaged, or if its scenes are not those that its name says.
         """
         pyarrow, parquet = arrow()
         path = self.file(part.start)
@@ -97,7 +97,7 @@ class Folder:
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """The parts of `wanted` to compute, and a message about the others, which exist already.
+        """The parts of `wanted` that are still to be computed, and a message on what was found.
 
         Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
         """
@@ -147,10 +147,12 @@ def open_folder(path: Path) -> Folder:
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
     """The folder of a sweep, created if it does not exist.
 
-    overwrite : remove the parts of an earlier sweep in the folder; other files in it stay
+    overwrite : remove an earlier sweep in the folder, and files written by `sweep --summary`; other
+        files stay
 
-    Raises FileError if it contains another sweep, or files but no sweep, or cannot be written, and
-    ExtraError if pyarrow is not installed.
+    Raises FileError if the folder contains another sweep, a sweep begun with other versions of
+    packages, or files but no sweep, or if it cannot be written; ExtraError if pyarrow is not
+    installed.
     """
     arrow()
     if overwrite and (path / MANIFEST).exists():
@@ -163,13 +165,13 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
             path.mkdir(parents=True, exist_ok=True)
-            # Meanwhile another process may write the manifest of this sweep or of another one.
+            # Meanwhile another process may write the manifest of this sweep or of another sweep.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
         if not (path / MANIFEST).exists():
-            if orphans:  # parts without a manifest, which is always written before parts
+            if orphans:  # the manifest, which is written before all parts, was removed
                 raise FileError(
                     f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they are: "
                     f"restore it or remove {path / PARTS}; --out takes another folder"
@@ -221,11 +223,12 @@ class SweepTable(Record):
     """A table with a row for each computed scene, in the order of the sweep.
 
     manifest  : description of the sweep
-    folder    : folder of the parts; None if the table is `in_memory`
+    folder    : folder of the parts; None if the table is in memory
+    in_memory : the columns by name; None if the table is in a folder
 
     The columns are `scene` (its number), the swept keys, `seed` (-1 if nothing is random), `status`
     ("certified", "undecided" or "failed"), `message` (why the scene is not certified, and
-    warnings), and the measured numbers (nan if failed).
+    warnings), and the measured numbers (nan if the scene failed).
 
     >>> loads = [1e-7, 2e-7, 3e-7]
     >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
@@ -249,7 +252,7 @@ class SweepTable(Record):
 
     @property
     def points(self) -> list[str]:
-        """The swept keys that are not random; combinations of their values are grid points."""
+        """The swept keys that are not random. A combination of their values is a grid point."""
         return [key for key in self.swept if key not in self.manifest["drawn"]]
 
     @property
@@ -274,7 +277,7 @@ class SweepTable(Record):
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Some columns, by default all, one part at a time; for large tables."""
+        """Yield some columns, by default all, one part at a time; for large tables."""
         self._refuse_unknown(names or ())
         if self.in_memory is not None:
             yield {name: self.in_memory[name] for name in names or self.columns}
@@ -286,7 +289,7 @@ class SweepTable(Record):
     def read(self, names: Sequence[str] | None = None) -> Columns:
         """Some columns, by default all, as arrays.
 
-        Raises InputError if they do not fit in memory, and for unknown names.
+        Raises InputError for unknown names, or if the arrays do not fit in memory.
         """
         wanted = self.columns if names is None else list(names)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
@@ -315,7 +318,8 @@ class SweepTable(Record):
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
         """A Dask data frame with some columns, by default all; parts are read when needed.
 
-        Raises ExtraError if Dask is not installed; InputError if the table is not in a folder.
+        Raises ExtraError if Dask is not installed; InputError for unknown names, or if the table
+        has no rows or is not in a folder.
         """
         frames_of_dask = needed("dask.dataframe", "dask")
         self._refuse_unknown(columns or ())
@@ -333,11 +337,12 @@ class SweepTable(Record):
         """Axes with bands of quantiles of a measured number against a swept key.
 
         measured, over : names of columns; default: the first measured number and the first swept
-            key. If the other swept keys have at most four combinations, each has its own bands
+            key. If the values of the other swept keys that are not random have at most four
+            combinations, each combination has bands of its own
 
-        Raises InputError if nothing is swept, and for unknown names.
+        Raises InputError if nothing is swept, if there are no rows, and for unknown names.
         """
-        from convexrough.plots.style import label, literal  # it loads matplotlib
+        from convexrough.plots.style import label, literal  # only when it draws: loads matplotlib
         from convexrough.sweeps.figures import draw_quantiles
 
         if not self.swept or not len(self):
@@ -354,12 +359,13 @@ class SweepTable(Record):
     def quantiles(
         self, measured: Sequence[str] | None = None, at: Sequence[float] = USUAL
     ) -> Columns:
-        """Quantiles over seeds, with a row for each grid point and each measured number.
+        """Quantiles over seeds; a row for each computed grid point and each measured number.
 
         measured : names of measured numbers, by default all;  at : quantiles, from 0 to 1
 
-        The columns are those of `points`, `quantity` (the name of the number), `scenes` (how many
-        were computed), `failed` (how many of these failed), and the quantiles (nan if all failed).
+        The columns are those of `points`, `quantity` (the name of the number), `scenes` (number of
+        computed scenes), `failed` (number of failed scenes), and the quantiles (nan if all scenes
+        failed).
         """
         names = self.measured if measured is None else list(measured)
         about = self.read([*self.points, "scene", "status"])

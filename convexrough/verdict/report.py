@@ -22,12 +22,12 @@ from convexrough.tabular.columns import aligned, bound, labelled
 #: Relative errors above this are printed in per cent.
 PERCENT = 1e-4
 
-#: A list on the terminal shows at most this many asperities, and the number of the others.
+#: A list on the terminal shows at most this number of asperities, and says how many more there are.
 MOST_LISTED = 10
 
 
 def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
-    """The verdicts and a row for each asperity, as `--json` prints them, in the scene's units."""
+    """The verdicts and a row for each asperity, in the scene's units; `--json` prints this."""
     summary: dict[str, Any] = {}
     for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
         names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
@@ -42,7 +42,7 @@ def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
 def asperity_columns(claims: Sequence[Claim]) -> dict[str, NDArray[Any]]:
     """Columns by name, with an entry for each asperity: what is claimed, and what is proved.
 
-    claims : the claim on loads, and the one on shear forces if there is one
+    claims : the claim about loads and, if shear forces are checked, the claim about shear forces
     """
     loads, *sheared = claims
     x, y = loads.of.asperities.positions.T
@@ -63,7 +63,7 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
 
 
 def describe_scene(scene: Scene) -> list[str]:
-    """Aligned lines on the geometry and the contact modulus of a scene."""
+    """Aligned lines with the geometry and the contact modulus of a scene."""
     modulus = described_modulus(scene.material.contact_modulus, scene.units)
     return labelled([("geometry", scene.geometry), ("contact modulus", modulus)])
 
@@ -86,9 +86,9 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
-    """Aligned lines on one claim: wrong, undecided and inaccurate asperities, and the total.
+    """Aligned lines about one claim: wrong, undecided and inaccurate asperities, and the total.
 
-    others : text to print after the number of rows that a table leaves out
+    others : text printed after the number of rows that a table leaves out
     """
 
     def table(which: Indices) -> list[str]:
@@ -126,9 +126,9 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
-    """JUnit XML: a test case for each check of each claim, or one case with the error.
+    """JUnit XML: a test case for each check of each claim; for an error, one case with the error.
 
-    files : the names of the files, for the names of the suite and of its cases
+    files : names of the files that were checked; they are part of the names in the XML
     """
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
     if isinstance(found, ConvexroughError):
@@ -150,7 +150,7 @@ def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
 
 
 def _findings(claim: Claim) -> dict[str, str]:
-    """What is wrong, by the name of each check; "" where nothing is."""
+    """What is wrong, by the name of each check; "" for checks that are passed."""
     points = claim.of.asperities.positions
 
     def named(which: Indices) -> str:

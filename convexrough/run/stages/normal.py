@@ -19,10 +19,10 @@ from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: `closest_change` is taken over the loads that are at least this fraction of the largest.
+#: `closest_change` considers only loads of at least this fraction of the largest load.
 HEAVY = 0.1
 
-#: Relative change of loads by the geometry above which the report mentions it.
+#: The report mentions `closest_change` if it is larger than this.
 DIFFERENT = 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
@@ -100,11 +100,12 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
 
 
 def limits_of(contact: Contact) -> Summary:
-    """Measures of the validity of the model: those of `plausibility.limits_of`, and two more.
+    """Measures of the validity of the model: those of `plausibility.limits_of` and two others.
 
-    geometry        : where asperities meet the sphere
-    closest_change  : largest relative change that the geometry "closest" would cause in a load of
-        at least a tenth of the largest; None in this geometry, or if the change is not known
+    geometry        : where asperities meet the sphere: "summit" or "closest"
+    closest_change  : largest relative change, by the geometry "closest", of a load that is at least
+        a tenth of the largest load; None if the geometry is "closest" already, if nothing touches,
+        or if the change is not known
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
@@ -117,7 +118,10 @@ def limits_of(contact: Contact) -> Summary:
 
 
 def describe(normal: Summary, units: UnitNames) -> list[str]:
-    """The printed report, in aligned lines, of checked loads or of a contact."""
+    """The printed report of checked loads or of a contact, in aligned lines.
+
+    normal : a summary, made by `judged_loads` or by a `NormalResult`
+    """
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
     width = len(str(normal["asperities"]))

@@ -40,14 +40,14 @@ from convexrough.run.values import (
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
-#: This times (number of chords)^-2 is the largest relative error of a loss found in tests.
+#: With n chords, the largest relative error of a loss found in tests is this number / n^2.
 CHORDS_ERROR = 12
 
 
 class Ellipse(FileTable):
-    """An elliptic path in chords: normal load P + A cos t, shear force Q + B sin(t + phase).
+    """Chords of an elliptic path: normal load P + A cos t, shear force Q + B sin(t + phase).
 
-    load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : their number
+    load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : number of chords
     """
 
     load: Positive
@@ -59,7 +59,7 @@ class Ellipse(FileTable):
 
 
 class _Points(Stage):
-    """The points of a path or an ellipse, in multiples of `reference`."""
+    """The points of a path, or an ellipse. All loads and forces are multiples of `reference`."""
 
     loads: list[NonNegative] | None = None
     forces: list[Finite] | None = None
@@ -99,7 +99,7 @@ class _Points(Stage):
         return {"loads": self.reference * loads, "forces": self.reference * forces}
 
     def chords(self) -> list[str]:
-        """A printed line on the chords that replace an ellipse; [] without an ellipse."""
+        """A printed line about the chords that replace an ellipse; [] without an ellipse."""
         if self.ellipse is None:
             return []
         n = self.ellipse.chords
@@ -108,7 +108,7 @@ class _Points(Stage):
 
 
 class PathStage(_Points):
-    """A path of normal load and shear force that starts without load."""
+    """The table [path]: a path of normal load and shear force that starts at the load 0."""
 
     name = "path"
     numbers = (
@@ -123,7 +123,7 @@ class PathStage(_Points):
 
 
 class PathResult(Steps):
-    """The result of [path]: the states at the points."""
+    """The result of [path]: the friction states at the points."""
 
     stage: PathStage
     title = "load path"
@@ -145,7 +145,7 @@ class PathResult(Steps):
         return super().summary() | {"presses": path.presses}
 
     def tables(self) -> dict[str, Columns]:
-        """The tables of the points and of the asperities at each point."""
+        """A table of the points, and a table of all asperities at each point."""
         (path,) = self.found
         m, n = path.asperity_forces.shape
         x, y = path.scene.asperities.positions.T
@@ -159,10 +159,10 @@ class PathResult(Steps):
 
 
 class SteadyStage(_Points):
-    """A closed path of normal load and shear force that is repeated.
+    """The table [steady]: a closed path of normal load and shear force that is repeated.
 
-    phases, factors : also compute the losses of the ellipse at these phases [rad], with the
-        amplitudes multiplied by these factors
+    phases, factors : the losses are also computed at these phases [rad] of the ellipse, with its
+        amplitudes multiplied by these factors; with None as `phases`, they are not
     """
 
     name = "steady"
@@ -174,7 +174,7 @@ class SteadyStage(_Points):
 
     @property
     def highest_load(self) -> float:
-        """[force] the largest load, also with the largest of the factors."""
+        """[force] the largest load of the path, including the path with the largest factor."""
         if self.ellipse is None:
             return super().highest_load
         amplitude = max(1.0, *self.factors) * abs(self.ellipse.load_amplitude)
