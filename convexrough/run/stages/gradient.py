@@ -20,7 +20,7 @@ from convexrough.tabular.columns import bound, labelled
 #: Results whose gradient a scene file may ask for, and their symbols.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: Parameters per asperity, and the name of one of them.
+#: Names of the parameters of asperities, for all asperities and for one asperity.
 EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 
 #: Parameters that are one number for the whole scene.
@@ -33,7 +33,7 @@ class GradientStage(Stage):
 
     of       : "loss" of the cycle between -Q and Q, or "displacement" under Q, where
         Q = fraction f P; "approach" or "load"
-    by       : parameters with a column in the table
+    by       : parameters of asperities that get columns in the table
     holding  : "load" or "approach", held constant; default: what is prescribed
     """
 
@@ -85,7 +85,7 @@ class GradientResult(Single):
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """Derivatives by parameters of the scene, and the largest by parameters of asperities."""
+        """One row: derivatives by the shared parameters, and the largest by those of asperities."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]
