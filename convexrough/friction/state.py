@@ -52,7 +52,7 @@ class States(NamedTuple):
 
 
 class LevelSums(NamedTuple):
-    """Weighted sums over the levels of each of m curves.
+    """Sums over the levels of each of m memory curves, weighted by changes of slope.
 
     used    : the k total loads of the levels of all curves, sorted
     places  : (m, j) the levels of each curve, as indices into `used`

@@ -43,7 +43,7 @@ class SiteBox:
 
     shape  : numbers of rows and of columns of sites
     basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
-    extent : [spacing] upper bound on the distance of two occupied sites
+    extent : [spacing] upper bound on the distance of two occupied sites, which are sites of points
     """
 
     shape: tuple[int, int]
@@ -314,7 +314,7 @@ def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
         half = (i > 0) | (j > 0)
         i, j = i[half], j[half]
         distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
-        # On a reduced basis every difference beyond the square is longer than this.
+        # On a reduced basis every difference with |i| or |j| above `reach` is longer than this.
         whole = reach >= max(rows, columns) - 1
         sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis.T).min())
         order = np.argsort(distances)

@@ -78,7 +78,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A normal solution near computed loads, as balls in scaled units.
+    """A normal solution near computed loads, as balls (numbers with error bounds), in scaled units.
 
     All arrays are (n,), for the asperities of `problem`. The level of a stack of m problems has one
     row for each problem: arrays are (m, n) or, if they hold one number per problem, (m, 1). Where

@@ -1,7 +1,7 @@
 """The normal solutions of one scene at many total loads, solved one by one or together.
 
-Many problems are solved together as the rows of a stack. Only the cheapest proof is then tried; the
-caller solves the rows without a proof one by one.
+Many problems are solved together as the rows of a stack. Then only the cheapest proof is tried, and
+the caller solves rows that it does not prove one by one.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class Levels:
         return self._solved(self.problem.at_approach(approach))
 
     def _solved(self, problem: NormalProblem) -> Level:
-        """The level of `problem`, computed first without initial loads, then from those of `top`.
+        """The level of `problem`, computed without initial loads or from the loads of `top`.
 
         The second attempt is made if the first proves nothing. The level is proved in the box of
         `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only

@@ -81,7 +81,7 @@ class Units:
 
 
 class Data(NamedTuple):
-    """The numbers of a problem as balls, in scaled units.
+    """The numbers of a problem as balls (numbers with error bounds), in scaled units.
 
     coefficients : (n,) k, or (1,) if all are equal;  offsets : (n,) d
     scale        : () 1 / (pi E*)

@@ -35,7 +35,7 @@ def along(radius: Radius) -> tuple[float, float]:
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """Each finite radius R, with a slice of the axes (0 is x, 1 is y) that it belongs to."""
+    """Each finite radius R, with the slice of the axes (0 is x, 1 is y) that have this radius."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]

@@ -11,8 +11,8 @@ with integrals over 0 <= x <= b, for every P whose contact radius is at most b. 
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
 cells. Then x^2 / R_i is replaced by its mean over the cell, and the minimum becomes an upper bound
 on the energy. In scaled units let B_i be the load at which the contact radius of asperity i is b_i.
-Under this load its indentation is d_i = k B_i^(2/3) and its compliance is h_i = (2/3) k
-B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
+Under this load its indentation is d_i = k B_i^(2/3), and its compliance is
+h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
@@ -30,8 +30,8 @@ For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h)
 the contact energy at the upper ends of the box P <= B. At first B are the a priori bounds on the
 loads. If a Cholesky factorisation does not find A + diag(h) positive definite for this B, the box
 is cut at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the
-cut box the shell lemma of docs/theory/convexity.md proves definiteness. An answer with a load at an
-upper end that was cut is refused.
+cut box the shell lemma of docs/theory/convexity.md proves definiteness. If a load of the answer
+reaches an upper end that was cut, the answer is refused.
 """
 
 from __future__ import annotations

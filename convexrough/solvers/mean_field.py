@@ -1,7 +1,7 @@
 """Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-Asperities are grouped in rings about the axis. In the approximation, the loads of all rings cause
-the same displacement w at all asperities of a ring. Their indentations are D - w with
+Asperities are grouped in rings about the axis. The approximation: the loads of all rings cause the
+same displacement w at all asperities of a ring. Their indentations are D - w with
 D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). K_rs is the
 displacement of ring r by a unit load that is spread evenly over ring s, without the displacement of
 an asperity by its own load. Newton's method solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech.

@@ -137,10 +137,11 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
 def model_errors(contact: Contact) -> Array:
     """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
 
-    At the distance r_ij, the Hertz pressure of a neighbour with contact radius a_j and load P_j
-    displaces the surface by a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij) more than a point force.
-    The sum over neighbours is divided by the asperity's approach D0 + d_i, where D0 is the approach
-    of the contact and d_i an entry of the scene's `offsets`.
+    The Hertz pressure of a neighbour at the distance r_ij, with the contact radius a_j and the load
+    P_j, displaces the surface more than a point force P_j does. The difference is
+    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The sum over neighbours is divided by the
+    asperity's approach D0 + d_i, where D0 is the approach of the contact and d_i an entry of the
+    scene's `offsets`.
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

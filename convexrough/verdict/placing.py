@@ -196,7 +196,7 @@ class Placing:
         return named | others
 
     def _numbered(self, name: str, index: Indices) -> Indices | None:
-        """(m,) indices of asperities from a column that counts from 0 or 1; None if it is wrong."""
+        """(m,) indices of asperities from a column that counts from 0 or 1; None if it does not."""
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
