@@ -79,7 +79,7 @@ def parsed(name: str) -> Unit | None:
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit `name` of the quantity `what`; None for "". Raises InputError if of another kind."""
+    """The unit `name` of the quantity `what`; None for "". Raises InputError for other kinds."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)

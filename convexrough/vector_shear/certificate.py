@@ -34,7 +34,8 @@ class VectorBounds(NamedTuple):
     proved : False if nothing is proved
     increments, slips : (n,) bounds on |q - q*| and |slip - slip*|
     displacement_error : bound on |X - X*|;  excess : bound on the energy minus its minimum
-    sliding, partial : (n,) True where proved to slide, and where proved not to slide
+    sliding, partial : (n,) True where the asperity is proved to slide, and where it is proved not
+        to slide
     """
 
     proved: bool

@@ -31,8 +31,9 @@ SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load
 class GradientStage(Stage):
     """The result to differentiate, and the parameters.
 
-    of       : "loss" of the cycle between -Q and Q, or "displacement" under Q, where
-        Q = fraction f P; "approach" or "load"
+    of       : "loss" (of the cycle between -Q and Q), "displacement" (under Q), "approach" or
+        "load"
+    fraction : Q / (f P) for "loss" and "displacement"
     by       : parameters of asperities that get columns in the table
     holding  : "load" or "approach", held constant; default: what is prescribed
     """
