@@ -64,7 +64,8 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
     """(...) [force / length^2] shear traction along x after loading from rest.
 
     At the distance r from its centre an asperity contributes f p0 sqrt(1 - r^2/a^2), with the
-    coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is taken off.
+    coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is
+    subtracted. A negative shear force has the opposite traction.
     """
     centres, a, shares, peaks = _sheared(state)
     return _sum_over_discs(
@@ -82,7 +83,7 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     asperities; each contributes the displacement (3.91) of Johnson (1985) for both bodies. Dini and
     Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the relative
     displacement of the bodies. This sum only approximates it: in `shear` the compliance between two
-    asperities is a mean over the directions in which one can lie from the other.
+    asperities is a mean over all directions from one to the other.
     """
     centres, a, shares, peaks = _sheared(state)
     material = state.contact.scene.material

@@ -1,4 +1,4 @@
-"""Press and cycle scenes with equal numbers of asperities together, as rows of a stack of arrays.
+"""Scenes with equal numbers of asperities, pressed and cycled together as rows of arrays.
 
 Scenes that differ only in heights and friction are a family, which shares one matrix. Scenes that
 are not proved in this way are left out.
@@ -30,7 +30,7 @@ from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
-#: Scenes with more asperities are solved one by one, because for these stacks save no time.
+#: Scenes with more asperities are solved one by one, because for them stacks save no time.
 MOST = 512
 
 #: Rows are processed together up to this total number of entries of their matrices.
@@ -76,7 +76,7 @@ class PressedRows(NamedTuple):
     ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
         """A mask (m,) of the proved cycles, and the fields of `Cycles` for these rows, by name.
 
-        upper, lower : (m,) shear forces [force];  friction : (m,) coefficients
+        upper, lower : (m,) [force] ends of the cycles;  friction : (m,) coefficients
         """
         problem, high, units = self.problem, self.high, self.problem.units
         f, nu = Ball.exact(friction), Ball.exact(problem.scene.material.poisson_ratio)
@@ -84,7 +84,7 @@ class PressedRows(NamedTuple):
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
-        total = where(inside, total, high.load)[:, None]  # the result omits rows not `inside`
+        total = where(inside, total, high.load)[:, None]  # rows not `inside` are not proved
         rows = replace(self.stack, control=total, by_load=True)
         level, good = solved(rows, self.box.closed)
         low = level.rows
@@ -190,7 +190,7 @@ def _repeated(values: Array, shape: tuple[int, int]) -> Array:
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
-    """(m, n) the offsets of scenes that differ only in heights, with error bounds."""
+    """(m, n) the offsets of scenes of one family, with error bounds."""
     scene, length = problem.scene, problem.units.length
     if len(rows) == 1 and rows[0] is scene:
         return problem.exact.offsets[None, :]

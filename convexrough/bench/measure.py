@@ -27,22 +27,22 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
 
-#: Largest proved error that reference loads may have, over the largest load: two roundoffs.
+#: Largest accepted error bound of reference loads, divided by the largest load: two roundoffs.
 ACCURATE = 2.0**-52
 
 #: Least and largest number of runs, of which the fastest counts. Between these limits, runs start
-#: for `patience` [s].
+#: until all runs together have taken `patience` [s].
 LEAST_RUNS, MOST_RUNS = 3, 25
 
 #: Number of timed products (`plain_product`), of which the fastest is the unit of time.
 PRODUCTS = 8
 
-#: Vertices (P, Q / f) of a load path, over the load at the paper's approach.
+#: Vertices (P, Q / f) of a load path, divided by the load at the paper's approach.
 CORNERS = np.array(
     [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
 )
 
-#: Amplitudes of a loss curve, over the friction limit.
+#: Amplitudes of a loss curve, divided by the friction limit.
 PARTS_OF_LIMIT = np.linspace(0.02, 0.98, 49)
 
 Make = Callable[[], Scene]
@@ -122,7 +122,7 @@ def measure_attempt(
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
-        """The solution of a new problem, because operators cache what they compute."""
+        """A new problem (operators cache what they compute), and its solution."""
         problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
         return problem, attempt.settings.solve(problem)
 

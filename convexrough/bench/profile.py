@@ -85,7 +85,7 @@ def profile_of(
 
     solvers : solver objects; default: every solver of `compare`. Newton's method is always first
     cases   : names of cases or families; default: all
-    within  : largest error of correct loads, over the largest load
+    within  : largest error of a right answer, divided by the largest load
     """
     tried = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)

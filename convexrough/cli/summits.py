@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Pressing(NamedTuple):
-    """How to press: as a scene file says, or a sphere of this radius; all None to press nothing."""
+    """How to press: as in a scene file, or a sphere; if all are None, nothing is pressed."""
 
     scene: Path | None
     radius: float | None
@@ -71,7 +71,8 @@ class Pressing(NamedTuple):
         from convexrough.scene.material import Material
         from convexrough.scene.scene import Scene
 
-        # At a given approach no contact depends on the modulus. Poisson's ratio affects only shear.
+        # At a given approach only the loads depend on the modulus. Poisson's ratio affects only
+        # shear.
         stuff = Material(1.0 if self.modulus is None else self.modulus, 0.3)
         base = partial(Scene, self.radius, material=stuff, geometry="closest")
         pressed = partial(press, approach=self.approach, load=self.load)

@@ -36,12 +36,12 @@ class ShearCertificate(Table):
 
     Arrays are (n,), in the order of the scene's asperities.
 
-    scope  : scope of the certificate of the pressed contact; "none" where nothing is proved
-    order  : "proved": no indentation falls as the load rises from P - Q/f to P (load P, shear force
-        Q, coefficient of friction f), so statuses and bounds hold for the true state; "proved for
-        one step": statuses and bounds hold for the result of one general step from rest to Q
-        (docs/theory/without-order.md), which is the true state unless the deflection of some
-        asperity decreased on the way; "fails": nothing is proved
+    scope  : scope of the certificate of the pressed contact; "none" if nothing is proved
+    order  : "proved": no indentation falls as the load rises from P - |Q|/f to P, so statuses and
+        bounds hold for the true state (P is the load, Q the shear force, f the coefficient of
+        friction); "proved for one step": statuses and bounds hold for the result of one general
+        step from rest to Q (docs/theory/without-order.md), which is the true state unless the
+        deflection of some asperity decreased on the way; "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
@@ -84,7 +84,7 @@ class ShearState(Table, Plottable):
     displacements : [length] tangential displacement of each asperity due to its own force, plus its
         slip; the effect of other asperities is left out
     slips         : [length] gross slip; 0 where the asperity does not slide
-    stick_radii   : [length] radii of the stick discs; 0 where the asperity slides
+    stick_radii   : [length] radii of the stick discs; 0 where the asperity slides or is open
 
     >>> state = cr.shear(contact, displacement=9.88e-6)
     >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
@@ -112,7 +112,7 @@ class ShearState(Table, Plottable):
 
     @property
     def order(self) -> Order:
-        """What is proved about order: one of the three values of `ShearCertificate.order`."""
+        """Whether indentations are proved to rise with the load, as in `ShearCertificate.order`."""
         return self.certificate.order
 
     def gradient(
@@ -131,7 +131,7 @@ class ShearState(Table, Plottable):
             too; `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if there is no derivative. In gross sliding there is none if the approach
-        is kept constant, or if several asperities are the last to start to slide, all at the same
+        is kept constant, or if several asperities are the last to start to slide, at the same shear
         force.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
@@ -164,8 +164,8 @@ def shear(
         at most 16 * 2^-53 of f P, it counts as f P, which means gross sliding
     displacement : [length] relative tangential displacement of distant points
 
-    Raises InputError if the scene has no friction, if |Q| exceeds f P, or if the displacement
-    exceeds that of gross sliding; SolverError if a normal problem is not solved.
+    Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
+    that at which gross sliding starts; SolverError if a normal problem is not solved.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")
@@ -232,7 +232,7 @@ def shear(
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The value of T = Q / f for which general steps give this displacement."""
+    """The value of T = Q / f for which one general step from rest gives this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     def beyond(part: float) -> float:

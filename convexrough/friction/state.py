@@ -2,10 +2,11 @@
 
 The weights are the changes of slope of the memory curve, which stores the state
 (docs/theory/paths.md). Equation (1) of that page gives the shear forces Q_i of the asperities and
-the displacement X of the bodies. With the indentations n_i in place of the loads P_i, and the
-factor of X, the sum is the own deflection of asperity i, which is due to its own force, plus its
-drift. The drift is its displacement relative to the opposite surface. Where an asperity is open,
-n_i is minus its gap. Equation (1) of docs/theory/states.md is the special case of first loading.
+the displacement X of the bodies. Replace the loads P_i in the sum for Q_i by the indentations n_i,
+and multiply by the factor of X. The result is the own deflection of asperity i, which its own force
+causes, plus its drift. The drift is the displacement of the asperity relative to the opposite
+surface. Where an asperity is open, n_i is minus its gap. Equation (1) of docs/theory/states.md is
+the special case of first loading.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ class States(NamedTuple):
 
     Error bounds (the radii of the balls) are infinite without a proof.
 
-    displacements : (m,) X, of the bodies
+    displacements : (m,) X, of the two bodies relative to each other
     forces        : (m, N) Q_i, shear forces of the asperities
     asperity_displacements : (m, N) own deflection plus drift
-    drifts        : (m, N) displacement relative to the opposite surface, also while open
+    drifts        : (m, N) displacements relative to the opposite surface, also of open asperities
     """
 
     displacements: Ball
@@ -51,11 +52,12 @@ class States(NamedTuple):
 
 
 class LevelSums(NamedTuple):
-    """Weighted sums over the levels of each of m curves.
+    """Sums over the levels of each of m memory curves, weighted by changes of slope.
 
-    used    : (k,) loads of all levels
+    used    : the k total loads of the levels of all curves, sorted
     places  : (m, j) the levels of each curve, as indices into `used`
-    weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above
+    weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above.
+        Rows of curves with fewer than j levels end with the weight 0
     """
 
     used: list[Fraction]
@@ -110,7 +112,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) the status of each asperity, from what is proved at the load and at the slip front."""
+    """(N,) the status of each asperity, from what is proved at the curve's load and slip front."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)
@@ -124,7 +126,7 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
     """(N,) for each asperity the status whose mask in `proved` is true for it.
 
-    If there is none, the status is "open" if that is proved, else "undecided".
+    If no mask is true, the status is "open" if the asperity is proved to be open, else "undecided".
     """
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
@@ -136,7 +138,7 @@ def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) 
 
 
 def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
-    """(N,) [length] contact radii 3 P_i^(1/3) / (4 k_i E*) at a level, and bounds on the errors."""
+    """(N,) [length] contact radii 3 P_i^(1/3) / (4 k_i E*) at a level, and their error bounds."""
     modulus = Ball.exact(levels.scene.material.contact_modulus)
     root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
     radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus

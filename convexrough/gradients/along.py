@@ -1,8 +1,8 @@
 """Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
 
-docs/theory/gradients.md, "Along a path", explains the method. The path is compared with a path on
-which one load P_k, or one T_k = Q_k / f, is shifted by SHIFT; Q_k is a shear force, f the
-coefficient of friction, and the arithmetic is exact. Let L be a load level of the shifted path, l
+docs/theory/gradients.md, "Along a path", explains the method. The path is compared with a shifted
+path, on which some loads P_k, or some T_k = Q_k / f, differ by at most SHIFT. Q_k is a shear force,
+f the coefficient of friction. The arithmetic is exact. Let L be a load level of the shifted path, l
 the corresponding level of the original path, and S = dD0/dL. To first order in the shift
 
     V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l).
@@ -34,7 +34,8 @@ from convexrough.gradients.parts import ZERO, Moves, Part
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: Coordinates of memory curves that differ by less than this part of the largest load count as
-#: equal when ties are looked for: rounded decimals often miss a tie by less.
+#: equal in the search for ties (docs/theory/gradients.md): rounded decimals often miss a tie by
+#: less.
 ROUNDED = Fraction(1, 2**46)
 
 #: One-sided derivatives are compared at this distance from a near tie, divided by the largest load.
@@ -45,7 +46,8 @@ PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: For each segment: index of its end point, weight of its loss, weight of the displacement there.
+#: For each segment: index of its end point, weight of its loss, weight of the displacement at its
+#: end.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
 #: Changes of P or of T at all points of a path, per unit of a parameter.
@@ -111,7 +113,10 @@ class Along:
 
     @cached_property
     def sums(self) -> tuple[Sums, Sums]:
-        """Weights in the sum of losses over c_t f^2, and in that of displacements over c_t f."""
+        """Weights in (sum of losses) / (c_t f^2), and in (sum of displacements) / (c_t f).
+
+        c_t is the ratio of tangential to normal compliance.
+        """
         curve, lost, moved = MemoryCurve.pressed(self.start), Sums(), Sums()
         for point, loss, displacement in self.steps:
             curve, pieces = curve.go(self.loads[point], self.heights[point])
@@ -127,7 +132,7 @@ class Along:
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
         """The parts of the weighted sum of losses, and those of the sum of displacements.
 
-        moves : derivatives of the total load of every level by parameters, at fixed T
+        moves : derivatives of the total load of every level with respect to parameters, at fixed T
         """
         (lost, moved), at, force = self.sums, self.known.at, self.known.units.force
         unit, travel = self.known.loss_unit, self.known.travel_unit
@@ -141,7 +146,10 @@ class Along:
 
     @cached_property
     def nearly_tied(self) -> bool:
-        """True if unequal numbers P, P + T or P - T at vertices of memory curves nearly agree."""
+        """True if unequal P, unequal P + T or unequal P - T of two vertices nearly agree.
+
+        The vertices are those of all memory curves along the path.
+        """
         curve, vertices = MemoryCurve.pressed(self.start), set[tuple[Fraction, Fraction]]()
         for point, _, _ in self.steps:
             curve = curve.go(self.loads[point], self.heights[point])[0]
@@ -151,7 +159,7 @@ class Along:
         return any(b - a < least for each in along for a, b in pairwise(sorted(each)))
 
     def _shifted(self, loads: Shifts, heights: Shifts, by: Fraction) -> Along:
-        """The path after changes, times `by`, of P and T at all points."""
+        """The path after P and T at all points have changed by these shifts times `by`."""
         return replace(
             self,
             loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
@@ -193,9 +201,10 @@ class Along:
     ) -> tuple[Ball, Array]:
         """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
 
-        The one-sided values are those from below and from above. A derivative is the mean of both
-        if they agree within their error bounds. It is nan if they differ or one does not exist. A
-        path that misses a tie by rounding is also shifted past the tie, to both sides of it.
+        The one-sided values are the derivatives from below and from above. The derivative is their
+        mean if they agree within their error bounds. It is nan if they differ or one does not
+        exist. If rounding may have moved the path off a tie, one-sided derivatives past the tie are
+        computed, too; if these differ, they replace the others, and the derivative is nan.
 
         directions : changes of P and of T at all points
         """
@@ -218,7 +227,7 @@ def _one(below: Ball, above: Ball) -> Ball:
 
 
 def _moved(weights: Weights, off: Fraction) -> Weights:
-    """The weights at the level `off` below; V, D0 and S are expanded about this level."""
+    """The weights moved down by `off`: V, D0 and S are expanded about the lower level."""
     V, D, S = weights
     return V, D + V * off, S + D * off + V * off * off / 2
 

@@ -1,14 +1,15 @@
 """How offsets d, coefficients k of Hertz's law and the compliance matrix A depend on a scene.
 
-Derivatives, as balls, follow from
+Derivatives are computed, as balls (numbers with error bounds), from
 
     d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
     A_ij = 1 / (pi E* |c_i - c_j|).
 
-An asperity has the summit r = (x, y) at the height z and the tip radius rho. The base has a
-curvature 1/R along each axis, x and y; in k, 1/R is the mean of both. In the geometry "summit",
-b = 1/R, and the contact points are c = r. In "closest", b = 1 / (R + rho) and c = r / (1 + rho/R)
-(docs/theory/gradients.md, "Derivatives by the data of a scene").
+An asperity has the summit r = (x, y) at the height z and the tip radius rho. The pressed body has a
+curvature 1/R along each axis, x and y; in k, 1/R is the mean of both. The effective curvatures
+b = (bx, by) and the contact points c depend on the geometry. In "summit", b = 1/R and c = r. In
+"closest", b = 1 / (R + rho) and c = r / (1 + rho/R) (docs/theory/gradients.md, "Derivatives by the
+data of a scene").
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ BLOCK = 2**16
 
 
 class Bending(NamedTuple):
-    """Changes (n,) dd [length], (n,) dlog k and (n, 2) dc [length] of asperities."""
+    """Changes of n asperities: (n,) dd [length], (n,) d(log k) and (n, 2) dc [length]."""
 
     offsets: Ball
     local: Ball
@@ -112,7 +113,7 @@ class Geometry:
         return Bending((self.points * flatter).sum() * 0.5, local, outwards)
 
     def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
-        """Changes for those of heights, rho (n,), summits (n, 2) and the radius of a sphere."""
+        """Changes due to those of z and rho (n,), of r (n, 2), and of the radius of a sphere."""
         a, b, sunk = self.by_tip, self.by_radius, (self.points * self.bend * moved).sum()
         return Bending(
             heights - sunk + tips * a.offsets + radius * b.offsets,

@@ -27,8 +27,8 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     """The compliance operator of the asperities `which` of a scene.
 
     scale : 1 / (pi E*) with the contact modulus E*, in the units of the loads and displacements
-    kind  : None for the cheapest kind. For few asperities it is a matrix. For more it is Fourier
-        transforms, on the lattice if the asperities lie on one, and on a mesh if they do not
+    kind  : None for the cheapest kind. For few asperities it is a matrix. For more asperities it
+        uses Fourier transforms, on their lattice if they lie on one, and on a mesh otherwise
 
     Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
     than fit in memory.

@@ -17,7 +17,7 @@ from convexrough.roundoff import ROUNDOFF
 
 #: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
 #: docs/theory/operators-lattice.md, "Rounding". A pass of radix 4 has a smaller error than two
-#: passes of radix 2, and one of radix 8 a smaller error than three.
+#: passes of radix 2, and a pass of radix 8 has a smaller error than three passes of radix 2.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed in groups with this many bytes in each row, which fit in the cache.
@@ -27,8 +27,9 @@ ROW = 512
 LAID_OUT = 2**17
 
 
-#: A function of differences of sites in rows, i, and in columns, j, and of the squared distances
-#: [spacing^2] for all (i, j). It returns for each kernel an array of values (len(i), len(j)).
+#: A function of the differences i of two sites in rows, of their differences j in columns, and of
+#: the squared distances [spacing^2] for all (i, j). It returns for each kernel an array of values
+#: (len(i), len(j)).
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
 #: A function of the transforms of some fields in a slice of columns, and of this slice. It returns
@@ -42,7 +43,7 @@ class SiteBox:
 
     shape  : numbers of rows and of columns of sites
     basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
-    extent : [spacing] upper bound on the distance of two occupied sites
+    extent : [spacing] upper bound on the distance of two occupied sites, which are sites of points
     """
 
     shape: tuple[int, int]
@@ -144,8 +145,8 @@ class SiteBox:
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
         """Values in some rows of the padded box.
 
-        If several differences of sites share an entry of the box, the value is that of the
-        shortest.
+        If several differences of sites share an entry of the box, its value is that of the shortest
+        difference. Beyond `extent` values are 0.
         """
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
@@ -168,7 +169,11 @@ class SiteBox:
         return found
 
     def _spectrum(self, half: NDArray[Any]) -> NDArray[Any]:
-        """The real transform of an even kernel, from the transforms of its rows 0, 1, ..."""
+        """The transform of an even kernel, from the transforms of its rows 0, 1, ...
+
+        For an odd kernel, `half` is -i times these transforms, and the result is the imaginary part
+        of the transform.
+        """
         from scipy import fft
 
         rows = self.padded[0]
@@ -181,7 +186,7 @@ class SiteBox:
         return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Slices of rows and columns of the padded box, each with the differences i, j there."""
+        """Slices of `taken` and of columns of the padded box, with the differences i, j there."""
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
@@ -309,7 +314,7 @@ def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
         half = (i > 0) | (j > 0)
         i, j = i[half], j[half]
         distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
-        # On a reduced basis every difference beyond the square is longer than this.
+        # On a reduced basis every difference with |i| or |j| above `reach` is longer than this.
         whole = reach >= max(rows, columns) - 1
         sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis.T).min())
         order = np.argsort(distances)

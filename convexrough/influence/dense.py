@@ -24,8 +24,8 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: A matrix of 1 / r between asperities and other points is cached if it has at most so many
-#: entries; for larger ones a cache saves no time.
+#: A matrix of 1 / r between asperities and other points is cached if it has at most this many
+#: entries; for larger matrices a cache saves no time.
 KEPT = 2**16
 
 

@@ -1,4 +1,4 @@
-"""A solution of the normal contact problem at a total load L: the basis of friction and gradients.
+"""A solution of the normal contact problem at a total load L, which friction and gradients use.
 
 A proved solution is the only one in a box of loads. At the total load L it has the loads P_i(L),
 the approach D0(L), the indentations n_i(L) (minus the gap where open), and the energy
@@ -7,7 +7,7 @@ the approach D0(L), the indentations n_i(L) (minus the gap where open), and the 
 
 The coefficients k, the operator A and the offsets d are those of `NormalProblem`. The derivatives
 q = dP/dL and S = dD0/dL solve  q_i / c_i + (A q)_i = S,  sum q = 1  for the touching asperities,
-with c = dP/dn = (3/2) P^(1/3) / k; elsewhere q_i = 0.
+where c_i = dP_i/dn_i = (3/2) P_i^(1/3) / k_i. For all other asperities q_i = 0.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial
 from convexrough.roundoff import SAFETY
 
-#: Largest accepted residual of `Level.response` after refinement, divided by that before it.
+#: Largest accepted residual of `Level.response` after refinement, divided by that before it or by
+#: the right side, whichever is larger.
 SOLVED = 1e-6
 
 
@@ -66,7 +67,7 @@ class Springs(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and which asperities cause this.
+    """The reason why nothing is proved, and the asperities that cause this.
 
     which : indices into `NormalProblem.candidates`, the asperities that could touch
     """
@@ -77,19 +78,19 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A normal solution near computed loads, as balls in scaled units.
+    """A normal solution near computed loads, as balls (numbers with error bounds), in scaled units.
 
     All arrays are (n,), for the asperities of `problem`. The level of a stack of m problems has one
-    row for each: arrays are (m, n) or, if they hold one number per problem, (m, 1). Where nothing
-    is proved, the radii of the balls are infinite, except that of a prescribed approach.
+    row for each problem: arrays are (m, n) or, if they hold one number per problem, (m, 1). Where
+    nothing is proved, the radii of the balls are infinite, except that of a prescribed approach.
 
     loads, indentation : P_i and n_i;  approach : () D0
     open      : (n,) True where an asperity is proved to have a gap
     trial     : the loads from which the solution was proved, and their residuals; None at L = 0
     box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
         L = 0
-    distance  : bound on the norm of P - P* for the loads P of `trial` and the solution P*; the
-        square of the norm is sum_i h_i (P_i - P*_i)^2
+    distance  : bound on the norm of P - P*, for the loads P of `trial` scaled to the total L, and
+        the solution P*; the square of the norm is sum_i h_i (P_i - P*_i)^2
     compliance : (n,) the h_i of this norm: the local compliance at the upper ends of a second,
         smaller box, which also contains the solution
     obstacle  : the reason why nothing is proved, or None
@@ -116,7 +117,7 @@ class Level:
         error = np.inf if problem.by_load else state.approach.radius
         approach = Ball.around(state.approach.mid, error)
         opened = np.zeros(len(problem), dtype=bool)
-        if problem.by_load:  # what no solution can load
+        if problem.by_load:  # asperities that carry no load in any solution
             highest = problem.approach_bound
             opened = problem.exact.offsets.upper + (highest + SAFETY * abs(highest)) < 0
         return cls(problem, loads, indentation, approach, opened, state, obstacle=obstacle)
@@ -141,7 +142,7 @@ class Level:
 
     @cached_property
     def load(self) -> Ball:
-        """() the total load L; if it is not prescribed, with an error bound by Cauchy's inequality.
+        """() the total load L. If it is not prescribed, Cauchy's inequality bounds its error.
 
         Where nothing is proved, the ball is around the sum of the computed loads, and its radius
         bounds only rounding errors.
@@ -157,7 +158,7 @@ class Level:
         return Ball.around(total.mid, total.radius + np.reshape(spread, total.shape))
 
     def row(self, k: int, problem: NormalProblem) -> Level:
-        """The level in row k of a stack; `box` is the one that all rows share.
+        """The level in row k of a stack; all rows share one `box`.
 
         problem : the problem of this row
         """
@@ -171,7 +172,7 @@ class Level:
 
     @property
     def rows(self) -> Rows:
-        """The levels of a stack."""
+        """The levels of a stack, as arrays with one row for each level."""
         load = self.load if self.load.radius.ndim == 1 else self.load[:, 0]
         known = self.loads, self.indentation, self.touching, self.open
         return Rows(load, self.approach[:, 0], *known)
@@ -179,8 +180,8 @@ class Level:
     def moves(self, coupling: Coupling) -> Any:
         """(m,) bounds on the errors |A P - A P*| of the displacements at m points.
 
-        A is here the map `coupling` from loads to the displacements at these points, and P are the
-        loads of `trial`.
+        Here A is the map `coupling` from loads to the displacements at these points, P are the
+        loads of `trial`, and P* is the solution.
         """
         if self.box is None or self.trial is None:
             return np.inf
@@ -228,7 +229,8 @@ class Level:
 
         The equations hold for touching asperities; x is 0 for others. The solution is refined in
         pairs of float64 numbers until the residual no longer halves. The bounds on its error
-        (docs/theory/one-theorem.md) allow for asperities that are not proved to touch or be open.
+        (docs/theory/one-theorem.md) allow for asperities that are neither proved to touch nor
+        proved to be open.
 
         right : (n,) the given right side;  total : the given sum of x
 
@@ -245,7 +247,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and the beta for which its mean, weighted by c, is 0."""
+            """x / c + A x - right - beta, and beta, which makes the mean weighted by c about 0."""
             above = compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
@@ -300,10 +302,11 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Three bounds: on the residual after asperity j has taken up the part of the total
-            that x misses, on this part, and on the displacements by it and by `others`.
+            """Bounds on three things: the residual after x_j has been changed so that the total is
+            right; the size of this change; the displacements by this change and by the asperities
+            of `others`.
 
-            others : bound on the sum of |x| over asperities not proved to touch or be open
+            others : bound on the sum of |x| of asperities neither proved to touch nor to be open
             """
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
@@ -335,7 +338,7 @@ class Level:
 
 
 class Rows(NamedTuple):
-    """Levels with k total loads: (k,) or (k, n), in scaled units."""
+    """Levels at k total loads: the fields of `Level` as arrays (k,) or (k, n), in scaled units."""
 
     load: Ball
     approach: Ball
@@ -376,7 +379,8 @@ def energies(levels: Sequence[Level]) -> Ball:
         local = data.coefficients * Ball.exact(trial).two_thirds()
         per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
         found = Ball.exact(trial).dot(per_load)
-        # The energy of the trial loads exceeds the least at their total by at most e'|P - P*|.
+        # The energy of trial loads P exceeds the least energy at their total by at most the sum of
+        # e_i |P_i - P*_i|, for the solution P* and e = `excess`.
         loads = Ball.stacked([level.loads for level in loaded])
         off = loads.error + np.abs(loads.mid.low)
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)

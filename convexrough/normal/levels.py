@@ -1,7 +1,7 @@
 """The normal solutions of one scene at many total loads, solved one by one or together.
 
-Many problems are solved together as the rows of a stack. Only the cheapest proof is then tried; the
-caller solves the rows without a proof one by one.
+Many problems are solved together as the rows of a stack. Then only the cheapest proof is tried, and
+the caller solves rows that it does not prove one by one.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Largest number of candidates for which levels are solved together: for more this saves no time.
+#: Largest number of candidates for which levels are solved together: for more candidates this saves
+#: no time.
 MOST = 512
 
 #: Largest number of Newton steps.
@@ -35,7 +36,8 @@ STEPS = 30
 #: indentations. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: Largest size of an array (rows, asperities), because dozens of such arrays are in use at once.
+#: Largest number of entries of an array (rows, asperities). Dozens of such arrays are in use at
+#: once, so this limits the memory.
 NUMBERS = 2**17
 
 quietly = np.errstate(all="ignore")
@@ -105,7 +107,7 @@ class Levels:
         return self._solved(self.problem.at_approach(approach))
 
     def _solved(self, problem: NormalProblem) -> Level:
-        """The level of `problem`, computed first without initial loads, then from those of `top`.
+        """The level of `problem`, computed without initial loads or from the loads of `top`.
 
         The second attempt is made if the first proves nothing. The level is proved in the box of
         `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only
@@ -133,10 +135,10 @@ def _key(load: Ball) -> tuple[float, float, float]:
 
 @quietly
 def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
-    """The solutions of all rows, and (m,) True for rows that are proved; others have no meaning.
+    """The solutions of all rows, and (m,) True where a row is proved; other rows have no meaning.
 
-    In a row that counts as proved, the residual is also near its rounding error, and the status of
-    every asperity is proved.
+    Two more conditions hold in such a row: the residual is near its rounding error, and the status
+    of every asperity is proved.
 
     box : one box for all rows; default: a box for each row, by `widest`
     """
@@ -169,7 +171,7 @@ def pressed(stack: Stack) -> Array:
 def widest(stack: Stack, state: Trial) -> Box:
     """For each row the box that contains every solution and the loads of `state`.
 
-    The shells give its convexity number.
+    `NormalProblem.shells` give its convexity number.
     """
     highest = stack.control.upper
     if stack.by_load:

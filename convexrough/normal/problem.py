@@ -1,13 +1,13 @@
 """The normal contact problem in scaled units: energy, gap, residual, bounds, convexity.
 
-(1) and (2) of docs/theory/convexity.md, "The model", state it:
+Equations (1) and (2) of docs/theory/convexity.md, "The model", state the problem:
 
     minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
 
 for the loads P, with the coefficients k of the local law, the compliance operator A, and
-D_i = D0 + d_i for the approach D0 and the offsets d. Either D0 is prescribed (approach control), or
-sum P_i is, with D0 as the multiplier of this constraint (load control). The first-order conditions
-are the contact law
+D_i = D0 + d_i for the approach D0 and the offsets d. Under approach control D0 is prescribed. Under
+load control sum P_i is prescribed, and D0 is the multiplier of this constraint. The first-order
+conditions are the contact law, with the gaps g:
 
     P >= 0,   g = k P^(2/3) + A P - D >= 0,   P_i g_i = 0.
 """
@@ -37,7 +37,7 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: If a matrix is stored, and no load changes by more than this part of the largest one, A P is
+#: If a matrix is stored, and no load changes by more than this part of the largest load, A P is
 #: updated by a product of A with the changes in float64, and keeps 29 digits. Without a stored
 #: matrix A P is always updated in this way.
 NEARBY = 1e-13
@@ -52,10 +52,10 @@ REDUCTION = 1e-7
 
 @dataclass(frozen=True)
 class Units:
-    """Scaled units of length and force: numbers of a problem are about 1 in them.
+    """Units of length and force in which the numbers of a problem are about 1.
 
-    They are the units of the scene times powers of two (of eight for the force). So scaling a
-    float64 number by them, or a force to the power 2/3, does not round.
+    They are the units of the scene times a power of two (length) and a power of eight (force). So
+    it causes no rounding to scale a float64 number, or a force to the power 2/3.
     """
 
     length: float  # [length] the scaled unit of length
@@ -68,7 +68,7 @@ class Units:
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
-        """Units of about the size of `approach` [length] and of the load with this indentation.
+        """Units close to `approach` [length] and to the load that causes this indentation.
 
         coefficient : k of Hertz's law, indentation = k load^(2/3)
 
@@ -81,9 +81,9 @@ class Units:
 
 
 class Data(NamedTuple):
-    """The numbers of a problem as balls, in scaled units.
+    """The numbers of a problem as balls (numbers with error bounds), in scaled units.
 
-    coefficients : (n,) k, or (1,) where all are equal;  offsets : (n,) d
+    coefficients : (n,) k, or (1,) if all are equal;  offsets : (n,) d
     scale        : () 1 / (pi E*)
     """
 
@@ -96,14 +96,16 @@ class Data(NamedTuple):
 class NormalProblem:
     """The asperities of a scene that could touch, and what is prescribed, in scaled units.
 
-    candidates    : (n,) indices of these asperities in the scene; no others touch in any solution
+    candidates    : (n,) indices of these asperities in the scene; no other asperity touches in any
+        solution
     coefficients, offsets, influence : (n,) k, (n,) d, and the compliance operator A
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    shells        : (n,) 1 / (pi E* s_i) with the contact modulus E* and radii s_i that make
-        A + diag(shells) positive semidefinite
+    shells        : (n,) 1 / (pi E* s_i) with the contact modulus E*. The radii s_i are so small
+        that A + diag(shells) is positive semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
-    highest       : upper bound on D0 at any solution; infinite to compute one when it is needed
+    highest       : upper bound on D0 at any solution; if it is infinite, `approach_bound` computes
+        a bound when one is needed
     exact_control : the prescribed number as a ball; None if it is a float64 number
     """
 
@@ -121,7 +123,7 @@ class NormalProblem:
     exact_control: Ball | None = None
 
     def __post_init__(self) -> None:
-        # The proof uses these arrays after a solver, which could be any class, has seen them.
+        # A solver, which may be any class, gets these arrays, and later the proof uses them.
         for each in (*vars(self).values(), *vars(self.influence).values()):
             if isinstance(each, np.ndarray):
                 frozen(each)
@@ -193,7 +195,7 @@ class NormalProblem:
 
     @cached_property
     def places(self) -> Indices:
-        """(N,) the position of each asperity of the scene in `candidates`; -1 for all others."""
+        """(N,) for each asperity of the scene its index in `candidates`, or -1."""
         places = np.full(len(self.scene), -1)
         places[self.candidates] = np.arange(len(self))
         return places
@@ -214,14 +216,16 @@ class NormalProblem:
         return Ball.around(product, errors * (1 + SAFETY))
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
-        """(n,) one Newton step of the unknowns delta of docs/theory/newton.md: indentations, or
-        minus gaps where open.
+        """(n,) one Newton step for the equation F(delta) = 0 of docs/theory/newton.md.
 
-        slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta), to be reduced to 0
-        enough : fraction of the defect that the step may leave;  todo : for `Stack.correct` only
+        delta_i is the indentation of a touching asperity, and minus the gap of an open one.
 
-        If `Influence.cheap_sums` is True, asperities with slope and defect 0 are left out to save
-        time.
+        slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta)
+        enough : fraction of the defect that the step may leave;  todo : not used; `Stack.correct`
+            uses it
+
+        If `Influence.cheap_sums` is True, asperities whose slope and defect are both 0 are left out
+        to save time.
         """
         some, influence = np.arange(len(self)), self.influence
         if influence.cheap_sums:
@@ -238,7 +242,7 @@ class NormalProblem:
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(n,) A P for P = `others`, if possible by an update of `product`, which is A `loads`."""
+        """(n,) A times `others`; if possible by an update of `product`, that is A times `loads`."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:
@@ -270,11 +274,11 @@ class NormalProblem:
         influence: Kind | None = None,
         highest: float | None = None,
     ) -> NormalProblem:
-        """The problem of a scene. `approach` [length] or `load` [force] is given, exactly one.
+        """The problem of a scene. Give exactly one of `approach` [length] and `load` [force].
 
         influence : compliance operator; None for the cheapest
-        highest   : [length] upper bound on the approach under this load, or inf to include all
-            asperities; default `highest_approach`
+        highest   : [length] upper bound on the approach under `load`, or inf to make all asperities
+            candidates; default: the result of `highest_approach`
         """
         checks.exactly_one("approach", approach, "load", load)
         offsets, errors = scene.offsets, scene.offset_errors
@@ -288,7 +292,7 @@ class NormalProblem:
             if highest is None:
                 highest = highest_approach(scene, load, influence)
 
-        # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
+        # An asperity with D_i <= 0 cannot touch: A P >= 0, so its gap is at least -D_i.
         prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
@@ -313,7 +317,7 @@ class NormalProblem:
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
-        """The problem in which only these candidates may carry loads."""
+        """The problem in which only the candidates with these indices may carry loads."""
         return replace(
             self,
             candidates=self.candidates[which],
@@ -325,7 +329,7 @@ class NormalProblem:
         )
 
     def widened(self, which: Indices) -> NormalProblem:
-        """The same problem with more candidates: the asperities `which` of the scene."""
+        """The same problem with a larger set of candidates: the asperities `which` of the scene."""
         scene, units = self.scene, self.units
         coefficients = hertz.local_coefficient(
             scene.material.contact_modulus, scene.relative_radii[which]
@@ -346,7 +350,7 @@ class NormalProblem:
         return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
 
     def energy(self, loads: Array, displacement: Array) -> float:
-        """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""
+        """The energy Phi(P), in which D0 counts as 0 under load control; `displacement` is A P."""
         local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
         prescribed = self.offsets + (self.approach or 0.0)
         return float(local + loads @ (0.5 * displacement - prescribed))
@@ -357,7 +361,7 @@ class NormalProblem:
         return local + displacement - self.offsets - approach
 
     def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
-        """The residual of the contact law: the largest of |g_i| where P_i > 0 and -g_i elsewhere.
+        """The residual: the largest of all |g_i| where P_i > 0, and of all max(-g_i, 0) elsewhere.
 
         displacement : (n,) A P, if known
         """
@@ -376,21 +380,21 @@ class NormalProblem:
         return alone * (1 + SAFETY)
 
     def compliance(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
-        """(n,) h_i = (2/3) k_i P_i^(-1/3), the local part of the Hessian; it is 1 / (2 E* a_i)."""
+        """(n,) the local part h_i = (2/3) k_i P_i^(-1/3) = 1 / (2 E* a_i) of the Hessian of Phi."""
         with np.errstate(divide="ignore"):
             h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
         return h
 
     def convexity_number(self, loads: Array) -> float:
-        """The largest shells_i / h_i with the compliances h at `loads`.
+        """The largest ratio shells_i / h_i, where h is the `compliance` at `loads`.
 
-        If it is below 1, the energy is convex for all loads up to these: (3) of
+        If it is below 1, the energy is convex for all loads from 0 up to `loads`: (3) of
         docs/theory/convexity.md.
         """
         return float(self.convexity_at(self.compliance(loads)))
 
     def convexity_at(self, compliance: Array) -> Any:
-        """The `convexity_number` at loads with this compliance (n,); (m, 1) for (m, n)."""
+        """The `convexity_number` for a compliance (n,); one per row, (m, 1), for (m, n)."""
         return largest(self.shells / compliance) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
@@ -409,8 +413,10 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """An upper bound on D0 at every solution: D0 itself if it is prescribed, else the smaller
-        of `highest` and `load_control.approach_bound`.
+        """An upper bound on D0 at every solution.
+
+        It is `highest` or, under load control, the result of `load_control.approach_bound` if that
+        is smaller.
 
         weights      : (n,) approximate loads, not negative, not all 0
         displacement : (n,) A times weights
@@ -429,8 +435,11 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Three balls: the mean curvature of the base, k^3 of an asperity whose relative curvature is
-    1, and 1 / (pi E*); the last two in scaled units.
+    """Three balls: the mean curvature of the pressed body; and, in scaled units, k^3 of an asperity
+    whose relative curvature is 1, and 1 / (pi E*).
+
+    base : the radius of the pressed body;  modulus : E*
+    local, unit : factors that scale k and 1 / (pi E*)
     """
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
@@ -450,6 +459,6 @@ def _even_coefficient(tip: float, *constants: Any) -> Ball:
 
 
 def _middle(values: Array) -> float:
-    """The approximate median of the values, from a thousand of them."""
+    """The approximate median of the values, from fewer than 2000 of them."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])

@@ -1,11 +1,11 @@
-"""The contact law on balls, and Newton's method, which refines loads to more than float64's digits.
+"""The contact law with error bounds, and loads refined to more digits than float64 has.
 
 Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
 one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
 
-The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0  is a
-ball, whose radius bounds the errors of the data, the product and the arithmetic. A correction is
-one step of docs/theory/newton.md in float64.
+The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0
+(symbols of `normal.problem`) is a ball, whose radius bounds the errors of the data, the product and
+the arithmetic. A correction is one step of docs/theory/newton.md in float64.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ ENOUGH = 0.1
 #: costs no more than the solution.
 FEW = 700
 
-#: If the sum of the loads misses the total by a smaller part, only the largest load is changed;
-#: otherwise all loads are scaled first. A heuristic.
+#: If the sum of the loads misses the total by less than this part, only the largest load is
+#: changed; otherwise all loads are scaled first. A heuristic.
 FITS = 1e-6
 
 #: Number of loads up to which `math.fsum`, which rounds once, is fastest.
@@ -52,8 +52,8 @@ class Trial:
     loads, product : (n,) P and A P
     local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
-    approach : D0: the prescribed one, or, if the load is prescribed, the one that fits best
-    missing : prescribed total minus the sum of the loads; 0 where none is prescribed
+    approach : D0: the prescribed approach; if the load is prescribed, the approach that fits best
+    missing : prescribed total minus the sum of the loads; 0 if no total is prescribed
     """
 
     problem: Problem
@@ -124,14 +124,15 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
 def refines(problem: NormalProblem) -> bool:
     """True if refinement costs no more than the solution; only then loads are refined.
 
-    It corrects the loads until the residual is about as small as the error bound of a sharp product
-    (docs/theory/operators.md). A stored matrix of more than `FEW` candidates is used without it.
+    Refinement corrects the loads until the residual is about as small as the error bound of a sharp
+    product (docs/theory/operators.md). With a stored matrix and more than `FEW` candidates, loads
+    are not refined.
     """
     return not problem.influence.stored or len(problem) <= FEW
 
 
 def refined(problem: Problem, best: Trial) -> Trial:
-    """The trial `best`, corrected until a correction no longer halves its residual."""
+    """The trial `best`, corrected until its residual is within rounding or no longer halves."""
     size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
     for _ in range(CORRECTIONS):
@@ -196,7 +197,7 @@ def scaled(problem: Problem, loads: Pair) -> Pair:
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads changed to have the prescribed total, and a ball of the difference that is left."""
+    """The loads, changed to have the prescribed total, and a ball of the remaining difference."""
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():

@@ -208,7 +208,7 @@ def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
 
 
 def _letters(axes: Axes, names: list[str], heights: Array) -> None:
-    """Write the name of each curve right of its end, without overlaps."""
+    """Write the name of each curve to the right of its end, without overlaps."""
     low, high = axes.get_ylim()
     apart = 0.055 * (high - low)
     order = np.argsort(heights)

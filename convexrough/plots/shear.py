@@ -111,7 +111,7 @@ def _doubtful(state: State) -> Any:
 
 
 def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
-    """The title: the size of the shear force, and how many asperities slide."""
+    """The title: the shear force divided by f P, and how many asperities slide."""
     touching = state.contact.loads > 0
     slide = int((touching & (state.status == "sliding")).sum())
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)

@@ -1,7 +1,7 @@
-"""The slider page: one HTML file that shows states after loading from rest, computed beforehand.
+"""The slider page: one HTML file that shows precomputed states after loading from rest.
 
-The page steps through these states and shows their numbers unchanged. It only computes loops, by
-Masing's rule (docs/theory/paths.md).
+The page steps through these states and shows their numbers unchanged. The only results that it
+computes are loops, by Masing's rule (docs/theory/paths.md).
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
 
-#: Numbers of forces of the slider: each for at most as many touching asperities as its key says.
+#: FORCES: numbers of forces of the slider, each with the largest number of touching asperities for
+#: which it is used. FEWEST_FORCES: the number for still more asperities.
 FORCES = {2_500: 101, 20_000: 51}
 FEWEST_FORCES = 21
 
-#: Largest numbers of discs (the same for dots of open asperities), and of asperities with curves.
-#: These limits keep a page below 2 MB.
+#: MOST_DRAWN: largest number of discs, and of dots for open asperities. MOST_FOLLOWED: largest
+#: number of asperities with curves. These limits keep a page below 2 MB.
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
@@ -120,7 +121,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
 
 
 def _stick(shares: Array, statuses: NDArray[np.str_]) -> list[list[int]]:
-    """`stick` of `slider_data`, from (m, k) shear forces over friction limits, and statuses."""
+    """`stick` of `slider_data`, from (m, k) shear forces / friction limits, and statuses."""
     rows = np.maximum(np.rint(1000.0 * np.cbrt(np.maximum(1.0 - shares, 0.0))), 1.0).astype(int)
     rows[statuses == "sliding"] = 0
     rows[statuses == "undecided"] = -1

@@ -33,7 +33,7 @@ MOST_NUMBERS, MOST_DOTS = 12, 60
 
 
 def label(axes: Axes, x: str, y: str) -> None:
-    """Label the axes in the size of print."""
+    """Label the axes in the font size of print."""
     axes.set_xlabel(x, fontsize=LABEL)
     axes.set_ylabel(y, fontsize=LABEL)
     axes.tick_params(labelsize=TICK)
@@ -115,7 +115,7 @@ def say_nothing(axes: Axes, why: str = "no contact") -> None:
 
 
 def not_proved(scope: str, status: Any) -> str:
-    """A text in brackets on what is not proved of a state; "" if everything is proved."""
+    """A text in brackets that says what is not proved about a state; "" if all is proved."""
     if scope == "none":
         return " (not proved)"
     unsure = int((status == "undecided").sum())
@@ -128,7 +128,11 @@ def shades_of(count: int, low: float = 0.3) -> Array:
 
 
 def mark_points(axes: Axes, x: Array, y: Array) -> None:
-    """Draw dots; if they are few, write their numbers beside them, at one place in one label."""
+    """Mark points with dots and numbers, if there are few points.
+
+    Dots are drawn for at most `MOST_DOTS` points, numbers for at most `MOST_NUMBERS`. Points at
+    nearly the same place share a label.
+    """
     if len(x) <= MOST_DOTS:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:

@@ -21,7 +21,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
     """The contents of a file for qpsolvers.Problem.load, with dense matrices.
 
     qpsolvers' problem is: minimise x'Px/2 + q'x subject to G x <= h and A x = b. Rows of `program`
-    with two equal bounds become equations; the others must have no upper bound.
+    with two equal bounds become equations; other rows must have no upper bound.
     """
     width, height = len(program.linear), len(program.lower)
     checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
@@ -45,7 +45,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) cannot write it."""
+    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) writes no such files."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),
@@ -94,7 +94,7 @@ def cone_npz(program: ConeProgram) -> bytes:
 def mps(program: QuadraticProgram) -> bytes:
     """The contents of a file in free MPS with a section QUADOBJ, for HiGHS, Gurobi and CPLEX.
 
-    Rows of `program` with two equal bounds become equations; the others must have no upper bound.
+    Rows of `program` with two equal bounds become equations; other rows must have no upper bound.
     Variables are free.
     """
     equal = program.lower == program.upper
@@ -119,8 +119,8 @@ def mps(program: QuadraticProgram) -> bytes:
 def cbf(program: ConeProgram) -> bytes:
     """The contents of a file in the Conic Benchmark Format, version 1.
 
-    The objective of this format is linear, so one more variable t, the last, replaces x'Px/2. With
-    P = F'F,
+    The objective of this format is linear. So x'Px/2 is replaced by one more variable t, the last.
+    With P = F'F,
 
         t >= |Fx|^2 / 2    as    t + 1/2 >= |(t - 1/2, Fx)|,
 
@@ -156,7 +156,7 @@ def cbf(program: ConeProgram) -> bytes:
 
 
 def _factor(quadratic: csc_matrix) -> Array:
-    """F with F'F = P, from eigenvalues, as some of them may be 0 up to rounding."""
+    """F with F'F = P, from eigenvalues: Cholesky's method fails if some of them are 0."""
     upper = quadratic.toarray()
     used = np.flatnonzero(upper.diagonal())
     small = upper[np.ix_(used, used)]

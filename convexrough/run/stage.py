@@ -37,7 +37,7 @@ Labels = Mapping[str, Sequence[float]]
 #: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: The names of the numbers of results, by physical dimension; all others are dimensionless.
+#: The names of the numbers in results, by physical dimension; other numbers are dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
@@ -52,7 +52,7 @@ KIND = {name: kind for kind, names in KINDS.items() for name in names}
 #: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
-#: A table of steps is printed with at most this many rows, its last ones.
+#: Of a table of steps at most this many rows are printed: the last ones.
 MOST_PRINTED = 20
 
 
@@ -126,7 +126,7 @@ def number(found: Any, name: str) -> Any:
 
 
 def numbers_of(found: Any, names: Sequence[str]) -> Summary:
-    """What `number` returns for each of these names, as Python numbers and lists, by name."""
+    """For each of these names the result of `number`, as a Python number or list."""
     return {name: plain(number(found, name)) for name in names}
 
 
@@ -224,9 +224,9 @@ class Result(Table, Plottable):
         return {}
 
     def lines(self) -> list[str]:
-        """The lines of the printed table, and a line on what is proved about order.
+        """The lines of the printed table and, for some results, a line about a proof.
 
-        That is, whether it is proved that indentations increase with the load.
+        That line says whether it is proved that indentations increase with the load.
         """
         most = MOST_PRINTED if self.steps else len(self.known)
         said = self.printed_table(self.name, self.known, self.headings(), self.title, most)

@@ -17,7 +17,7 @@ from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout, Pattern
 
 #: Random heights and logarithms of radii are normally distributed. They are clipped at this many
-#: standard deviations, so that only finitely many asperities can touch.
+#: standard deviations, so that only finitely many asperities of an unbounded array can touch.
 CUT_DEVIATIONS = 6.0
 
 
@@ -25,7 +25,7 @@ CUT_DEVIATIONS = 6.0
 class Asperities(Record):
     """Spherical asperities on a half-space, in the order of the given positions.
 
-    positions : (n, 2) [length] x and y of the summits; the axis of the sphere is at (0, 0)
+    positions : (n, 2) [length] x and y of the summits; the axis of the pressed body is at (0, 0)
     tip_radii : (n,) [length] radii of the tips, or one number for all
     heights   : (n,) [length] heights of the summits, or one number for all; positive is taller
 
@@ -58,7 +58,7 @@ class Asperities(Record):
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
-        They share all data that depend only on the positions, such as distances.
+        The new asperities share all data that depend only on the positions, such as distances.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -194,7 +194,7 @@ def checked_seed(seed: int | None) -> int:
 
 
 def cut_normal(count: int, seed: int, *, stream: int) -> Array:
-    """(count,) clipped standard normal numbers. A `stream` is independent of all others."""
+    """(count,) clipped standard normal numbers. Different streams are independent."""
     numbers = np.random.default_rng([seed, stream]).standard_normal(count)
     return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)
 

@@ -19,7 +19,7 @@ Radius: TypeAlias = float | tuple[float, float]
 
 
 def checked(radius: Any) -> Radius:
-    """The radius; a pair of equal radii becomes one number. Raises InputError if it is wrong."""
+    """The radius, checked; a pair of equal radii becomes one number. Raises InputError."""
     if np.ndim(radius) == 0:
         return _length("sphere_radius", radius)
     if len(radius) != 2:
@@ -35,7 +35,7 @@ def along(radius: Radius) -> tuple[float, float]:
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """Each finite radius R, with the slice of the axes (0 is x, 1 is y) along which it holds."""
+    """Each finite radius R, with the slice of the axes (0 is x, 1 is y) that have this radius."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]

@@ -18,10 +18,11 @@ from convexrough.scene.neighbours import refuse_coincident
 MANY = 5000
 
 
-#: The rim of points consists of the farthest one in each of this number of sectors.
+#: The rim of a layout consists of the farthest point in each of this number of sectors.
 SECTORS = 16
 
-#: Bound on the distance from their sites of points made on a lattice, over the largest coordinate.
+#: Bound on the distance of points that were made on a lattice from their exact sites, divided by
+#: the largest coordinate.
 MADE_SITE_ERROR = 16 * 2.0**-53
 
 
@@ -69,7 +70,7 @@ class Pattern:
         return i + self.second[0] * j, self.second[1] * j
 
 
-#: The lattice in which each site has six nearest neighbours, and the one in which it has four.
+#: The lattice in which each site has six nearest neighbours, and that in which each has four.
 HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
 SQUARE = Pattern(0, (0.0, 1.0))
 
@@ -78,7 +79,8 @@ SQUARE = Pattern(0, (0.0, 1.0))
 class Layout(Cached):
     """Distinct points (n, 2) [length] in the plane, with data that depend only on them.
 
-    made : the lattice on which they were made, and their sites (i, j) (n, 2); None if it is unknown
+    made : the lattice on which the points were made, and (n, 2) their sites (i, j); None for other
+        points
     """
 
     points: Array
@@ -90,7 +92,10 @@ class Layout(Cached):
 
     @classmethod
     def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
-        """The sites up to the squared distance `limit` [spacing^2], times a spacing [length]."""
+        """The layout of a pattern's sites up to the squared distance `limit` [spacing^2].
+
+        spacing : [length] distance of nearest neighbours
+        """
         sites, order = pattern.within(limit)
         points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
         if len(points) < 3:
@@ -123,7 +128,7 @@ class Layout(Cached):
         return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
 
     def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
-        """The indices where `wanted` (n,) is True; for many points on a lattice, as in `order`."""
+        """The indices where `wanted` (n,) is True; for many points on a lattice, in `order`."""
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]

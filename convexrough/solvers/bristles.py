@@ -1,17 +1,18 @@
 """The contact as one quadratic program for OSQP: each Hertz contact becomes a row of springs.
 
 In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
-value of a quadratic program. Independent springs, the bristles, lie on |x| <= b. On each half they
-have the stiffness 2 E* per length, and the bristle at x touches at the indentation x^2 / R_i:
+minimum of a quadratic program. Independent springs, the bristles, lie on |x| <= b. On each half
+they have the stiffness 2 E* per length, and the bristle at x first touches at the indentation
+x^2 / R_i:
 
     (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
 
 with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
-cells. Then x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy.
-In scaled units let B_i be the load at which the contact radius of asperity i is b_i. Under this
-load its indentation is d_i = k B_i^(2/3) and its compliance h_i = (2/3) k B_i^(-1/3) =
-1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
+cells. Then x^2 / R_i is replaced by its mean over the cell, and the minimum becomes an upper bound
+on the energy. In scaled units let B_i be the load at which the contact radius of asperity i is b_i.
+Under this load its indentation is d_i = k B_i^(2/3), and its compliance is
+h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
@@ -26,11 +27,11 @@ and prescribed displacements D,
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
 For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
-the contact energy at the upper ends of the box P <= B. First B are the a priori bounds on the
-loads. If a Cholesky factorisation does not find A + diag(h) positive definite there, the box is cut
-at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the cut box
-the shell lemma of docs/theory/convexity.md proves definiteness. An answer with a load at an upper
-end that was cut is refused.
+the contact energy at the upper ends of the box P <= B. At first B are the a priori bounds on the
+loads. If a Cholesky factorisation does not find A + diag(h) positive definite for this B, the box
+is cut at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the
+cut box the shell lemma of docs/theory/convexity.md proves definiteness. If a load of the answer
+reaches an upper end that was cut, the answer is refused.
 """
 
 from __future__ import annotations
@@ -60,13 +61,13 @@ from convexrough.sphere import hertz
 #: The convexity number of a box that is cut; below 1 the matrix is definite. A heuristic.
 LARGEST_S = 0.99
 
-#: The part of the diagonal that is subtracted before a Cholesky factorisation decides whether the
-#: matrix is definite. A heuristic, far above rounding.
+#: This part of the diagonal is subtracted from the matrix before a Cholesky factorisation decides
+#: whether it is definite. A heuristic, far above rounding errors.
 MARGIN = 0.001
 
-#: Smallest upper end B_i of a box, divided by the largest, unless a face is below it. A heuristic:
-#: smaller loads need not be resolved, and the compliances, proportional to B^(-1/3), then differ by
-#: at most a factor of a hundred.
+#: Smallest upper end B_i of a box, divided by the largest, unless the box must be cut below it. A
+#: heuristic: smaller loads need not be resolved. The factors B^(-1/3) of the compliances then
+#: differ by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -74,11 +75,11 @@ SMALLEST_BOX = 1e-6
 class BristleQP:
     """A solver of the bristle program with OSQP (1.0 or newer) and polishing.
 
-    bristles    : m, number of cells over half the contact width; the error of the loads is about
+    bristles    : m, number of cells in half a row, 0 <= x <= b_i; the error of the loads is about
         0.4 / m^2 of the largest load
     newton_step : True to end with one Newton step, which squares the relative error
     tolerance   : absolute and relative tolerance of OSQP, in scaled units. If OSQP finds which
-        bristles carry forces, its polishing step computes these forces to rounding
+        bristles carry forces, its polishing step computes these forces up to rounding errors
     max_iterations : largest number of iterations of OSQP
     verbose     : True to print OSQP's table of iterations
 
@@ -144,7 +145,7 @@ class BristleProgram:
         return cls(problem, m, solver, *_convex_box(problem, solver))
 
     def apply(self) -> QuadraticProgram:
-        """The program; its rows are phi_ij >= 0, sum_j e_ij / m = 0, and the prescribed load."""
+        """The program, with constraints phi_ij >= 0, sum_j e_ij / m = 0, and the given load."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
@@ -196,7 +197,7 @@ class BristleProgram:
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The upper ends B (n,), True where a box was cut (n,), and the definite matrix A + diag(h)."""
+    """The upper ends B (n,); a mask (n,), True where B was cut; and the matrix A + diag(h)."""
     trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
     approach_bound = problem.overhang(trial, problem.apply(trial))
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face

@@ -1,7 +1,8 @@
 """The contact law as one second-order cone program, written in CVXPY to be read.
 
-It is the program of `conic.py`, with the names of docs/theory/exact-cones.md. It satisfies CVXPY's
-rules of convexity (DCP) and of parameters (DPP), so it is compiled once for all approaches.
+This is the program of `conic.py`, with the names of docs/theory/exact-cones.md. It satisfies
+CVXPY's rules of convexity (DCP) and of parameters (DPP), so CVXPY compiles it once for all
+approaches.
 """
 
 from __future__ import annotations
@@ -59,8 +60,9 @@ class ConicCVXPY(ConeSolver):
     """A solver of the cone program through CVXPY, with any of its second-order cone solvers.
 
     tolerance      : absolute and relative tolerance of feasibility and of the duality gap, in
-        scaled units; a solver that `OPTIONS` does not name keeps its default
-    max_iterations : largest number of iterations; None for 200 (SCS: 20,000)
+        scaled units
+    max_iterations : largest number of iterations; None for 200 (SCS: 20,000). Solvers that
+        `OPTIONS` does not name keep their own tolerances and limits
     solver         : a name from `cvxpy.installed_solvers()`, in upper or lower case
     verbose        : True to print the output of CVXPY and of the solver
     """
@@ -141,7 +143,7 @@ class LiftedModel:
     boxes    : the boxes 0 <= p <= B of loads
     program  : the cvxpy.Problem
     D0       : cvxpy.Parameter: the approach, or its upper bound if the load is prescribed
-    p        : cvxpy.Variable: the loads of `boxes.members`
+    p        : cvxpy.Variable: the loads of the asperities `boxes.members`
     link     : the constraint p == B y3, whose multiplier is minus the gap where p = 0
     total    : the constraint sum p == load, or None; its multiplier is D0 minus the approach
     """

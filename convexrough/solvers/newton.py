@@ -3,7 +3,7 @@
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
 D = D0 + d of `NormalProblem`. For many asperities the iteration first includes only those near the
-contact, and adds others until all that are left out are found to be open.
+contact, and adds others until all asperities left out are found to be open.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Newton's method may end if the next step is expected to leave a defect whose norm is this
-#: fraction of that of the indentations. Refinement then makes the next correction. A heuristic.
+#: Newton's method may end if the expected norm of the defect after the next step is at most this
+#: fraction of the norm of the indentations. Refinement then makes the next correction. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: If at most so many asperities could touch, the iteration includes all, and the start uses a
-#: product with A. This number affects speed only.
+#: If at most this many asperities could touch, the iteration includes all of them, and the start
+#: uses a product with A. This number affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
@@ -118,7 +118,7 @@ class Newton:
     max_iterations : largest number of steps; SolverError is raised if they are not enough
 
     Once the left side, the residual, is below 1e-12 (|D0| + max_i |d_i|), the method also stops if
-    it is small compared with the rounding errors of A P, or if a step does not halve it.
+    the residual is small compared with the rounding errors of A P, or if a step does not halve it.
     """
 
     tolerance: float = 0.0

@@ -18,18 +18,18 @@ STEPS = 5
 def slenderness(ratio: Number) -> Number:
     """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1.
 
-    The secant method. The logarithm of Rx / Ry is nearly linear in that of b / a, so that `STEPS`
-    steps reach rounding errors.
+    The secant method finds it. The logarithm of Rx / Ry is nearly linear in that of b / a, so
+    `STEPS` steps reach rounding errors.
     """
     from scipy.special import elliprd
 
     def radii(log: Number) -> Number:
-        """The logarithm of Rx / Ry for that of b / a."""
+        """The logarithm of Rx / Ry, given the logarithm of b / a."""
         q = np.exp(2.0 * log)
         return np.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0))
 
     wanted = np.log(ratio)
-    before, log = -0.5 * wanted, -2.0 / 3.0 * wanted  # the latter if Rx is nearly Ry
+    before, log = -0.5 * wanted, -2.0 / 3.0 * wanted  # the second holds if Rx is nearly Ry
     value_before = radii(before)
     for _ in range(STEPS):
         value = radii(log)
@@ -60,11 +60,11 @@ def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> 
 
 
 def load_ratio(ratio: Number) -> Number:
-    """The load of an ellipsoid over that of the sphere of radius sqrt(Rx Ry) at the same approach.
+    """The load of an ellipsoid, divided by that of a sphere with the same approach.
 
-    From `semi_axes` and `approach` P = pi E* sqrt(Rx R_D) (delta / (1.5 R_F))^(3/2) with
-    R_D(0, q^2, 1), R_F(0, 1, q^2) and q = b / a. From Hertz P = (4/3) E* (Rx Ry)^(1/4) delta^(3/2)
-    for the sphere.
+    The radius of the sphere is sqrt(Rx Ry). From `semi_axes` and `approach`, P = pi E* sqrt(Rx R_D)
+    (delta / (1.5 R_F))^(3/2) with R_D(0, q^2, 1), R_F(0, 1, q^2) and q = b / a. For the sphere,
+    Hertz's law is P = (4/3) E* (Rx Ry)^(1/4) delta^(3/2).
 
     ratio : Rx / Ry >= 1
     """

@@ -16,7 +16,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to four of its eight neighbours, so that no pair is found twice.
+#: Steps (row, column) from a pixel to four of its eight neighbours: they find each pair of
+#: neighbours once.
 PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
@@ -97,9 +98,9 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """For each pair of neighbouring pixels of two hills: the numbers of the hills, and a rank.
+    """For each pair of neighbouring pixels in different hills: their hills, and a rank.
 
-    The smaller number is first. The rank is that of the lower pixel.
+    Of the numbers of the two hills, the smaller is first. The rank is that of the lower pixel.
     """
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]

@@ -1,9 +1,10 @@
-"""The choice of the pruning: how proofs of the contact, and errors of its model, depend on it.
+"""How the proof and the model error of a contact depend on the pruning of its summits.
 
-Pruning removes hills of small prominence (height of the maximum above the highest pass to a taller
-one). With weak pruning many summits are close to others. If the contact discs of two summits
-overlap, the two are really one contact, which the model of point forces does not describe. Crowded
-summits can also make the energy nonconvex, and then the solution cannot be proved.
+Pruning removes hills of small prominence. The prominence is the height of a maximum above the
+highest pass to a taller maximum. With weak pruning many summits are close to others. If the contact
+discs of two summits overlap, the two are really one contact, which the model of point forces does
+not describe. Crowded summits can also make the energy nonconvex, and then the solution cannot be
+proved.
 """
 
 from __future__ import annotations
@@ -37,11 +38,12 @@ Press = Callable[[Asperities], Contact]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Provability(Table, Plottable):
-    """Contacts of the summits that are left at m prunings, the weakest first. Arrays are (m,).
+    """Contacts of the summits left by m prunings, the weakest pruning first. Arrays are (m,).
 
     prune, heights : least prominence of a hill that is not removed, as a fraction of the height Sz
         of the map and as a [length]
-    summits, contacts, undecided : numbers of summits, of summits that touch, and of undecided ones
+    summits, contacts, undecided : numbers of summits, of summits that are proved to touch, and of
+        undecided summits; without a proof, those with a load count as touching
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found
     approaches, loads : [length] approach and [force] load of each contact
@@ -74,7 +76,7 @@ class Provability(Table, Plottable):
 
     @property
     def trusted_from(self) -> float:
-        """The smallest pruning from which on all prunings are trusted; nan if there is none."""
+        """The smallest pruning that is trusted with all stronger ones; nan if there is none."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
@@ -135,10 +137,11 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
 def model_errors(contact: Contact) -> Array:
     """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
 
-    At the distance r_ij, the Hertz pressure of a neighbour with contact radius a_j and load P_j
-    displaces the surface by a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij) more than a point force.
-    The sum over neighbours is divided by the asperity's approach D0 + d_i, where D0 is the approach
-    of the contact and d_i an entry of the scene's `offsets`.
+    The Hertz pressure of a neighbour at the distance r_ij, with the contact radius a_j and the load
+    P_j, displaces the surface more than a point force P_j does. The difference is
+    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The sum over neighbours is divided by the
+    asperity's approach D0 + d_i, where D0 is the approach of the contact and d_i an entry of the
+    scene's `offsets`.
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

@@ -47,6 +47,7 @@ UNLIKE = 0.2
 class Scanned:
     """A surface, all summits, those left by pruning, and the result of pressing these.
 
+    maxima, summits : all summits, and those left by pruning
     curve   : contacts at several prunings; None if nothing was pressed
     contact : contact of `summits`; None if nothing was pressed or no solution was found
     whole   : the contact of the whole map by boundary elements, or None
@@ -83,7 +84,7 @@ class Scanned:
 
 
 def surface_summary(scanned: Scanned) -> dict[str, Any]:
-    """The contents of the output of `--json`, with lengths in the unit of the map."""
+    """The object that `--json` prints, with lengths in the unit of the map."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     moments, statistics = surface.moments, scanned.maxima.statistics
     summary: dict[str, Any] = {
@@ -128,7 +129,7 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
-    """The columns of summits.csv, named with their units, which a scene file can read."""
+    """The columns of summits.csv, with units in their names; a scene file can read the file."""
     unit, columns = summits.origin.unit, summits.columns()
     named = {
         f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values

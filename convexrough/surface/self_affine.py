@@ -37,8 +37,8 @@ def self_affine(
     cutoff    : [length] shortest wavelength; default 8 pixels
     unit      : unit of length, as in `Surface`
 
-    Maps with the same size pixels * pixel, seed and `cutoff` are the same surface with different
-    resolution.
+    Maps that differ only in `pixels` and `pixel` show the same surface at different resolutions, if
+    they agree in the size pixels * pixel and a given `cutoff`.
 
     >>> surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256)
     >>> surface.heights.shape
@@ -86,8 +86,8 @@ def _waves(
 ) -> tuple[Indices, Array]:
     """The waves of a map, one for each pair of opposite wave vectors.
 
-    Their numbers of wavelengths across the map (n, 2), along x and y, and their variances (n,)
-    [length^2], in an order that does not depend on the number of pixels.
+    The result is (n, 2) the numbers of wavelengths across the map, along x and y, and (n,) the
+    variances [length^2]. The order of the waves does not depend on the number of pixels.
     """
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)

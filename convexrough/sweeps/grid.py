@@ -70,7 +70,7 @@ class Grid(FileTable):
     """The table [sweep]: keys "table.key" of a scene file that vary, and numbers to measure.
 
     measure  : names of numbers
-    seeds    : how many seeds of random heights, tip radii and values, or a list of them
+    seeds    : number of seeds of random heights, tip radii and values, or a list of seeds
     together : keys with lists of the same length, whose k-th values belong together
     over     : keys whose values are combined in every way
     draw     : keys with random values, and their laws
@@ -153,7 +153,7 @@ class Grid(FileTable):
 def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
     """The random value of a key for a seed. It is independent of the values of other keys.
 
-    "normal", and the logarithm of "lognormal", are clipped at six standard deviations.
+    Normal values, and logarithms of lognormal values, are clipped at six standard deviations.
     """
     random = np.random.default_rng([seed, zlib.crc32(key.encode())])
     if law == "uniform":
@@ -183,7 +183,7 @@ def with_values(
 
 
 def table_in(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The table of this name; {} if there is none, or if the name is that of something else."""
+    """The table of this name; {} if there is none, or if its value is not a table."""
     value = tables.get(name)
     return value if isinstance(value, dict) else {}
 

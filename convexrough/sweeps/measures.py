@@ -40,7 +40,7 @@ Numbers = dict[tuple[str, str], float]
 #: asperities start to slide.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
-#: Errors that mean that one scene failed; the others are still computed.
+#: Errors that mean that one scene failed; other scenes are still computed.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Keys of a scene file that are lengths.
@@ -60,7 +60,11 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The numbers of a scene; why they are not certified, or ""; why the model may fail, or ""."""
+    """The measured numbers of a scene, with doubts about them.
+
+    doubts   : reasons why the numbers are not certified, or ""
+    cautions : reasons why the model may fail, or ""
+    """
 
     numbers: Numbers
     doubts: str
@@ -108,10 +112,10 @@ def row_label(ends: Sequence[float]) -> str:
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
-    """The columns for each name in `measures`, which stands for the first number of that name.
+    """The columns for each name in `measures`. A name stands for the first number that has it.
 
-    Stages after the last needed one are not computed. Raises InputError for a name that no
-    number has.
+    Stages are computed in their order until all names are found. Raises InputError for a name that
+    no number has.
     """
     rows: dict[str, list[str]] = {}
 

@@ -20,7 +20,7 @@ class Unit(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The quantity that the unit measures, as "length"; "" if it is not in `KINDS`."""
+        """The quantity that the unit measures, such as "length"; "" if it is not in `KINDS`."""
         return KINDS.get((self.length, self.force), "")
 
     def __mul__(self, other: Unit) -> Unit:  # type: ignore[override]
@@ -30,7 +30,7 @@ class Unit(NamedTuple):
         return Unit(self.size**power, power * self.length, power * self.force)
 
     def into(self, other: Unit) -> float:
-        """This unit in units of the other, as 0.001 from µm into mm, rounded once."""
+        """The size of this unit in the other unit, such as 0.001 from µm into mm, rounded once."""
         return float(self.size / other.size)
 
 
@@ -79,7 +79,7 @@ def parsed(name: str) -> Unit | None:
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit `name` of the quantity `what`; None for "". Raises InputError if of another kind."""
+    """The unit `name` of the quantity `what`; None for "". Raises InputError for other kinds."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -93,7 +93,7 @@ def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> U
 
 
 def one_unit(what: str, given: str | None, found: str) -> Unit | None:
-    """The unit of length that the caller or the file names. Raises InputError if they differ."""
+    """The unit of length named by the caller or the file. Raises InputError if the two differ."""
     said, there = known_unit(what, given or ""), known_unit(what, found)
     if said and there and said.size != there.size:
         expected = f"{there.name}, as the file says, or none given"
@@ -145,7 +145,7 @@ NAMELESS = UnitNames()
 
 
 def force_of(pressure: Unit, length: Unit) -> str:
-    """The name of the unit pressure times length^2, as mN for GPa and µm; "" if it has none."""
+    """The name of the unit pressure * length^2, such as mN for GPa and µm; "" if it has none."""
     made = pressure * length**2
     names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
     return names[0] if names else ""

@@ -1,9 +1,10 @@
 """Proved bounds on the errors of a vector friction state from any source.
 
-docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derives
-the steps 1 to 6 that comments name. The shear forces q, the displacements eta that the asperities
-take up, the total T and the rigid displacement X are in scaled units. P are the loads, k the
-sliding thresholds, B the kernel. A star marks the state for the true loads, known as balls.
+docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derive the
+steps 1 to 6 that comments name. Symbols, in scaled units: q are the shear forces (in code,
+`increments`), eta the displacements that the asperities take up, T the total force, X the rigid
+displacement, P the loads, k the values of |eta| at which asperities slide, and B the kernel. A star
+marks the exact state for the true loads, which are known as balls.
 """
 
 from __future__ import annotations
@@ -30,9 +31,11 @@ ROUNDED = 8 * ROUNDOFF
 class VectorBounds(NamedTuple):
     """Proved bounds on the errors of a state, in scaled units; infinite without a proof.
 
+    proved : False if nothing is proved
     increments, slips : (n,) bounds on |q - q*| and |slip - slip*|
     displacement_error : bound on |X - X*|;  excess : bound on the energy minus its minimum
-    sliding, partial : (n,) True where proved to slide, and where proved not to slide
+    sliding, partial : (n,) True where the asperity is proved to slide, and where it is proved not
+        to slide
     """
 
     proved: bool
@@ -109,7 +112,8 @@ def _by_convexity(problem: FrictionProblem, state: VectorState, total: Ball) -> 
     partial = sure & ((size + uncertainty < thresholds.lower) | bears_more)
     increments = distances + force_errors + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
     increments = np.where(sure, increments, problem.most + np.hypot(*state.increments.T))
-    # eta less its projection onto the disc |eta| <= k changes by at most the changes of eta and k.
+    # A slip is eta minus its projection onto the disc |eta| <= k. It changes by at most the changes
+    # of eta and k.
     slips = along(np.maximum(size - thresholds.value, 0.0), eta, size)
     slip_errors = np.hypot(*(slips - state.slips).T) + uncertainty + thresholds.error
     slip_errors = np.where(partial, np.hypot(*state.slips.T), np.where(sure, slip_errors, np.inf))
@@ -180,9 +184,9 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
 def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: Array) -> float:
     """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
 
-    It is the sum of e_i |q_i - q*_i|, for |q_i| <= P_i up to rounding. e_i is the distance of
-    X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the ray of all eta with this
-    force.
+    It is the sum of e_i |q_i - q*_i|, and a term for the error of the total. It needs |q_i| <= P_i
+    up to rounding. e_i is the distance of X - (B q)_i from the deflection of q_i or, where
+    |q_i| = P_i, from the ray of all eta with this force.
 
     errors : (n,) bounds on |q - q*|
     """
@@ -248,8 +252,8 @@ def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) ->
         + coupled @ t
         - uncertainty
     )
-    least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # of X.t
-    highest = thresholds.upper + uncertainty  # of | X - coupled | where an asperity sticks
+    least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # bounds X.t
+    highest = thresholds.upper + uncertainty  # bounds |X - coupled| where an asperity sticks
     pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)
     # If i stuck, |X| would be small. Then differences of B q across t would turn the forces.
     weights, side = np.where(sure, least, 0.0), coupled @ across

@@ -28,14 +28,15 @@ POSITION_TOLERANCE = 1e-2
 #: Number of iterations of the estimate of a shift of all nodes.
 REFINEMENTS = 5
 
-#: If rows are missing, at most this many shifts are tried, each to another asperity.
+#: If rows are missing, at most this many shifts are tried; each moves the first row to another
+#: asperity.
 MOST_TRIED = 1000
 
 #: The last row counts as the sum of the others up to this relative difference.
 TOTAL = 1e-4
 
-#: If at most this part of the loaded nodes is far from all asperities, only their positions may be
-#: wrong; otherwise all may be.
+#: If at most this part of the loaded nodes is far from all asperities, only the positions of these
+#: nodes may be wrong; otherwise all positions may be.
 FEW_FAR = 0.1
 
 #: Largest accepted distance of a loaded node from its asperity, as a fraction of the distance of
@@ -46,7 +47,8 @@ REACH = 0.9
 MOST_UNREAD = 8
 
 #: Largest accepted median of the distances of loaded nodes from their nearest asperities, each as a
-#: fraction of that asperity's distance from its neighbour. At random points it is about 0.4.
+#: fraction of that asperity's distance from its neighbour. For random points the median is about
+#: 0.4.
 BY_CHANCE = 0.25
 
 #: Names of columns that can only be indices of asperities.
@@ -87,7 +89,7 @@ class Placing:
         return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self) -> Indices:
-        """(m,) the index of the asperity of each row; `mistakes` gets what is wrong."""
+        """(m,) the index of the asperity of each row; messages on errors go to `mistakes`."""
         if self.points is not None:
             found, by = self._matched(self.points), True
         else:
@@ -112,7 +114,7 @@ class Placing:
         return found
 
     def nearest(self, values: Array) -> Indices:
-        """(m,) the asperity nearest to each node or pixel; far ones with a load are `mistakes`."""
+        """(m,) the asperity nearest to each node or pixel; `mistakes` names loaded far ones."""
         assert self.points is not None
         places, loaded = self.scene.contact_points, values != 0
         distances, owners = _nearest(places, self.points)
@@ -122,7 +124,10 @@ class Placing:
         far = loaded & (distances > REACH * apart[owners])
 
         def fits(points: Array) -> bool:
-            """True if all points are near asperities, several of them, and not just by chance."""
+            """True if all points are near asperities, of which there are several.
+
+            The points must also be nearer than random points would be.
+            """
             near, their = _nearest(places, points)
             parts = near / apart[their]
             return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
@@ -153,7 +158,7 @@ class Placing:
     # By an index, or in order
 
     def _numbered_or_in_order(self) -> tuple[Indices, bool]:
-        """The asperity of each row, and True if a column gives its index, False if the order."""
+        """The asperity of each row; True if a column gives the indices, False if the order does."""
         headers = self.table.others
         places = {it[0].lower(): it for it in headers if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
         if len(places) == 2:
@@ -171,7 +176,7 @@ class Placing:
         return np.arange(rows), False
 
     def _indices(self) -> dict[str, Indices]:
-        """Unused columns of possible indices, by header; first those with the name of an index."""
+        """Unused columns that may be indices, by header; those named as an index are first."""
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
@@ -191,7 +196,7 @@ class Placing:
         return named | others
 
     def _numbered(self, name: str, index: Indices) -> Indices | None:
-        """(m,) indices of asperities from a column that counts from 0 or 1; None if it is wrong."""
+        """(m,) indices of asperities from a column that counts from 0 or 1; None if it does not."""
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
@@ -219,7 +224,7 @@ class Placing:
         return None
 
     def _unread_positions(self) -> Iterator[str]:
-        """A message if two unread columns hold positions, or polar ones, in another order."""
+        """A message if unread columns are Cartesian or polar positions in another order."""
         numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
             for what, points in {
@@ -279,7 +284,7 @@ class Placing:
         return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
 
     def _matched(self, points: Array) -> Indices:
-        """(m,) the asperity at each point; `mistakes` gets points at none or at the same one."""
+        """(m,) the asperity at each point; `mistakes` names points at none or at a taken one."""
         allowed = self._allowed
         distances, owners = _nearest(self.positions, points)
         far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
@@ -352,7 +357,7 @@ class Placing:
         return ""
 
     def _about_shifted(self, rows: NDArray[np.bool_], values: Array, fits: Fits) -> str:
-        """A message with the approximate shift after which loaded nodes fit; "" without one."""
+        """A message with the approximate shift after which loaded nodes fit, or ""."""
         assert self.points is not None
         points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
         shift = np.average(points, axis=0, weights=weights)

@@ -20,7 +20,7 @@ from convexrough.tabular.columns import bound, labelled
 #: Results whose gradient a scene file may ask for, and their symbols.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: Parameters per asperity, and the name of one of them.
+#: Names of the parameters of asperities, for all asperities and for one asperity.
 EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 
 #: Parameters that are one number for the whole scene.
@@ -31,9 +31,10 @@ SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load
 class GradientStage(Stage):
     """The result to differentiate, and the parameters.
 
-    of       : "loss" of the cycle between -Q and Q, or "displacement" under Q, where
-        Q = fraction f P; "approach" or "load"
-    by       : parameters with a column in the table
+    of       : "loss" (of the cycle between -Q and Q), "displacement" (under Q), "approach" or
+        "load"
+    fraction : Q / (f P) for "loss" and "displacement"
+    by       : parameters of asperities that get columns in the table
     holding  : "load" or "approach", held constant; default: what is prescribed
     """
 
@@ -85,7 +86,7 @@ class GradientResult(Single):
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """Derivatives by parameters of the scene, and the largest by parameters of asperities."""
+        """One row: derivatives by the shared parameters, and the largest by those of asperities."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]
