@@ -6,7 +6,6 @@ P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the curv
 plus the mean curvature of the *base*, which is the sphere, or a flat, cylinder or ellipsoid in its
 place. With the distances r_ij between contact points, the contact law is
 
-
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
 
 where the sum leaves out j = i. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i
@@ -424,8 +423,8 @@ def push(
 def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
     """The scope: "global" if every solution is proved to be in the box, else "local" (10).
 
-    top : None if the approach is prescribed; else a number that should exceed all (A P)_i of the
-        trial loads, or the scope is "local"
+    top : None if the approach is prescribed; else any number. If it does not exceed all (A P)_i of
+        the trial loads, the scope is "local"
     """
     ceiling = state.approach  # an upper bound on D0 of every solution
     if top is not None:

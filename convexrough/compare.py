@@ -103,7 +103,7 @@ class Comparison(Table, Plottable):
         return any(contact.certificate.holds for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
-        """The entries' `disagreement` where it is above `within`, by the name of the solver.
+        """The values of `disagreement` that exceed `within`, by the name of the solver.
 
         Raises InputError unless `within` is positive.
         """
@@ -207,7 +207,6 @@ def solver_named(name: str) -> solvers.Solver:
         the path of a class, such as "mine.Solver", of which an instance is made without arguments
 
     Raises InputError if there is no such solver.
-
     """
     module, _, attribute = name.rpartition(".")
     if not module:

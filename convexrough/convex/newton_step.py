@@ -6,10 +6,11 @@ a point with the defect F is
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-The number beta is 0. But if the loads must keep their sum, beta is the number with which sum W
-y = 0. The matrix I + W A W is positive definite where the energy is convex. If this matrix is not
-positive definite, diag(`shells`) is added to A, which makes the matrix positive definite. Conjugate
-gradients also give A W y, from which the step d follows for every asperity, touching or open.
+The number beta is 0. But if the loads must keep their sum, beta is the number with which
+sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If this matrix is
+not positive definite, diag(`shells`) is added to A, which makes the matrix positive definite.
+Conjugate gradients also give A W y, from which the step d follows for every asperity, touching or
+open.
 """
 
 from __future__ import annotations

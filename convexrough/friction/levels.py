@@ -200,8 +200,8 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     Order means that no indentation falls as the load rises. The result is "proved", "proved for one
     step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse the
     proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
-    takes some milliseconds per asperity. Without a call of this function, the search is made for at
-    most 1,000 asperities, and only if at most 10,000 touch.
+    takes some milliseconds per asperity. Other functions make this search for at most 1,000
+    asperities, and only if at most 10,000 touch.
 
     most : largest number of asperities for which the search is made. It is made only if at most ten
         times as many touch

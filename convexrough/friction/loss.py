@@ -150,10 +150,10 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     cells : total number of cells into which the pieces with a varying load are cut
 
-    The loss in a cell lies between two losses: those at the constant loads of the two ends of the
-    cell (docs/theory/losses.md, "A front while the load changes"). The results are the means of
-    these two. Their relative errors are about cells^-2; the proved bounds on these errors are about
-    1 / cells.
+    The loss in a cell lies between two losses: those with a constant load, which is the load at one
+    end or at the other end of the cell (docs/theory/losses.md, "A front while the load changes").
+    The results are the means of these two. The relative errors of these means are about cells^-2;
+    the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Loads, Loads]]()  # weight, P at both ends, fronts at both ends

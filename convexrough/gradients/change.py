@@ -247,7 +247,6 @@ class _Bent:
 
         C is the diagonal matrix of indentations, and c_i is the local stiffness of asperity i. The
         second result is (n,) dA P + A dP - dd - dD0, the changes of gaps of open asperities.
-
         """
         problem = level.problem
         raised = self.here.offsets / problem.units.length - self._felt(level)

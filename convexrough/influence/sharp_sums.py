@@ -116,7 +116,6 @@ class SharpPairs:
 
     Entries of `first` are multiples of a unit, so that sums of them are exact.
 
-
     first, second : (n, n) sparse, the entries for pairs of sorted points i < j
     unit   : unit of the entries of `first`, a power of two
     loads  : unit of the first slices of loads, for loads of at most 1, a power of two
@@ -335,7 +334,6 @@ def _from_nodes(
     """W times the values on the mesh, as the sum of whole numbers (n,) and rests (n,) in a unit.
 
     The other two results are this unit, and a bound on the error in this unit.
-
     """
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))

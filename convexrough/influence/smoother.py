@@ -7,7 +7,6 @@ The Gaussian is as wide as a window of cells. Cells are those of the asperities'
 squares. The code computes M on blocks of m x m cells, which are smaller than a window, with the
 mean of A over pairs of blocks. The constants are heuristics: they change the number of steps of
 conjugate gradients, not the answer.
-
 """
 
 from __future__ import annotations

@@ -302,7 +302,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
             displacement = problem.influence.apply(q)
             excess = excess + displacement + problem.influence.rounding(q).of(displacement)
         most[opened] = 0.0
-    if (most > box.loads).any():  # only on the box A >= -theta H, theta the convexity number
+    if (most > box.loads).any():  # on the box A >= -theta H, theta = box.convexity_number
         most = np.maximum(box.loads, most)
         # At larger loads H is at least this fraction of its value on the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
@@ -321,7 +321,7 @@ class _Screened(NamedTuple):
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
     coupling: Coupling | None  # maps loads to their displacements; None if all can touch
-    indentation: Array  # approach plus offset minus displacement; minus the gap
+    indentation: Array  # approach + offset - displacement, which is minus the gap
     rounding: Array  # bounds on errors of the indentation
 
 

@@ -143,7 +143,6 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     """The balls of the loads, with smaller radii where possible.
 
     For a load with a large error the ball of (indentation / k)^(3/2) is used if it is smaller.
-
     """
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
@@ -169,7 +168,6 @@ def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, mov
     this right side, because gaps are not negative. So if no asperity is proved to touch, the least
     right side bounds D0* from above. The lower bound on D0* is -max d, the approach at which
     contact begins.
-
     """
     if problem.load is None:
         return state.approach.radius

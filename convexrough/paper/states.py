@@ -12,8 +12,8 @@ from convexrough.scene.rings import rings
 #: Q / (f P) of the paper's Figs. 4 to 6 and 8.
 SHARE = 0.5
 
-#: Forces Q / (f P) of loading from rest, and amplitudes Q / (f P) of cycles; both are denser near
-#: gross sliding.
+#: Forces Q / (f P) of loading from rest, and amplitudes Q / (f P) of cycles; both are closer
+#: together near gross sliding.
 FRACTIONS = np.union1d(np.linspace(0.0, 1.0, 51), 1.0 - np.linspace(0.0, 1.0, 31) ** 2)
 AMPLITUDES = np.union1d(
     np.concatenate((np.geomspace(1e-3, 0.0125, 6), np.linspace(0.0125, 1.0, 80))),

@@ -1,4 +1,4 @@
-"""Figures of steady cycles: hysteresis loops, energy losses, and fretting."""
+"""Figures of steady cycles: hysteresis loops and energy losses."""
 
 from __future__ import annotations
 

@@ -200,7 +200,7 @@ class Study(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: tables that are unknown or missing, or that need a table which is missing."""
+        """Mistakes: unknown tables, missing tables, and keys that need a key of another table."""
         for name, keys_within in keys.items():
             if name == "sweep":
                 yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"

@@ -1,4 +1,4 @@
-"""Lattices: the lattice on which points lie is found from their coordinates."""
+"""The lattice on which given points lie, found from their coordinates."""
 
 from __future__ import annotations
 

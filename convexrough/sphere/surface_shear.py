@@ -61,7 +61,7 @@ def surface_displacement(
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
     slip_area = a_squared * np.abs(
         mindlin.deflection(share)
-    )  # a^2 - c^2, an area over pi like all areas here
+    )  # a^2 - c^2; all areas here are divided by pi
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
     sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a)

@@ -211,7 +211,7 @@ def read_text_table(
 def _headed(
     rows: list[TextRow], title: str, style: Style, known: Sequence[str]
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header or None, with the units if the next line has units; and the rows below."""
+    """The header or None, and the rows below; a header gets the units that the next line has."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -289,7 +289,6 @@ def _sheet_lines(
 
     Of equal sheets, those with a column of `known` are preferred, then the first. Tabs separate
     cells. The name is in quotes, and followed by the names of other sheets that are as suitable.
-
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():

@@ -9,7 +9,6 @@ own(u) = threshold [1 - (1 - u / P)^(2/3)], where threshold = k P^(2/3) and k is
 coefficient. An asperity that must take up a displacement longer than threshold slides. Let A be the
 compliance operator and bias = nu / (2 - nu). By (1) of the page above, the tangential kernel is
 
-
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
 where d is the unit vector from j to i. Q is the shear force on the contact, and T = Q / f. The
@@ -143,7 +142,10 @@ class FrictionProblem:
 
     @property
     def convexity_numbers(self) -> Array:
-        """(n,) a_i / ((pi/2) s_i), with contact radii a and half the nearest distances s."""
+        """(n,) a_i / ((pi/2) s_i), with the contact radii a_i.
+
+        s_i is half the distance to the nearest loaded asperity.
+        """
         numbers: Array = self.shells / self.compliance
         return numbers
 
@@ -170,7 +172,6 @@ class FrictionProblem:
 
         Both are in scaled units; eta is the sum of deflection and slip.
 
-
         height : [force] T = Q / f
         """
         if height < ELASTIC * self.levels.load:
@@ -181,7 +182,7 @@ class FrictionProblem:
         return u.value[self.places], eta.value[self.places]
 
     def deflections(self, increments: Array) -> Array:
-        """(n,) the deflections of these shear forces, 0 <= u <= P."""
+        """(n,) the deflections under the shear forces u = `increments`, 0 <= u <= P."""
         left = (self.loads - increments) / self.loads
         x = annulus.width_between(increments / self.loads, left)
         eta: Array = self.thresholds * annulus.deflection(x)
@@ -212,8 +213,9 @@ class FrictionProblem:
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) the forces q(eta) of asperities that must take up the displacements eta by
-        deflection and slip; |q_i| = P_i where sliding.
+        """(n, 2) the forces q(eta) of asperities that take up displacements by deflection and slip.
+
+        |q_i| = P_i where an asperity slides.
 
         deflections : (n, 2) eta
         """
@@ -289,8 +291,6 @@ def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
     The arguments are scale = P / threshold and share = |eta| / threshold. The force is
     q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0). The eigenvalue across eta is
     |q| / |eta|.
-
-
     """
     left = np.maximum(1.0 - share, 0.0)
     root = np.sqrt(left)
