@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
 
-#: A float or a float64 array; a result of this type has the shape of the arguments.
+#: A float or a float64 array. A result of this type has the shape of the arguments.
 Number: TypeAlias = Any
 
 
@@ -22,29 +22,29 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def summed(values: NDArray[Any]) -> Any:
-    """The sum along the last axis: a number for a vector, an array (m, 1) for m rows."""
+    """The sum along the last axis: a number for a vector, or an array (m, 1) for m rows."""
     return values.sum(axis=-1, keepdims=values.ndim > 1)
 
 
 def largest(values: NDArray[Any]) -> Any:
-    """The maximum along the last axis, or 0 if that is negative: a number, or (m, 1) for rows."""
+    """The maximum along the last axis, but at least 0: a number, or an array (m, 1) for m rows."""
     return values.max(axis=-1, initial=0.0, keepdims=values.ndim > 1)
 
 
 def even(value: float, length: int) -> Array:
-    """A read-only array (length,) of equal values that stores only one number."""
+    """A read-only array (length,) of equal values, which stores only one number."""
     return np.ndarray((length,), np.float64, np.float64(value), strides=(0,))
 
 
 def evenly(function: Callable[[Array], Array], values: Array) -> Array:
-    """function(values) of an elementwise function, evaluated once if `values` is made by `even`."""
+    """function(values) for an elementwise function, evaluated only once if `even` made `values`."""
     if values.strides == (0,) and len(values):
         return even(function(values[:1])[0], len(values))
     return function(values)
 
 
 def taken(values: Array, which: Indices) -> Array:
-    """values[which]; if `values` stores only one number (`even`), so does the result."""
+    """values[which]. If `values` stores only one number (`even`), the result does, too."""
     if values.strides == (0,) and len(values):
         return even(values[0], len(which))
     return np.asarray(values[which])

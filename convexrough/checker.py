@@ -1,16 +1,16 @@
 """Check a proof of which asperities touch, and which slide: python checker.py proof.json
 
 This file needs only the standard library and trusts no claim of the proof. Asperity i of a scene
-with n asperities has the contact radius a_i, which is 0 where it is open, and the load
-P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the mean curvature of the
-tip plus that of the *base*: the sphere, or a flat, cylinder or ellipsoid in its place. With the
-distances r_ij between contact points, the contact law is
+with n asperities has the contact radius a_i, which is 0 where the asperity is open, and the load
+P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the curvature of the tip
+plus the mean curvature of the *base*, which is the sphere, or a flat, cylinder or ellipsoid in its
+place. With the distances r_ij between contact points, the contact law is
 
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
 
-without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i of the
-asperity. The offset is its height minus the distance, at the asperity, between the base and the
-plane that touches the base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
+where the sum leaves out j = i. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i
+of the asperity. The offset is its height minus the distance, at the asperity, between the base and
+the plane that touches the base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, which are exact
@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 
 FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
-MOST_INVERTED = 600  # most touching asperities for an inverse in the proof of order: half a minute
+MOST_INVERTED = 600  # largest number of touching asperities for which the proof of order inverts
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
@@ -175,7 +175,7 @@ def as_list(values: Any, what: str, n: int | None = None) -> list[Any]:
 
 
 def number(text: Any, what: str) -> Fraction:
-    """The float64 number that `float.hex` wrote as this text; reading it rounds nothing."""
+    """The float64 number that `float.hex` writes as this text. Reading rounds nothing."""
     try:
         value = float.fromhex(text)
         if math.isfinite(value) and value.hex() == text:
@@ -190,12 +190,12 @@ def numbers(values: Any, what: str, n: int | None = None) -> list[Fraction]:
 
 
 def added(texts: Any, what: str) -> Fraction:
-    """The sum of float64 numbers, which represents one number with more digits."""
+    """The exact sum of float64 numbers, which together stand for one number with more digits."""
     return sum(numbers(texts, what), Fraction(0))
 
 
 def digest(scene: Any, prescribed: Any) -> str:
-    """SHA-256 of scene and prescribed quantity, as JSON with sorted keys and without spaces."""
+    """SHA-256 of the scene and the prescribed quantity, as JSON with sorted keys and no spaces."""
     given = {"prescribed": prescribed, "scene": scene}
     text = json.dumps(given, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
@@ -258,7 +258,7 @@ def read_scene(given: Any) -> Scene:
 def distances(
     scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
 ) -> Iterator[tuple[int, list[int]]]:
-    """For each i of `some`: i, and for each j of `chosen` the integer m of (1)."""
+    """Yields, for each i of `some`, i and the integers m of (1), one for each j of `chosen`."""
     place = {j: k for k, j in enumerate(chosen)}
     points = [scene.points[j] for j in chosen]
     for i in some:
@@ -282,7 +282,7 @@ class Box(NamedTuple):
 
 
 def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
-    """The box, after the proof that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
+    """The box. Proves that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
     b, theta = numbers(given[0], "box", len(scene.points)), number(given[1], "convexity_number")
     able = [i for i in range(len(b)) if b[i] > 0]
     if min(b) < 0 or not 0 < theta < 1:
@@ -332,19 +332,22 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
 
 
 class State(NamedTuple):
-    """Intervals that contain a solution, and trial loads. Forces and energies are divided by E*."""
+    """A solution and trial loads, as intervals. Forces and energies are divided by E*."""
 
-    near: list[Interval]  # trial loads: those of the given radii, scaled to a prescribed total
+    near: list[Interval]  # trial loads: from the given radii, scaled to a prescribed total
     pushed: list[Interval]  # displacements (A P)_i of the trial loads
     approach: Interval  # D0 of the solution
     depths: list[Interval]  # D_i - (A P)_i of the solution: the indentation, or minus the gap
     loads: list[Interval]  # P_i of the solution
     total: Interval  # sum of the P_i
-    energy: Interval  # least energy of all loads with this total, the energy of the solution (9)
+    energy: Interval  # the energy of the solution, the least for this total (9)
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The solution, proved to be in the box; at the approach in `place` if `load` is None."""
+    """The solution, proved to be in the box.
+
+    It is at the total load `load` or, if this is None, at the approach in `place`.
+    """
     radii, centre = table(place, "radii", "approach")
     n = len(scene.points)
     a = [added(radius, f"radii [{i}]") for i, radius in enumerate(as_list(radii, "radii", n))]
@@ -402,7 +405,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
 def push(
     scene: Scene, box: Box, loads: list[Fraction], tell: Tell
 ) -> tuple[list[Interval], list[Interval]]:
-    """Enclosures of (A P)_i for P = `loads`, and of sum_j A_ij^2 2 b_j; sums of integers (1)."""
+    """Intervals for (A P)_i, P = `loads`, and for sum_j A_ij^2 2 b_j, from sums of integers (1)."""
     force = max(loads) / 2**GRID or Fraction(1)
     parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
@@ -418,9 +421,10 @@ def push(
 
 
 def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
-    """The scope: "global" if all solutions are proved to be in the box, else "local" (10).
+    """The scope: "global" if every solution is proved to be in the box, else "local" (10).
 
-    top : None if the approach is prescribed, else any number above all (A P)_i
+    top : None if the approach is prescribed; else any number. If it does not exceed all (A P)_i of
+        the trial loads, the scope is "local"
     """
     ceiling = state.approach  # an upper bound on D0 of every solution
     if top is not None:
@@ -441,16 +445,16 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     """An amount by which D0 can decrease from this state while no indentation increases (11).
 
-    The rate of an asperity is the derivative of its indentation by D0. `missed` is ONE times minus
-    a lower bound on each rate. It must be negative for all asperities that may touch; otherwise the
-    amount is 0. For an open asperity it may be positive. Then the amount is so small that the gap
-    stays open.
+    The rate of an asperity is the derivative of its indentation with respect to D0. `missed` holds
+    a lower bound on each rate, times -ONE. It must be negative for all asperities that may touch;
+    otherwise the amount is 0. For an open asperity it may be positive; then the amount is so small
+    that the gap stays open.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
     weights = [math.ceil(2 * a * scene.grid) for a in radii]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
-    rows: dict[int, list[int]] = {}  # rows of A C times ONE, too small by less than `rounding`
+    rows: dict[int, list[int]] = {}  # rows of A C (11) times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
     able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
     for i, apart in distances(scene, able, near, tell):
@@ -471,7 +475,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 def missed_by_inverse(
     rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
-    """`missed` of `ordered_fall` by the bounds (11), with weights from an approximate inverse."""
+    """`missed` of `ordered_fall`, by the bounds (11) with weights from an approximate inverse."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
     X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
     for k in range(n):  # Gauss-Jordan elimination in place
@@ -507,7 +511,7 @@ def missed_by_inverse(
 def prove_shear(
     scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any, tell: Tell
 ) -> dict[str, Any]:
-    """What is proved about a friction state, which is the difference of two solutions (12)."""
+    """What is proved about a friction state, which is a difference of two solutions (12)."""
     force, place = table(entry, "force", "held")
     f, unit = scene.friction, scene.friction * scene.modulus
     if number(force, "force") <= 0 or f <= 0:
@@ -628,7 +632,7 @@ def counted(claims: Any, *statuses: str) -> str:
 
 
 def check(document: Any, tell: Tell) -> str:
-    """The claims in sentences. Raises Refused if one is not proved, Unreadable if not a proof."""
+    """The claims in sentences. Raises Refused if one is not proved, Unreadable for other files."""
     proved = prove(document, tell)
     hold("claims", document["claims"], proved)
     return sentence(document)

@@ -1,9 +1,9 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-One code certifies all results, independently of the solver. If a certified result contradicts one
-of global scope, the mathematics or the code of the package has a mistake. Two results of local
-scope may differ without a mistake: each certificate proves that its own box of loads contains a
-solution, and the two solutions may be different.
+The same code certifies all results, whichever solver found them. If a certified result contradicts
+a result of global scope, there is a mistake in the mathematics or in the code of the package. Two
+results of local scope may differ without a mistake: each certificate proves that its own box of
+loads contains a solution, and the two solutions may be different.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 
-#: A message names at most this many asperities, and counts the others.
+#: A message names at most this many asperities, and gives the number of the others.
 MOST_NAMED = 5
 
 #: Loads above this fraction of the largest count as contact in a comparison of solvers.
@@ -59,12 +59,14 @@ class Entry(Record):
         nan if this solver or the reference has no solution
     different_statuses : number of asperities whose proved status differs from that in the
         reference; None if this solver or the reference has no solution
-    different_contacts : number of asperities with a load above 1e-6 of the reference's largest load
-        in one of the two solutions, and below 1e-7 of it in the other; None if one is missing
+    different_contacts : number of asperities whose load is above 1e-6 of the reference's largest
+        load in one of the two solutions, and below 1e-7 of that load in the other; None if this
+        solver or the reference has no solution
     steps : for each iteration its solver, step, objective and residual, if `compare` was called
         with `log`; OSQP and the solvers of CVXPY do not report their iterations
-    memory : [bytes] largest increase of the resident memory of the process, without memory that the
-        allocator reused; None if the system is not Linux
+    memory : [bytes] largest increase of the resident memory of the process, which does not count
+        memory that the allocator reused; None if there is no solution, or if the system is not
+        Linux
     """
 
     solver: str
@@ -80,10 +82,11 @@ class Entry(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Table, Plottable):
-    """The entries of all solvers; the first is Newton's method, the reference.
+    """The entries of all solvers. The first is that of Newton's method, the reference.
 
-    contradictions : a sentence for each contradiction between two certified results, at least one
-        of them of global scope; each shows a mistake in the mathematics or in the code
+    contradictions : a sentence for each contradiction between two certified results of which at
+        least one has global scope. Each contradiction shows a mistake in the mathematics or in the
+        code
     """
 
     entries: tuple[Entry, ...]
@@ -100,7 +103,7 @@ class Comparison(Table, Plottable):
         return any(contact.certificate.holds for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
-        """Each `disagreement` above `within`, by the name of the solver.
+        """The values of `disagreement` that exceed `within`, by the name of the solver.
 
         Raises InputError unless `within` is positive.
         """
@@ -117,7 +120,7 @@ class Comparison(Table, Plottable):
         yield "contradictions", "; ".join(self.contradictions) or "none"
 
     def _variables(self) -> Variables:
-        """A row for each entry; nan and "" where there is no solution."""
+        """Columns with a row for each entry; nan and "" where there is no solution."""
         none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
         answers = [entry.contact for entry in self.entries]
         statuses = [entry.different_statuses for entry in self.entries]
@@ -154,8 +157,8 @@ def compare(
     influence : compliance operator, as for `press`
     log : store the steps of each solver in its entry
 
-    Raises InputError where the reference refuses the input. Errors of the other solvers are in
-    their entries.
+    Raises InputError if the reference refuses the input. Errors of the other solvers are reported
+    in their entries.
     """
     others = every_solver() if solvers is None else [*map(named, solvers)]
     pressed = partial(press, scene, approach=approach, load=load, influence=influence)
@@ -181,7 +184,10 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers; those with a last Newton step also without it; SCS and QOCO if installed."""
+    """All solvers of the package, and SCS and QOCO through CVXPY if installed.
+
+    Those of the package that end with a Newton step are also used without this step.
+    """
     return (
         solvers.Newton(),
         solvers.Conic(),
@@ -195,11 +201,12 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 
 
 def solver_named(name: str) -> solvers.Solver:
-    """The solver with this name in scene files, such as "newton".
+    """The solver with this name.
 
-    For a name with a dot, such as "mine.Solver", an instance of that class, made without arguments.
+    name : the name of a solver of the package, as in scene files, such as "newton"; or, with a dot,
+        the path of a class, such as "mine.Solver", of which an instance is made without arguments
 
-    Raises InputError where there is no such solver.
+    Raises InputError if there is no such solver.
     """
     module, _, attribute = name.rpartition(".")
     if not module:
@@ -261,7 +268,7 @@ def _different_contacts(loads: Array, reference: Array) -> int:
 
 
 def _load_code_of(solver: solvers.Solver) -> None:
-    """Make a solver import what it needs, so that measured times contain no imports."""
+    """Make a solver import what it needs now, so that no measured time contains imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
     with suppress(Exception, SystemExit):  # `_enter` handles the same error later
@@ -269,7 +276,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
 
 
 class Answer(NamedTuple):
-    """Loads with their certificate; `name` says in messages where they come from."""
+    """Loads with their certificate; `name` is the origin of the loads in messages."""
 
     name: str
     loads: Array

@@ -1,4 +1,4 @@
-"""Base classes of results, which print a short summary, convert to tables, and can be pickled."""
+"""Base classes of results. Results print a short summary, convert to tables, and can be pickled."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """Base of results. `repr` has a line for each field; unpickled arrays are read-only again."""
+    """Base class of results. `repr` has a line for each field that is not empty."""
 
-    #: Properties that are printed before the fields.
+    #: Names of properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
 
     def __repr__(self) -> str:
@@ -50,7 +50,7 @@ class Record:
         return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields by name, without cached results."""
+        """The fields by name, without results that are cached on the object."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -80,16 +80,16 @@ class Record:
 
 
 class Table(Record):
-    """A record with arrays that have an entry for each asperity, step or point.
+    """A result with arrays that have an entry for each asperity, step or point.
 
     Columns of data frames and files are named in the singular: `load` for `loads`.
     """
 
-    #: The first key is the dimension of the rows of a data frame.
+    #: Rows of a data frame belong to the dimension of the first key.
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays with these names, or of all columns, by their names in the singular."""
+        """The arrays with these names, or those of all columns, by their names in the singular."""
         wanted = names or next(iter(self._along.values()))
         return {singular(name): getattr(self, name) for name in wanted}
 
@@ -134,7 +134,7 @@ class Table(Record):
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """One mapping for each row: from the names of the columns to its values, as Python objects."""
+    """For each row, a mapping from the names of the columns to its values, as Python objects."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
@@ -149,7 +149,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value as text on one line; long arrays are summarised, by size and range or by counts."""
+    """A value as text on one line. Long arrays are summarised by size and range, or by counts."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):

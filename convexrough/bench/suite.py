@@ -1,4 +1,4 @@
-"""The measurements to make, the machine they are made on, and the files with their results."""
+"""The list of measurements, a description of the machine, and the files with the results."""
 
 from __future__ import annotations
 
@@ -40,14 +40,15 @@ from convexrough.threads import cores
 
 Sizes = tuple[tuple[Family, int], ...]
 
-#: The default solver and apparently faster ones are timed again this many times.
+#: The default solver and those that seem faster are timed again this many times.
 ROUNDS = 4
 
 #: Compliance operators for Newton's method, with the largest number of asperities for each.
 COUPLINGS: dict[Kind | None, int] = {None: 10**9, "dense": 2_000, "lattice": 10**9,
                                      "scattered": 10**9}  # fmt: skip
 
-#: Largest number of asperities for cone and quadratic programs: their memory grows as its square.
+#: Largest number of asperities for cone and quadratic programs, whose memory grows as the square of
+#: this number.
 PROGRAMS = 1_000
 
 
@@ -73,7 +74,7 @@ FOLLOWING = {
     "gradient": _of("lattice", 700, 36_000, 330_000),
 }
 
-#: Sweeps: asperities of a scene, number of scenes, number of processes.
+#: Sweeps: number of asperities in each scene, number of scenes, number of processes.
 SWEEPS = ((61, 10_000, 1), (61, 10_000, 2), (700, 500, 1), (700, 500, 2))
 
 #: A quick run leaves out presses of more than QUICK asperities, compares solvers on three scenes
@@ -85,7 +86,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 
 
 def attempts(quick: bool) -> list[Attempt]:
-    """All solvers at several tolerances; those that end with a Newton step also without it."""
+    """All solvers at several tolerances; those with a last Newton step also without it."""
     found = [Attempt("newton", "default", Newton())]
     for kind, most in COUPLINGS.items():
         label = "newton" if kind is None else f"newton, {kind}"
@@ -107,7 +108,7 @@ def attempts(quick: bool) -> list[Attempt]:
 
 
 def run(*, quick: bool) -> Bench:
-    """The measurements of the whole list, or of a quick run."""
+    """The results of all measurements or, if `quick`, of a part of them."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
     for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # excludes imports from times
@@ -127,7 +128,11 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """The rows of all attempts on one scene; apparently faster ones are timed again."""
+    """The rows of the attempts on one scene; apparently faster attempts are timed again.
+
+    Attempts with the operator that is the default on this scene, or for fewer asperities, are left
+    out.
+    """
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)
@@ -180,7 +185,7 @@ def _processor() -> str:
 
 
 def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) -> None:
-    """Write bench.json, rows.csv, the figures and, if given, the page.
+    """Write bench.json, rows.csv and the figures, and the results into `page` if that is given.
 
     Raises FileError; files already written remain.
     """

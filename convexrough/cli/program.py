@@ -1,6 +1,6 @@
 """The program: its commands, exit statuses and error messages.
 
-Each command imports slow modules when it runs.
+Each command imports slow modules only when it runs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError, WorkerError
 from convexrough.version import __version__
 
-#: The variable that a shell sets to ask for a completion script or the completions of a line.
+#: The environment variable that a shell sets to ask for a script or for completions of a line.
 COMPLETE = "_CONVEXROUGH_COMPLETE"
 
 
@@ -53,7 +53,7 @@ for command in (run, verify, check, compare, export, sweep, new, summits, paper,
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status; errors are a message, never a traceback."""
+    """Run one command and return its exit status. Errors give a message, not a traceback."""
     with _interrupts() as interrupts:
         try:
             return _status(arguments)
@@ -96,7 +96,7 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """A list of the Ctrl-C signals in the body; each also raises KeyboardInterrupt as usual."""
+    """A list of the Ctrl-C signals during the body; each also raises KeyboardInterrupt."""
     seen: list[int] = []
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or current_thread() is not main_thread():
@@ -115,7 +115,7 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _unheard(error: OSError) -> int:
-    """The exit status if standard output is closed or full; result files are complete."""
+    """The exit status if standard output is closed or full. Result files are complete then."""
     if error.errno != errno.EPIPE:
         say_aside("error", f"standard output: {error.strerror or error}")
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -1,4 +1,4 @@
-"""`run`, which computes a scene file; `new`, which writes one; `check`, which checks its proof."""
+"""Commands: `run` computes a scene file, `new` writes one, and `check` checks a proof file."""
 
 from __future__ import annotations
 

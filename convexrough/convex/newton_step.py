@@ -1,14 +1,16 @@
 """The linear system of a Newton step on a normal map, solved directly or by conjugate gradients.
 
-The normal maps of pressing and of shear have the Jacobian I + A diag(c), c >= 0. With
-W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The normal map")
+The normal maps of pressing and of shear (docs/theory/newton.md, "The normal map") have the Jacobian
+I + A diag(c) with c >= 0, where A is the compliance operator. With W = diag(c)^(1/2), the step from
+a point with the defect F is
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-A is the compliance operator. The number beta is 0, or, if the loads must keep their sum, the one
-for which sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If this
-matrix is not positive definite, diag(`shells`) is added to A, which makes it so. Conjugate
-gradients also return A W y, from which the step d of every asperity follows, touching or not.
+The number beta is 0. But if the loads must keep their sum, beta is the number with which
+sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If this matrix is
+not positive definite, diag(`shells`) is added to A, which makes the matrix positive definite.
+Conjugate gradients also give A W y, from which the step d follows for every asperity, touching or
+open.
 """
 
 from __future__ import annotations
@@ -23,11 +25,12 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
-#: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with a
-#: stored matrix and without. Heuristics, from timings.
+#: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
+#: without a stored matrix. Heuristics, from timings.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
-#: Least relative residual that is asked of conjugate gradients, in single and in double precision.
+#: Conjugate gradients are never asked for a smaller relative residual than this, in single and in
+#: double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
 #: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, is
@@ -48,14 +51,14 @@ def correct(
     balanced: bool,
     tolerance: float,
 ) -> Array:
-    """(n,) the Newton step d: (1) of docs/theory/newton.md.
+    """(n,) the Newton step d by (1) of docs/theory/newton.md.
 
     shells    : (n,) diagonal to add to A if I + W A W is not positive definite
     root      : (n,) diagonal of W, 0 where open
     defect    : (n,) F
     balanced  : True to keep the sum of the loads to first order
-    tolerance : largest 2-norm of F + J d, divided by that of F, with the Jacobian J; only conjugate
-        gradients use it
+    tolerance : largest accepted 2-norm of F + J d, divided by that of F, with the Jacobian J; used
+        only by conjugate gradients
 
     Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
@@ -91,7 +94,7 @@ def _factorise(
     matrix *= w
     matrix *= w[:, None]
     matrix.ravel()[:: len(w) + 1] = 1.0 if shells is None else 1.0 + w * shells[touching] * w
-    # The transpose of a symmetric matrix is itself, and in LAPACK's order: no copy.
+    # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
     factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
         raise _IndefiniteError
@@ -108,7 +111,7 @@ def _factorise(
 
 @cache
 def _cholesky() -> tuple[Any, Any]:
-    """LAPACK's factorisation and solution."""
+    """LAPACK's functions for the factorisation and the solution."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     return dpotrf, dpotrs
@@ -162,8 +165,8 @@ class _Smoothed:
 
     Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. A call also changes the
     residual by a multiple of the diagonal of W, so that single precision is enough. The sum of
-    these multiples, `shift`, is the number beta of the step, for a defect that is scaled as the
-    residual is.
+    these multiples, `shift`, is the number beta of the step for the scaled defect, from which the
+    residual is computed.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:

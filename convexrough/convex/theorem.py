@@ -1,12 +1,13 @@
 """One theorem: how far the solution of a convex problem can be from any trial point.
 
-docs/theory/one-theorem.md states and proves it, with the symbols of this module. Let x be a trial
-point, e its violations of the first-order conditions, x* the solution, and H a positive diagonal
-matrix. If a box contains x and x*, and on it the Hessian is at least mu H with mu > 0, then
+docs/theory/one-theorem.md states and proves the theorem, with the symbols of this module. Let x be
+a trial point, e its violations of the first-order conditions, x* the solution, and H a positive
+diagonal matrix. If a box contains x and x*, and on it the Hessian is at least mu H with mu > 0,
+then
 
     || x - x* ||_H  <=  || e ||_{H^-1} / mu.                                              (1)
 
-For a fixed component, x_i = x*_i is known, and its e_i counts as 0.
+If a component is fixed, x_i = x*_i is known, and e_i counts as 0.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     """(n,) violations e of the first-order conditions.
 
     residual : (n,) F - beta, the gradient F of the energy minus the multiplier beta of the total
-    inside   : (n,) False where x is at a lower bound. At an upper bound True is allowed: the
-        result |F - beta| is then at least as large as the violation
+    inside   : (n,) False where x is at its lower bound, else True. At an upper bound, the result
+        |F - beta| is at least as large as the violation
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
@@ -36,7 +37,7 @@ def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations.
 
     excess : (n,) or (m, n) the violations e
-    h      : the diagonal of H, of the same shape; infinite where x is fixed
+    h      : the diagonal of H, of the same shape as `excess`; infinite where x is fixed
     margin : mu
     """
     most = largest(excess)

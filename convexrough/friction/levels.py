@@ -1,13 +1,13 @@
-"""The normal solutions (levels) of a contact at rational total loads, and the units of friction.
+"""The levels of a contact, which are its normal solutions at given loads, and units of friction.
 
 Levels are in the scaled units of the normal problem (`normal.problem`). The unit of shear forces is
 f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
 coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
 
-A rational number [force] identifies a level. If the load of the contact is prescribed, this number
-is the total load of the level. If the approach is prescribed, the load P of the contact is known to
-about thirty digits. Then the float64 number p nearest to P identifies P, and p - x identifies the
-load P - x. The number 0 always identifies the load 0.
+A rational number [force] identifies each level. If the load of the contact is prescribed, this
+number is the total load of the level. If the approach is prescribed, the load P of the contact is a
+result, known to about thirty digits. Then a float64 number p close to P identifies the level at P,
+and p - x the level at P - x. The number 0 always identifies the level at the load 0.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ AT_THE_END = 16
 
 
 class FrictionLevels:
-    """The levels of a contact by rational loads [force]; use `contact.cached(FrictionLevels)`.
+    """The levels of a contact, by rational numbers; use `contact.cached(FrictionLevels)`.
 
     scene : the scene, with N asperities and friction
     top   : the level at the load P of the contact
-    load  : [force] P
+    load  : [force] the number that identifies `top`: P or, if the approach is prescribed, p
     candidates : (n,) indices of the asperities that may touch at loads up to P
     coefficient, ratio : f and c_t
     force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces, of
@@ -52,7 +52,7 @@ class FrictionLevels:
         self._levels, self.scene = contact.cached(levels_of), contact.scene
         self._named: dict[Fraction, Level] = {}
         self._orders: dict[tuple[frozenset[Fraction], int], Order] = {}
-        self._ordered: Fraction | None = None  # the least load down to which order is proved
+        self._ordered: Fraction | None = None  # order is proved from this load up to P
         self.top, problem = self._levels.top, self._levels.problem
         self.candidates, self.units = problem.candidates, problem.units
         self._prescribed = contact.prescribed_load
@@ -66,7 +66,7 @@ class FrictionLevels:
         self.loss_unit = self.force_unit * self.travel_unit
 
     def height(self, force: float | Fraction) -> Fraction:
-        """T = Q / f for a shear force Q at the load P."""
+        """[force] T = Q / f for the shear force Q = `force` at the load P."""
         return height_at(self.load, force, self.scene)
 
     @property
@@ -94,7 +94,7 @@ class FrictionLevels:
         return self._named[load]
 
     def prepare(self, loads: Iterable[Fraction]) -> None:
-        """Find the levels at these loads together, where this is cheaper than one by one."""
+        """Find the levels at these loads together, if that is cheaper than one by one."""
         new = sorted({x for x in loads if x not in self._named and 0 < x < self.load})
         if len(new) > 1:
             found = zip(new, self._levels.prepare(self._balls(new)), strict=True)
@@ -107,8 +107,8 @@ class FrictionLevels:
     def displaced(self, displacement: float) -> Fraction:
         """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 from rest.
 
-        The level of this load has the approach D0(P) - X / (c_t f). Raises InputError if X [length]
-        exceeds the displacement of gross sliding.
+        The approach at this load is D0(P) - X / (c_t f). Raises InputError if X = `displacement`
+        [length] exceeds the displacement at the onset of gross sliding.
         """
         room = self.top.approach - self.at(Fraction(0)).approach
         farthest = float((room * self.travel_unit).value)
@@ -130,7 +130,7 @@ class FrictionLevels:
         return load
 
     def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
-        """What is proved about order (`friction.order`) from the least of these loads up to P."""
+        """What is proved about order (`friction.order`) between the least of these loads and P."""
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
@@ -142,11 +142,11 @@ class FrictionLevels:
         return found
 
     def depths(self, load: Fraction) -> Array:
-        """(N,) [length] the indentations at a load, or minus the gap where open."""
+        """(N,) [length] indentations at a load; minus the gap where an asperity is open."""
         return self.indentations(self.at(load)).value * self.units.length
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
+        """(N,) the indentations n_i of a level, only to float64 where asperities cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
         others = self._others
         if len(others) == 0:
@@ -187,7 +187,7 @@ class FrictionLevels:
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
-    """T = Q / f as an exact fraction; P or -P if |T| exceeds P, but only by rounding."""
+    """[force] T = Q / f as an exact fraction; P or -P if |T| and P differ only by rounding."""
     height = Fraction(force) / Fraction(checks.friction(scene.friction))
     if not load < abs(height) <= (1 + AT_THE_END * Fraction(ROUNDOFF)) * load:
         return height
@@ -199,12 +199,12 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
 
     Order means that no indentation falls as the load rises. The result is "proved", "proved for one
     step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse the
-    proof. For some asperities, mostly at the edge of the contact, the proof needs a search of some
-    milliseconds per asperity. Other functions search for at most 1,000 asperities, and only if at
-    most 10,000 touch.
+    proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
+    takes some milliseconds per asperity. Other functions make this search for at most 1,000
+    asperities, and only if at most 10,000 touch.
 
-    most : largest number of asperities for which the search is made; at most ten times as many may
-        touch
+    most : largest number of asperities for which the search is made. It is made only if at most ten
+        times as many touch
 
     Raises InputError if the scene has no friction.
 
@@ -223,5 +223,5 @@ def exactly(values: Sequence[Fraction]) -> Ball:
 
 
 def rounded(ball: Ball) -> tuple[Array, Array]:
-    """The centres of the balls as float64 numbers, and bounds on their errors."""
+    """The centres of balls rounded to float64, and bounds on the errors of the rounded centres."""
     return frozen(np.array(ball.value)), frozen(np.array(ball.error))

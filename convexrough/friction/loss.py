@@ -1,12 +1,13 @@
-"""The energy loss by slip: of each asperity, of the whole contact, and along a path.
+"""The energy that slip dissipates: at each asperity, in the whole contact, and along a path.
 
 docs/theory/losses.md derives the formulas. Losses are divided by c_t f^2, with the coefficient of
 friction f and Mindlin's ratio c_t. The slip front is the load level above which slip has changed
-the memory curve. While the total load is P and the front falls through the level L, the loss per
-unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at L, c the direction of
-slip (1 or -1), and B the sum of B_i(P, L) in (2) of that page. By (1) of that page,
-B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)], with the approach D0 and its integral V over the
-load. All of this assumes order: no indentation falls as the load rises.
+the memory curve (docs/theory/paths.md). While the total load is P and the front falls through the
+level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
+L, and c the direction of slip, 1 or -1. B is the sum over asperities of B_i(P, L), which (2) of
+docs/theory/losses.md defines. By (1) of that page, B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)],
+with the approach D0 and its integral V over the load. All of this assumes order: no indentation
+falls as the load rises.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ T = TypeVar("T")
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) the parts of B_i due to partial slip, and those due to sliding, for k pairs P, L."""
+    """(k, n) the parts of B_i by partial slip, and the parts by sliding, for k pairs P, L."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -51,13 +52,13 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B(P, L): twice the integral of D0 from L to P minus twice its value by the trapezoid rule."""
+    """B(P, L): twice the integral of D0 from L to P, minus twice its trapezoid-rule value."""
     run = high.load - low.load
     return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
 
 
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
-    """(m,) the loss on each of m segments, given the pieces of each."""
+    """(m,) the loss on each of m segments of a path, from the pieces of each segment."""
     pieces = [piece for each in costs for piece in each]
     levels.prepare(load for piece in pieces for load in piece[2:])
     still = np.array([piece.load_constant for piece in pieces], dtype=bool)
@@ -70,7 +71,7 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 
 
 def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) the integral of -dB/dL over pieces at constant load: a difference of B."""
+    """(k,) integrals of -dB/dL over pieces at constant load, which are differences of B."""
     pairs = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
     place, found = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}, list[Ball]()
     for some in _some([*place], 1 + len(levels.candidates)):
@@ -81,7 +82,7 @@ def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _some(values: Sequence[T], size: int) -> Iterator[Sequence[T]]:
-    """The values in parts for which about NUMBERS numbers are in memory, `size` for each value."""
+    """The values in parts, each with about NUMBERS numbers in memory, `size` for each value."""
     step = max(1, NUMBERS // size)
     return (values[start : start + step] for start in range(0, len(values), step))
 
@@ -97,8 +98,7 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Loads]) -> tuple[Ball, Bal
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) integrals I of -dB/dL over pieces on which the load changes.
 
-    They follow from (4) of docs/theory/losses.md, with the intervals that this page gives for D, m
-    and M.
+    The formula is (4) of docs/theory/losses.md. The page also gives the intervals for D, m and M.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -150,9 +150,10 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     cells : total number of cells into which the pieces with a varying load are cut
 
-    The loss in a cell lies between the losses for the loads at the two ends of the cell
-    (docs/theory/losses.md, "A front while the load changes"). The results are the means of both.
-    Their relative errors are about cells^-2; the proved bounds on these errors are about 1 / cells.
+    The loss in a cell lies between two losses: those with a constant load, which is the load at one
+    end or at the other end of the cell (docs/theory/losses.md, "A front while the load changes").
+    The results are the means of these two. The relative errors of these means are about cells^-2;
+    the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Loads, Loads]]()  # weight, P at both ends, fronts at both ends

@@ -1,4 +1,4 @@
-"""Contacts of any size with a known answer: heights are computed from chosen loads and gaps."""
+"""Contacts of any size with a known answer, whose heights follow from chosen loads and gaps."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ class Manufactured(Record):
 
 
 def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
-    """A contact of `count` asperities on a hexagonal lattice; the part `touching` of them touches.
+    """A contact of `count` asperities on a hexagonal lattice, with a known answer.
 
-    Contact radii are random from 0.1 to 0.45 spacings, tip radii from 4 to 8 spacings, and gaps up
-    to the largest indentation. Other versions of numpy may give other numbers for a `seed`.
+    Each asperity touches with the probability `touching`. Contact radii are random from 0.1 to 0.45
+    spacings, tip radii from 4 to 8 spacings, and gaps from 0 to the largest indentation. With other
+    versions of numpy, a `seed` may give other numbers.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

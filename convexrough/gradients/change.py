@@ -1,6 +1,6 @@
 """Forward derivatives: first-order changes of results when a scene and its load change.
 
-docs/theory/gradients.md, "The change in one direction", derives them.
+docs/theory/gradients.md, "The change in one direction", derives the formulas.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ WHOLE = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(Record):
-    """A change of a scene's parameters and of what is prescribed. By default nothing changes.
+    """Changes of the parameters of a scene and of the prescribed quantities; by default all 0.
 
     heights, tip_radii : [length] (n,), or one number for all asperities
     positions : [length] (n, 2), or one number for all coordinates
@@ -44,7 +44,7 @@ class Direction(Record):
     contact_modulus : [force / length^2] at constant Poisson's ratio
     poisson_ratio : at constant contact modulus
     load      : [force] total load; give at most one of load and approach
-    approach  : [length]. If neither load nor approach is given, the prescribed one does not change
+    approach  : [length]. If neither load nor approach is given, the prescribed one is kept constant
     friction, force : coefficient of friction and shear force [force]; only for friction states
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
@@ -116,7 +116,10 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """The result of `Contact.change`. Raises InputError for a change of friction or shear force."""
+    """The result of `Contact.change`.
+
+    Raises InputError for a change of friction or shear force, or of both load and approach.
+    """
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
@@ -128,7 +131,7 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
 def _pressed(
     contact: Contact, direction: Direction, bent: _Bent
 ) -> tuple[ContactChange, Ball, Response]:
-    """The change of the contact; and in scaled units, those of its load and of its solution."""
+    """The change of the contact; also the changes of its load and solution, in scaled units."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
@@ -158,7 +161,7 @@ def _pressed(
 
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
-    """(n,) [length] changes of open gaps, dA P + A dP - dd - dD0, in float64; 0 for closed ones."""
+    """(n,) [length] dA P + A dP - dd - dD0, the changes of open gaps, in float64; 0 elsewhere."""
     scene, open_ones = contact.scene, contact.loads == 0.0
     if not open_ones.any():
         return np.zeros(len(scene))
@@ -174,7 +177,10 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
 
 
 def shear_change(state: ShearState, direction: Direction) -> ShearChange:
-    """The result of `ShearState.change`, from the changes at the loads P and P - Q / f."""
+    """The result of `ShearState.change`, from the changes at the loads P and P - Q / f.
+
+    Raises InputError in gross sliding.
+    """
     contact, known = state.contact, with_friction(state)
     checks.instance("direction", direction, Direction)
     if abs(known.height(state.force)) == known.load:
@@ -208,9 +214,10 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
 class _Bent:
     """The changes of a scene's geometry and modulus in one direction.
 
-    everywhere, here : changes of all asperities, and only of those that could touch (candidates)
+    everywhere, here : changes for all asperities, and for the candidates, which are the asperities
+        that can touch
     geometry : the geometry of the candidates
-    modulus  : dlog E*
+    modulus  : dlog E*, the relative change of the contact modulus
     """
 
     everywhere: Bending
@@ -238,7 +245,8 @@ class _Bent:
     def of_level(self, level: Level, total: Ball) -> tuple[Response, Ball]:
         """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total.
 
-        Also the changes (n,) of the gaps of open asperities, dA P + A dP - dd - dD0.
+        C is the diagonal matrix of indentations, and c_i is the local stiffness of asperity i. The
+        second result is (n,) dA P + A dP - dd - dD0, the changes of gaps of open asperities.
         """
         problem = level.problem
         raised = self.here.offsets / problem.units.length - self._felt(level)

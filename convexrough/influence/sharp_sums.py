@@ -1,10 +1,11 @@
-"""The sums of `pair_sums` with more digits than float64 has, for the products of a certificate.
+"""The sums over pairs of `pair_sums`, with more digits than float64 has, for certificates.
 
-For loads P, the smooth part of the sums is W G W^T P: W interpolates from the nodes of a mesh to
-the points, and G is the smooth kernel L between nodes. The product goes from points to the mesh, on
-the mesh, and back to the points. Each step is computed with slices of numbers. First slices have so
-few bits that sums of their products are exact, and the products with the rests are small. The
-remaining error is mostly due to interpolation (docs/theory/operators-mesh.md).
+The kernel 1 / r is the sum of a smooth part L and a rest S, which is 0 for distant pairs. For loads
+P, the part of the sums with L is W G W^T P, where W interpolates from the nodes of a mesh to the
+points, and G has the values of L between nodes. So there are three products: from points to the
+mesh, on the mesh, and back to the points. For each, numbers are split into a first slice and a
+rest. First slices have so few bits that sums of their products are exact, and all products with
+rests are small. The remaining error is mostly due to interpolation (docs/theory/operators-mesh.md).
 """
 
 from __future__ import annotations
@@ -32,13 +33,13 @@ from convexrough.roundoff import ROUNDOFF
 #: Numbers of bits of a float64 number and of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches (`pair_sums.Interpolation`) that are processed together and fit in the cache.
+#: Number of patches (`pair_sums.Interpolation`) that are processed together, to fit in the cache.
 PATCHES = 64
 
-#: L is computed with whole numbers, in units of 2^-FIXED.
+#: Whole numbers in units of 2^-FIXED are used to compute L.
 FIXED = 160
 
-#: Least number of nodes of the table of L, and number of terms of Taylor's series at each node.
+#: Least number of nodes in the table of L, and number of terms of Taylor's series at each node.
 NODES, TERMS = 1024, 8
 
 LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -47,8 +48,8 @@ LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
     """The first `count` coefficients of Taylor's series of reach times L, each (nodes,).
 
-    The variable is (r / reach)^2, and the series are about the nodes r^2 = 0, step, 2 step, ... The
-    coefficients are whole numbers, in units of 2^-FIXED.
+    The variable of the series is (r / reach)^2. There is a series about each of the nodes r^2 = 0,
+    step, 2 step, ... The coefficients are whole numbers, in units of 2^-FIXED.
     """
     one, apart = 1 << FIXED, step / Fraction(kernel.reach) ** 2
     t = one - np.arange(nodes, dtype=object) * one * apart.numerator // apart.denominator
@@ -61,7 +62,7 @@ def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list
 
 
 def soft_values(values: Any, scale: Fraction) -> Pair:
-    """Whole numbers in units of 2^-FIXED, multiplied by `scale`, as double-double numbers."""
+    """The numbers 2^-FIXED `values`, multiplied by `scale`, as double-double numbers."""
     unit = scale / (1 << FIXED)
     return Pair(*np.array([Pair.nearest(value * unit) for value in values]).T)
 
@@ -70,9 +71,10 @@ def soft_values(values: Any, scale: Fraction) -> Pair:
 class SoftTable:
     """L as a function of r^2 within the reach, by Taylor's series at the nearest node.
 
-    step   : [length^2] distance of nodes, a power of two
+    step   : [length^2] difference of r^2 between nodes, a power of two
     values : (m,) L at the nodes
-    terms  : (TERMS - 1, m) further terms of the series in r^2 / step, in float64
+    terms  : (TERMS - 1, m) coefficients of the further terms of the series in r^2 / step, in
+        float64
     error  : bound on the error of each L
     """
 
@@ -110,14 +112,16 @@ class SoftTable:
 
 @dataclass(frozen=True, eq=False)
 class SharpPairs:
-    """S = first + second. Entries of `first` are multiples of a unit, so that their sums are exact.
+    """The matrix S = first + second, with entries 1 / r - L for near pairs.
+
+    Entries of `first` are multiples of a unit, so that sums of them are exact.
 
     first, second : (n, n) sparse, the entries for pairs of sorted points i < j
     unit   : unit of the entries of `first`, a power of two
-    loads  : unit of the first parts of loads of at most 1, a power of two
+    loads  : unit of the first slices of loads, for loads of at most 1, a power of two
     sums   : (n,) bounds on the row sums of |S|
     centre : L(0)
-    error  : bound on the part of the error of an entry that is not due to 1 / r
+    error  : bound on the error of an entry that is not due to 1 / r
     """
 
     product: Product
@@ -136,7 +140,7 @@ class SharpPairs:
         upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
         ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
         sums = _sizes(product, ones)
-        # Sums of first parts up to 16 times the median of `sums` must be exact.
+        # Sums of first slices must be exact up to 16 times the median of `sums`.
         bits = (49 - terms.bit_length()) // 2
         unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
         table = SoftTable.of(kernel)
@@ -168,7 +172,7 @@ class SharpPairs:
         return cls(product, high, low, unit, 2.0**-bits, sums, centre, error)
 
     def __call__(self, ordered: Pair) -> tuple[Pair, Array]:
-        """(n,) the products of S with sorted loads of at most 1, and bounds on their errors."""
+        """(n,) the product of S and sorted loads of at most 1, and bounds on its errors."""
         product, kernel = self.product, self.product.splitting.kernel
         first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
         second = np.asarray((ordered.high - first) + ordered.low)
@@ -193,7 +197,7 @@ def _applied(upper: Any, loads: Array) -> Array:
 
 
 def _sizes(product: Product, strengths: Array) -> Array:
-    """(n,) bounds on the sums over near pairs of |S_ij| times the strength of j."""
+    """(n,) bounds on the sums over j of |S_ij| s_j, for the strengths s."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)
@@ -219,7 +223,7 @@ class Slices(NamedTuple):
 def in_slices(
     product: Callable[[Array, Array], Array], a: Slices, b: Slices
 ) -> tuple[Array, Array]:
-    """A bilinear `product` of a and b as two parts: that of the first slices, and all the rest."""
+    """A bilinear `product` of a and b in two parts: that of the first slices, and the rest."""
     left = product(a.first, b.second)
     left += product(a.second, b.first + b.second)
     return product(a.first, b.first), left
@@ -227,9 +231,9 @@ def in_slices(
 
 @dataclass(frozen=True)
 class SoftValues:
-    """The softened kernel L between nodes of a mesh, multiplied by the unit of length.
+    """The values of the smooth kernel L between nodes of a mesh, times the unit of length.
 
-    near      : the values within the reach; index i^2 + j^2 for nodes that differ by (i, j)
+    near      : the values within the reach, at the index i^2 + j^2 for nodes that differ by (i, j)
     distances : the values 1 / r beyond the reach
     """
 
@@ -258,7 +262,7 @@ class SoftValues:
 
 
 class MeshSums:
-    """The sums over j of P_j / r_ij for exact points, by the mesh and near pairs of a `Product`."""
+    """The sums over j of P_j / r_ij for exact points, by the mesh and near pairs of `product`."""
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
@@ -327,7 +331,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W times values on the mesh, in some unit: whole numbers (n,), and rests (n,) to be added.
+    """W times the values on the mesh, as the sum of whole numbers (n,) and rests (n,) in a unit.
 
     The other two results are this unit, and a bound on the error in this unit.
     """
@@ -345,7 +349,7 @@ def _from_nodes(
             exact[here], left[here] = in_slices(
                 partial(np.einsum, "ij,ij->i"), lines, along.some(rows)
             )
-    # Sums of |weights| are below 4; sums of the second slices of p weights are below p 2^-BITS.
+    # The sum of |weights| is below 4; that of the rests of p weights is below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
     return exact / unit, left / unit, unit / scale, rounding / unit
@@ -356,7 +360,7 @@ def _weighed(
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
     """For each group of patches: its points, the slices of each patch, and the weights in x and y.
 
-    The slices of a patch are those of its points within the group, and of its nodes in x and y.
+    The slices of a patch select its points within the group, and its nodes in x and in y.
     """
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):
@@ -381,6 +385,6 @@ def _met(product: Product) -> int:
 
 
 def _relative(product: Product) -> float:
-    """Relative error of distant pairs due to interpolation and to rounded positions in cells."""
+    """Bound on the relative error of distant pairs by interpolation and by rounded positions."""
     kernel, spacing = product.splitting.kernel, product.splitting.spacing
     return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)

@@ -1,4 +1,4 @@
-"""Shells: imagined spheres around the asperities that do not overlap.
+"""Shells: imagined spheres, one around each asperity, which do not overlap.
 
 With radii s_i, the contact modulus E* and the compliance operator A, A + diag(1 / (pi E* s_i)) is
 positive semidefinite: docs/theory/convexity.md, "Why (2) is not convex as it stands".

@@ -1,9 +1,10 @@
 """Products on a box of sites with any number of digits, by exact convolutions.
 
-Loads and kernel are divided into slices of whole numbers and a small rest. The unit shrinks by the
-same power of two from one slice to the next. The sum of all products of slices that have the same
-unit is a *level*. Fourier transforms compute a level with an error below one half, so rounding to
-whole numbers makes it exact (docs/theory/operators-lattice.md, "Slices").
+Loads and kernel are divided into slices of whole numbers and a small rest. From one slice to the
+next, the unit is divided by the same power of two. The products of a slice of the loads and a slice
+of the kernel that have the same unit add up to a *level*. Fourier transforms compute a level with
+an error below one half, so rounding to whole numbers makes it exact
+(docs/theory/operators-lattice.md, "Slices").
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ from convexrough.roundoff import ROUNDOFF
 #: Largest error allowed in a computed level; below 1/2, rounding to whole numbers removes it.
 SURE = 0.45
 
-#: Number of slices; and the number of sites of a box above which one more is used. On 6.6 million
-#: sites, three slices prove loads to 7e-13 of the largest load, four slices to 3e-15.
+#: Number of slices, and number of sites of a box above which one more slice is used. On 6.6 million
+#: sites, error bounds of loads are 7e-13 of the largest load with three slices, and 3e-15 with
+#: four.
 SLICES, LARGE = 3, 2**22
 
 #: Largest number of bits in a slice: float64 holds these and a rest.
@@ -51,8 +53,9 @@ class Values(Protocol):
 class Distances:
     """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
 
-    gram : (3, 3) three slices (rows) of b1 b1, 2 b1 b2 and b2 b2. The first two slices have so few
-        bits that their products with i^2, i j and j^2, and sums of these, are exact
+    gram : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns). The
+        first two slices have so few bits that their products with i^2, i j and j^2 are exact, and
+        so are sums of these products
     """
 
     gram: Array
@@ -62,7 +65,7 @@ class Distances:
     def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
         """The distances for |i| and |j| below `largest`.
 
-        basis : reduced basis, in a unit that is 0.5 to 1 times the length of the shorter vector
+        basis : reduced basis, in a unit of 0.5 to 1 times the length of the shorter vector
         """
         (a, b), (c, d) = basis
         bits = 52 - (4 * largest * largest).bit_length()
@@ -77,7 +80,7 @@ class Distances:
                 value, finest = value - part, finest / 2 ** (bits - 1)
             slices[2, k] = float(value)
         # The third slices are at most 2^(above - 2 bits). Their sums lose at most four roundoffs of
-        # i^2 + |i j| + j^2; on a reduced basis r^2 is at least a third of that.
+        # i^2 + |i j| + j^2; for a reduced basis, r^2 is at least a third of this sum.
         return cls(slices, PAIR_ROUNDOFF + 12 * ROUNDOFF * 2.0 ** (above - 2 * bits))
 
     def at(self, i: Indices, j: Indices) -> Pair:
@@ -96,8 +99,8 @@ class Distances:
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
     """`count` arrays v_1, v_2, ... with values = sum_s 2^-(bits + s more) v_{s+1}, s = 0, 1, ...
 
-    All but the last one, the rest, have whole numbers. |v_1| is at most about 2^bits max |values|.
-    The other slices are at most 2^(more - 1) in size.
+    The last array is the rest; all others contain whole numbers. |v_1| is at most about 2^bits max
+    |values|. Of the other slices, |v_s| is at most 2^(more - 1).
     """
     high, low = values.high * 2.0**bits, values.low * 2.0**bits
     slices = []
@@ -152,9 +155,9 @@ class Sliced:
             more -= 1
 
     def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """(n,) sums over j of g_ij P_j / unit with the kernel g, plus `change`.
+        """(n,) the sums over j of g_ij P_j, divided by `unit`, plus `change`; g is the kernel.
 
-        at     : (n,) flat indices of the loads' sites, in rows as long as those of the transforms
+        at     : (n,) indices of the loads' sites in the flattened array that is transformed
         change : (n,) values to add; each has an error of at most `error`
         """
         count = len(self.kernels)
@@ -184,7 +187,7 @@ class Sliced:
         for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
-        # The errors of the values and of operations on pairs, by Cauchy's inequality.
+        # Cauchy's inequality bounds the effect of errors of values and of operations on pairs.
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
         radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
@@ -198,7 +201,7 @@ class Sliced:
         return 2.0**-self.bits * sum(norms)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads with which all levels are exact, and the number of bits of the first one.
+        """Slices of loads for which levels are exact, and the number of bits of the first slice.
 
         shares : (n,) loads divided by a power of two, at most 1
         """

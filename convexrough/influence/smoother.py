@@ -1,11 +1,12 @@
 """An approximate inverse of I + W A W, to precondition conjugate gradients.
 
-It is the matrix M of docs/theory/newton.md, "The preconditioner", for the compliance operator A and
-a diagonal W:  M = I - v G (I - (I + b A)^-1) G v.  G^2 takes means with Gaussian weights. v is
-W / d^(1/2) for a local mean d of W^2, and b the median of d. The Gaussian is as wide as a window of
-cells: those of the asperities' lattice, or squares. The code computes M on blocks of m x m cells,
-smaller than a window, with the mean of A over pairs of blocks. The constants are heuristics: they
-change the number of steps of conjugate gradients, not the answer.
+A is the compliance operator and W is diagonal. The approximate inverse is the matrix
+M = I - v G (I - (I + b A)^-1) G v of docs/theory/newton.md, "The preconditioner". Here G^2 takes
+means with Gaussian weights, v is W / d^(1/2) with a local mean d of W^2, and b is the median of d.
+The Gaussian is as wide as a window of cells. Cells are those of the asperities' lattice, or
+squares. The code computes M on blocks of m x m cells, which are smaller than a window, with the
+mean of A over pairs of blocks. The constants are heuristics: they change the number of steps of
+conjugate gradients, not the answer.
 """
 
 from __future__ import annotations
@@ -25,33 +26,34 @@ Single = NDArray[np.float32]
 #: Windows are chosen so large that the mean of W^2 over a window has about this relative variance.
 SCATTER = 0.04
 
-#: Width of the Gaussian that averages over as many cells as a window, divided by the window's side.
+#: Width of the Gaussian that averages over as many cells as a window has, divided by the side of
+#: the window.
 WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
-#: Side of a window divided by the side of a block. Blocks resolve the waves that the Gaussian
-#: passes.
+#: Side of a window divided by the side of a block, so that blocks resolve the waves that the
+#: Gaussian passes.
 FINE = 3.5
 
-#: Least side of a window. Blocks then have 2 x 2 cells, which cost a third of blocks of one cell.
+#: Least side of a window. Its blocks have 2 x 2 cells, which cost a third of blocks of one cell.
 LEAST_WINDOW = 2 * FINE
 
 #: Side, in cells, of the windows on which the scatter of W^2 is measured.
 WINDOW = 8
 
-#: Cells are made smaller while the mean number of points that share the cell of a point exceeds
-#: MOST_SHARING and there are fewer than MOST_CELLS cells per point. Neighbouring rows or columns
-#: with points are at most WIDEST_GAP cells apart; larger distances are shortened to this.
+#: The side of cells is halved while the mean, over all points, of the number of points in the same
+#: cell exceeds MOST_SHARING, but there are never more than MOST_CELLS cells per point. If
+#: successive rows or columns with points are more than WIDEST_GAP cells apart, this distance is
+#: shortened to WIDEST_GAP.
 MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 
-#: Lower limit of the eigenvalues of I + b A in the code, because A has negative ones for short
-#: waves.
+#: Smaller eigenvalues of I + b A are set to this: A has negative eigenvalues for short waves.
 LEAST = 0.2
 
 
 def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
     """M for asperities at arbitrary points, on square cells with about one asperity on average.
 
-    Where points are in clusters, cells are smaller, and wide empty strips are left out.
+    If points are in clusters, cells are smaller, and wide empty strips are left out.
     """
     away, n = points - points.min(axis=0), len(points)
     width, height = away.max(axis=0).tolist()
@@ -75,7 +77,7 @@ def _packed_cells(places: Array) -> Indices:
 
 
 def _mean_sharing(cells: Indices) -> float:
-    """The mean over all points of the number of points in the cell of the point."""
+    """The mean, over all points, of the number of points in the same cell."""
     counts = np.bincount(cells[0] * (cells[1].max() + 1) + cells[1])
     return float(counts @ counts / cells.shape[1])
 
@@ -83,7 +85,7 @@ def _mean_sharing(cells: Indices) -> float:
 def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:
     """M for asperities in these cells (2, n) of a lattice, with the diagonal `root` (n,) of W.
 
-    scale : A_ij r_ij, with distances r_ij in the unit of `basis`
+    scale : the product A_ij r_ij, with the distances r_ij in the unit of `basis`
     """
     (i, j), (rows, columns) = cells, (cells.max(axis=1) + 1).tolist()
     squares = np.bincount(i * columns + j, root * root, minlength=rows * columns)
@@ -155,12 +157,12 @@ def _window(squares: NDArray[Any]) -> float:
 
 
 def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
-    """The factor by which G^2, a mean with a Gaussian of this width [spacing], multiplies waves."""
+    """The factors by which G^2 multiplies waves, for a Gaussian of this width [spacing]."""
     dual = 2.0 * np.pi * np.linalg.inv(basis).T
     i, j = (np.fft.fftfreq(n) for n in size)
     i, j = i[:, None], np.abs(j[: size[1] // 2 + 1])
     squares = np.full(np.broadcast(i, j).shape, np.inf)
-    for a in (-1, 0, 1):  # waves with equal values at all sites count as the longest of them
+    for a in (-1, 0, 1):  # of waves with equal values at all sites, the longest counts
         for b in (-1, 0, 1):
             x, y = ((i + a) * dual[0, k] + (j + b) * dual[1, k] for k in (0, 1))
             np.minimum(squares, x * x + y * y, out=squares)
@@ -216,6 +218,6 @@ def _block_spectrum(
 
 
 def differences(length: int) -> NDArray[np.int64]:
-    """The array 0, 1, ..., -2, -1 of the differences nearest to 0 in a period of `length`."""
+    """The array 0, 1, ..., -2, -1: index differences modulo `length`, those nearest to 0."""
     i = np.arange(length)
     return np.where(i <= (length - 1) // 2, i, i - length)

@@ -1,9 +1,9 @@
-"""The softened kernel L: 1 / r^q made smooth within a reach, with bounds on interpolation errors.
+"""The kernel 1 / r^q, made smooth within a reach, and bounds on its interpolation errors.
 
-Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial: the series of 1 / r^q in
-t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives at r = a. All terms of
-the series are positive, so nothing cancels. docs/theory/operators-mesh.md derives the bounds, in
-"The smooth part", "Derivatives of L" and "Interpolation".
+L denotes the smooth kernel. Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial:
+the series of 1 / r^q in t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives
+at r = a. All terms of the series are positive, so nothing cancels. docs/theory/operators-mesh.md
+derives the bounds, in "The smooth part", "Derivatives of L" and "Interpolation".
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from convexrough.arithmetic.pairs import Pair, two_sum
 from convexrough.arrays import Array
 
 #: Near pairs are omitted if 1 / r^q - L is below this fraction of the interpolation error. The
-#: number is a heuristic; omitted pairs are part of the error bound.
+#: number is a heuristic: the error bound includes the omitted pairs.
 CUT_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Softened:
-    """The kernel L of 1 / r^q with power q, even order p, reach a [length]."""
+    """The smooth kernel L of 1 / r^q, with power q, even order p and reach a [length]."""
 
     power: int
     order: int
@@ -43,7 +43,7 @@ class Softened:
         return values
 
     def local(self, squares: Array) -> Array:
-        """1 / r^q - L at squared distances within the reach; -L(0) where two points coincide."""
+        """1 / r^q - L at squared distances within the reach; -L(0) at the distance 0."""
         with np.errstate(divide="ignore"):
             values: Array = 1.0 / np.sqrt(squares)
         values[squares == 0.0] = 0.0
@@ -82,14 +82,14 @@ class Softened:
         return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
 
     def pair_error(self, spacing: float) -> float:
-        """Bound on the error for any pair due to interpolation of L and omission of 1 / r^q - L."""
+        """Bound on the error of any pair by interpolation of L and by omission of 1 / r^q - L."""
         return (1.0 + CUT_SHARE) * self._interpolation_error(spacing)
 
     def cut(self, spacing: float) -> float:
         """[length] the distance beyond which 1 / r^q - L may be omitted.
 
-        1 / r^q - L is the rest of the series. For t <= 1/2 it is at most 2.3 times its first term,
-        because each coefficient is less than a tenth larger than the one before.
+        1 / r^q - L is the rest of the series. For t <= 1/2, this rest is at most 2.3 times its
+        first term, because each coefficient is less than a tenth larger than the one before.
         """
         first = 2.3 * float(_series(self.order + 1, self.power)[-1])
         error = CUT_SHARE * self._interpolation_error(spacing) * self.reach**self.power
@@ -111,8 +111,8 @@ class Softened:
     def sway(self, spacing: float) -> float:
         """[length] bound on |d - r| for two points at the distance r.
 
-        d is the distance of any two nodes, one of those from which L is interpolated to the first
-        point, and one of those for the second point.
+        d is the distance from any node that is used to interpolate L at the first point to any node
+        that is used at the second point.
         """
         return math.sqrt(2.0) * self.order * spacing
 
@@ -133,8 +133,8 @@ class Softened:
 def lebesgue(order: int) -> float:
     """The largest sum of the absolute values of Lagrange's polynomials between the middle nodes.
 
-    Between these two nodes the sum equals a polynomial that is even about the middle, and all its
-    roots lie outside. So it is largest in the middle.
+    Between these two nodes the sum equals a polynomial that is even about the middle. All roots of
+    the polynomial lie outside, so it is largest in the middle.
     """
     return float(np.abs(twofold_lagrange(np.array([0.5]), order).high).sum())
 
@@ -158,8 +158,9 @@ def twofold_lagrange(places: Array, order: int) -> Pair:
     return weights
 
 
-#: Bounds on the relative error of a weight: of a double-double one (at most 60 operations, and a
-#: low part in single precision); and of one in float64, in roundoffs.
+#: Bounds on the relative error of an interpolation weight. The first is for a double-double weight,
+#: with at most 60 operations and its low part in single precision. The second is for a weight in
+#: float64, in roundoffs.
 TWOFOLD_WEIGHT = 2.0**-76
 WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40
 
@@ -180,7 +181,7 @@ def exact_series(order: int, power: int) -> list[Fraction]:
 
 @cache
 def _interpolated(order: int) -> float:
-    """The factor c in |error| <= c h^p max |d^p L| / p! of interpolation in four variables."""
+    """The factor c in |error| <= c h^p max |d^p L| / p!, for interpolation in four variables."""
     growth = lebesgue(order)
     remainder = math.prod(range(1, order, 2)) ** 2 / 2.0**order
     return 1.01 * remainder * (1.0 + growth + growth**2 + growth**3)
@@ -191,12 +192,12 @@ def _steepest(order: int, power: int) -> float:
     """Bound on |d^p L / dx^p| / p! anywhere in the plane, for a reach of 1.
 
     Beyond the reach it is binom(p + q - 1, p), the largest value of Gegenbauer's polynomial.
-    Inside, the derivative is a polynomial in r and in the cosine of the direction. A polynomial of
-    degree d is at most 1 / cos(pi d / 2N) times its largest value at N Chebyshev nodes (Ehlich and
-    Zeller).
+    Inside, the derivative is a polynomial in r and in the cosine of the direction. The absolute
+    value of a polynomial of degree d is at most 1 / cos(pi d / 2N) times the largest one at N
+    Chebyshev nodes (Ehlich and Zeller).
     """
     terms = _series(order, power)
-    # The degree is p in r (2 p less p derivatives) and p in the angle; each has N = 6 p nodes.
+    # The degree is p in r (2 p minus p derivatives) and p in the cosine; each has N = 6 p nodes.
     radii = np.cos((np.arange(3 * order) + 0.5) * np.pi / (6 * order))
     cosines = np.cos(np.arange(3 * order + 1) * np.pi / (6 * order))
     total = np.zeros((len(radii), len(cosines)))

@@ -1,8 +1,8 @@
 """The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
-The data of the scene are the given float64 numbers. `refine` evaluates the contact law in ball
-arithmetic, `proved` proves that a solution exists near the loads, and this module bounds the
-distance to it.
+The data of the scene are the given float64 numbers. The module `refine` evaluates the contact law
+in ball arithmetic, and `proved` proves that a solution exists near the loads. This module bounds
+the distance from the loads to that solution.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ from convexrough.sphere import hertz
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
-#: If no contact radius exceeds this fraction of the distance to the nearest neighbour, a disc of
-#: every other solution covers the summit of its nearest neighbour. In units of this distance the
-#: fraction is the radius a for which (1) of docs/theory/crowded.md, with the radius b = 1 in the
-#: other solution, gives the mean m = pi / 4; rounded down.
+#: If no contact radius of a solution exceeds this fraction of the distance to the nearest
+#: neighbour, every other solution has a contact disc that covers the summit of its nearest
+#: neighbour. In units of this distance, the fraction is the radius a for which (1) of
+#: docs/theory/crowded.md gives the mean m = pi / 4 if the radius in the other solution is b = 1.
+#: The fraction is rounded down.
 ROOMY = 0.52
 
 
@@ -52,26 +53,27 @@ class Certificate(Table):
         proof is based: the smallest eigenvalue of the Hessian, scaled by each asperity's local
         compliance, is at least 1 - convexity_number
     codes : index of each status in `STATUSES`
-    load_errors : [force] bounds on |load - solution|
+    load_errors : [force] bounds on |load - load in the solution|
     gaps : [length] gaps that remain under these loads; 0 where an asperity touches
-    gap_errors : [length] bounds on |gap - solution|
+    gap_errors : [length] bounds on |gap - gap in the solution|
     approach : [length] the prescribed approach, or the one that fits the loads best
-    approach_error : [length] bound on |approach - solution|; 0 where prescribed
+    approach_error : [length] bound on |approach - approach of the solution|; 0 if prescribed
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
-        solution, which is the least energy if the scope is "global". It is 0 up to rounding at the
-        solution. It is infinite where nothing is proved, or where the energy is not proved convex
-        between the loads and the solution. If the total load is prescribed, loads on asperities
-        that cannot touch are first dropped, and the others scaled to the total
+        solution. If the scope is "global", the solution has the least energy. The bound is 0 up to
+        rounding at the solution. It is infinite if nothing is proved, or if the energy is not
+        proved convex between the loads and the solution. If the total load is prescribed, the
+        energy is that of changed loads: those on asperities that cannot touch are dropped, and the
+        others are scaled to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
         of these asperities touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
-        here the largest (a_i + a_j) / r_ij over pairs of asperities that can touch, with contact
-        radii a (0 where open) and distances r. This bound is infinite if there is no other
-        solution, and 0 if nothing is known
+        the largest (a_i + a_j) / r_ij of all pairs of asperities that can touch, with the distance
+        r_ij and the contact radii a, which are 0 where open. The bound is infinite if there is no
+        other solution, and 0 if nothing is known
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
-    in_the_way : (m,) indices of asperities that prevent a proof; empty where there is one
+    in_the_way : (m,) indices of asperities that prevent a proof; empty if there is a proof
     obstacle : a sentence that says why these asperities prevent a proof
 
     >>> judged = contact.certificate
@@ -99,7 +101,7 @@ class Certificate(Table):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) "contact" if a load is proved positive, "open" if a gap is, else "undecided"."""
+        """(n,) "contact" if the load is proved positive, "open" if the gap is, else "undecided"."""
         return frozen(STATUSES[self.codes])
 
     @property
@@ -154,11 +156,12 @@ def certify(
     load: float | None = None,
     influence: Kind | None = None,
 ) -> Certificate:
-    """The certificate of loads from any source.
+    """The certificate of given loads, from any source.
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
-    approach, load : [length], [force] the prescribed quantity, exactly one of the two. Loads are
-        scaled to a prescribed total, and the bounds include this change
+    approach, load : [length], [force] the prescribed quantity, exactly one of the two. If the load
+        is prescribed, the loads are scaled to this total, and the bounds include the change by
+        scaling
     influence : compliance operator "dense", "lattice" or "scattered"; None for the cheapest
 
     Raises InputError for loads that are negative, not finite or not of the shape (n,).
@@ -175,7 +178,7 @@ def certify(
 
 
 def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
-    """The certificate of loads (N,) [force] of all asperities of the scene of `problem`."""
+    """The certificate of the given `loads` (N,) [force] of all asperities of `problem.scene`."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
@@ -190,10 +193,10 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
 
 
 def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
-    """The certificate of loads (N,) [force] of all asperities of the scene.
+    """The certificate of the given `loads` (N,) [force] of all asperities of the scene.
 
-    level : the solution proved near them, or the obstacle to a proof
-    start : the loads of the asperities that can touch, scaled to the total if that is prescribed
+    level : the solution that is proved to be near these loads, or the obstacle to a proof
+    start : the loads of the asperities that can touch, scaled to the total load if it is prescribed
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
@@ -208,7 +211,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     others = NO_OTHERS
     if box.scope != "global":
         assert level.trial is not None
-        # The weights and their displacement must be of the same loads.
+        # `overhang` needs weights and the displacement that exactly these weights cause.
         highest = problem.overhang(level.trial.loads.high, level.trial.product.upper)
         others = OtherSolutions.of(problem, level.loads.upper, highest)
     load_errors = _load_errors(problem, loads, level)
@@ -263,12 +266,15 @@ def _unproved(level: Level, start: Trial, gaps: Array) -> Certificate:
 
 
 def _apart(loads: Array, found: Level) -> Array:
-    """(n,) bounds on |load - solution| of the asperities that can touch, in scaled units."""
+    """(n,) bounds on |load - load in the solution|, in scaled units, where asperities can touch."""
     return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
 
 
 def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
-    """(N,) [force] bounds on |load - solution|; the load itself where an asperity cannot touch."""
+    """(N,) [force] bounds on |load - load in the solution|.
+
+    The bound is the load itself where an asperity cannot touch.
+    """
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
     errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
@@ -278,14 +284,14 @@ def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
 def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
-    It is e'|P - P*| if Phi is convex from P to P*, with the violations e of the contact law at P.
-    Loads q on asperities fixed open add at most e'q, and removing them changes the residuals by
-    A q. If Phi is not proved convex, the bound is infinite.
+    The bound is e'|P - P*|, with the violations e of the contact law at P, if Phi is convex between
+    P and P*. Loads q on asperities fixed open add at most e'q; without these loads the residuals
+    change by A q. If Phi is not proved convex, the bound is infinite.
 
     moved : (n,) bounds on |P - P*|
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
-    if start is found.trial:  # P are these loads, rounded and perhaps scaled to the total again
+    if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total
         excess = excess + 2 * ROUNDOFF * (start.local + start.product.size)
         moved = moved + ROUNDOFF * loads
     most, opened = loads * (1 + SAFETY), box.fixed_open
@@ -296,7 +302,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
             displacement = problem.influence.apply(q)
             excess = excess + displacement + problem.influence.rounding(q).of(displacement)
         most[opened] = 0.0
-    if (most > box.loads).any():  # A >= -theta H on the box
+    if (most > box.loads).any():  # on the box A >= -theta H, theta = box.convexity_number
         most = np.maximum(box.loads, most)
         # At larger loads H is at least this fraction of its value on the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
@@ -315,7 +321,7 @@ class _Screened(NamedTuple):
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
     coupling: Coupling | None  # maps loads to their displacements; None if all can touch
-    indentation: Array  # approach plus offset, less displacement: minus the gap
+    indentation: Array  # approach + offset - displacement, which is minus the gap
     rounding: Array  # bounds on errors of the indentation
 
 
@@ -340,8 +346,8 @@ def _screened_energy(
 ) -> float:
     """Bound on the energy of loads s on asperities that cannot touch.
 
-    It is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the load is prescribed, these
-    loads are dropped and the bound is 0.
+    The energy is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the total load is
+    prescribed, the loads s are dropped and the bound is 0.
     """
     screened = loads.copy()
     screened[problem.candidates] = 0.0
@@ -363,14 +369,14 @@ def _screened_energy(
 
 
 class OtherSolutions(NamedTuple):
-    """Properties that all solutions other than the one found have; a local certificate states them.
+    """Properties of all solutions other than the one found, which a local certificate states.
 
-    docs/theory/crowded.md, "Other solutions", derives them.
+    docs/theory/crowded.md, "Other solutions", derives these properties.
     """
 
     possible: bool  # False if it is proved that there are none
     crowding: float  # lower bound on their crowding (see `Certificate`); infinite if there are none
-    cover: bool  # in each of them a disc covers the nearest neighbour's summit
+    cover: bool  # in each, a contact disc covers the nearest neighbour's summit
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
@@ -398,7 +404,7 @@ NO_OTHERS = OtherSolutions(False, np.inf, True)
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """(n,) the mean m of contact radii a and b in two solutions; it increases with both.
+    """(n,) the mean m of contact radii a and b in two solutions; m increases with a and with b.
 
     (2 / pi) m is the shell radius t of (1) of docs/theory/crowded.md.
     """

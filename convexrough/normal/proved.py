@@ -1,9 +1,10 @@
 """The proof that a solution exists near trial loads, and bounds on the distance to it.
 
-The theorem of docs/theory/one-theorem.md is applied twice: on a box of loads on which the energy is
-convex (module `boxes`), and on a smaller box, which by the first result contains the solution
-(docs/theory/certificate.md). P are the trial loads, D0 the approach, A the compliance operator; a
-star marks the solution. H is diagonal, the local part of the Hessian at the upper ends of the box.
+The theorem of docs/theory/one-theorem.md is applied twice: first on a box of loads on which the
+energy is convex (module `boxes`), then on a smaller box, which contains the solution by the first
+result (docs/theory/certificate.md). P are the trial loads, D0 the approach and A the compliance
+operator. A star marks the solution. `h` is the diagonal of H, the local part of the Hessian at the
+upper ends of a box.
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial
 from convexrough.roundoff import SAFETY
 
-#: Number of boxes of touching asperities that are tried, and the distance from the loads to the end
-#: of the next box, divided by the latest error bounds. Heuristics.
+#: Number of boxes that are tried in which only touching asperities can have a load; and the
+#: distance from the loads to the end of the next such box, divided by the latest error bounds.
+#: Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: If the relative error of a load is above this, the load is also bounded through the indentation.
+#: A load with a relative error above this is also bounded by means of its indentation.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -42,11 +44,11 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:
     """The `Level` of the solution in the first box that is proved to contain it.
 
-    If there is none, an unproved level whose `obstacle` says why.
+    If there is no such box, the result is an unproved level whose `obstacle` says why.
 
-    boxes : default: those of `normal.boxes.tried`. If none of these succeeds, boxes in which the
-        asperities without a load are assumed to be open; later attempts drop this assumption for
-        those whose gaps are not proved
+    boxes : the boxes to try. By default they are those of `normal.boxes.tried` and, if none of
+        these succeeds, boxes in which asperities without a load are assumed to be open; later boxes
+        drop this assumption for asperities whose gaps are not proved
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -79,9 +81,10 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
 def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
     """The solution near the trial loads, by the theorem on the box and then on a smaller box.
 
-    Three results. First, whether it is proved that the box contains the solution; (m,) for a stack.
-    If not, the other two prove nothing. Second, (n,) bounds on the errors of the trial loads, by
-    the theorem on the box. Third, the level, by the theorem on the smaller box.
+    There are three results. The first is True if it is proved that the box contains the solution;
+    (m,) for a stack of m problems. If it is False, the other two prove nothing. The second is (n,)
+    bounds on the errors of the trial loads, by the theorem on the box. The third is the level, by
+    the theorem on the smaller box.
     """
     trial, missing = state.loads.high, _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
@@ -112,10 +115,10 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
 class _Missing(NamedTuple):
     """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
-    docs/theory/one-theorem.md derives them. The loads (1 + t) P have the prescribed total.
+    docs/theory/one-theorem.md derives the bounds. The loads (1 + t) P have the prescribed total.
 
     loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
-        from P to (1 + t) P; 0 if P has this total
+        from P to (1 + t) P; 0 if P has the prescribed total
     """
 
     loads: Any
@@ -137,9 +140,9 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The balls of the loads.
+    """The balls of the loads, with smaller radii where possible.
 
-    For an inexact load this is the ball of (indentation / k)^(3/2), if that is smaller.
+    For a load with a large error the ball of (indentation / k)^(3/2) is used if it is smaller.
     """
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
@@ -147,8 +150,9 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
 
 
 def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
-    """The balls of loads P, or of (n / k)^(3/2) for indentations n where P is inexact and the
-    second ball is smaller; dP, dn and dk are radii.
+    """The balls of loads P or, where P is inexact and this is smaller, of (n / k)^(3/2).
+
+    n : the indentations;  dP, dn, dk : radii of the balls
     """
     ratio = Ball(n, dn) / Ball(k, dk)
     by_law = ratio.positive_part() * ratio.sqrt()
@@ -158,11 +162,12 @@ def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tu
 
 
 def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
-    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
+    """Bound on |D0 - D0*|, the error of the approach.
 
-    At an open asperity D0* is at most that right side, because gaps are not negative. So if none is
-    proved to touch, the least right side bounds D0* from above. D0* is at least -max d, the
-    approach at which contact begins.
+    At every touching asperity, D0* = k P*^(2/3) + A P* - d. At an open asperity, D0* is at most
+    this right side, because gaps are not negative. So if no asperity is proved to touch, the least
+    right side bounds D0* from above. The lower bound on D0* is -max d, the approach at which
+    contact begins.
     """
     if problem.load is None:
         return state.approach.radius

@@ -1,4 +1,4 @@
-"""Many normal problems with equal numbers of asperities that could touch, one in each row.
+"""Many normal problems with the same number of asperities that could touch, as rows of arrays.
 
 The functions of `refine` and `proved` take such a stack in place of a single problem.
 """
@@ -25,8 +25,10 @@ from convexrough.scene.scene import Scene
 class Stack:
     """Problems in m rows, in scaled units: arrays are (m, n), or (n,) where all rows are equal.
 
-    coupled : slices of the rows, each with a problem whose compliance operator these rows share
-    exact   : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
+    coupled : slices of the rows, each with a problem whose compliance operator is that of these
+        rows
+    exact   : coefficients k, which may be (1,) or (m, 1), and offsets d;  shells : as in
+        `NormalProblem`
     squares : [length^2] squared distances of summits from the axis
     control : (m, 1) the prescribed loads if `by_load` is True, else the prescribed approaches
     """
@@ -72,12 +74,12 @@ class Stack:
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) for each problem a bound on the largest 2-norm of a row of A."""
+        """(m, 1) bounds on the largest 2-norm of a row of the compliance operator A."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) for each problem a bound on the largest entry of A."""
+        """(m, 1) bounds on the largest entry of A."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
@@ -116,11 +118,11 @@ class Stack:
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P for P = `others`, to about thirty digits; the first two are not used."""
+        """(m, n) A P for P = `others`, to about thirty digits; other arguments are not used."""
         return self.product(others)
 
     def convexity_at(self, compliance: Array) -> Array:
-        """(m, 1) convexity numbers at loads with this compliance (m, n)."""
+        """(m, 1) convexity numbers at loads with this `compliance` (m, n)."""
         return np.asarray(largest(self.shells / compliance) * (1 + SAFETY))
 
     def compliance(self, loads: Array) -> Array:
@@ -131,8 +133,8 @@ class Stack:
         """(m, n) one Newton step of the indentations; nan in rows with an indefinite matrix.
 
         slopes, defect : (m, n) as in `NormalProblem.correct`
-        todo   : (m,) rows that need a step; the others get 0
-        enough : not used, because a factorisation leaves only rounding errors
+        todo   : (m,) True for rows that need a step; the step of all other rows is 0
+        enough : not used, because factorisations leave only rounding errors
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 

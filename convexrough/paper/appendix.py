@@ -1,16 +1,18 @@
-"""The source paper's appendix [A1]-[A15], for comparison: slips from the surface displacements.
+"""Slips and losses by the source paper's appendix, equations [A1] to [A15], for comparison.
 
 Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
 is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
-("adhered") approximates the displacement of distant points. The slip of a sliding asperity is the
-difference of this mean and u.
+("adhered") approximates the displacement of distant points. The slip of a sliding asperity is this
+mean minus its u.
 
 In theory u is the same at all adhered asperities. The computed values differ slightly, for two
 reasons. [A3] and [A4] spread each force over a disc, but `shear` uses point forces. And unless
-Poisson's ratio is 0, displacements decay more slowly along the shear than across it, but `shear`
-averages over directions. So slips differ around a ring of asperities and may be backwards.
+Poisson's ratio is 0, displacements decay more slowly along the shear force than across it, but
+`shear` averages over directions. So the slips of the asperities in a ring differ, and slips may be
+backwards.
 
-Nothing here is certified. Displacements and energies are for both bodies, twice the paper's.
+Nothing here is certified. Displacements and energies are for both bodies, and so twice those of the
+paper.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from convexrough.sphere import mindlin
 
 
 def displacements(state: ShearState) -> Array:
-    """(n,) [length] surface displacement along the shear at each loaded asperity; nan at others."""
+    """(n,) [length] surface displacement along the force at each loaded asperity, else nan."""
     contact = state.contact
     touching = np.flatnonzero(contact.loads)
     found = np.full(len(contact.loads), np.nan)
@@ -34,7 +36,7 @@ def displacements(state: ShearState) -> Array:
 
 
 def slips(state: ShearState) -> Array:
-    """(n,) [length] slips of sliding asperities, 0 for others; forward slip has the sign of Q.
+    """(n,) [length] slips of sliding asperities, 0 for others. Forward slips have the sign of Q.
 
     If all asperities slide, the largest displacement replaces the mean.
     """
@@ -48,7 +50,10 @@ def slips(state: ShearState) -> Array:
 
 
 def scatter(state: ShearState) -> float:
-    """Standard deviation over mean of u at adhered asperities, in theory 0; nan if undefined."""
+    """Standard deviation of u at the adhered asperities, divided by the size of its mean.
+
+    In theory this is 0. The result is nan if no asperity adheres, or if all u are 0.
+    """
     u = displacements(state)[state.stick_radii > 0]
     return float(u.std() / abs(u.mean())) if u.any() else float("nan")
 
@@ -56,8 +61,9 @@ def scatter(state: ShearState) -> float:
 def energies(state: ShearState) -> Array:
     """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q.
 
-    It is W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i|, with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i), the
-    function e of `mindlin.loss` and the slip s_i; a backward slip counts as negative.
+    The loss is W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i| with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i),
+    the function e of `mindlin.loss` and the slip s_i. For a backward slip the second term is
+    negative.
     """
     contact, scene = state.contact, state.contact.scene
     friction = checks.friction(scene.friction)

@@ -12,7 +12,8 @@ from convexrough.scene.rings import rings
 #: Q / (f P) of the paper's Figs. 4 to 6 and 8.
 SHARE = 0.5
 
-#: Forces Q / (f P) of loading from rest, denser near gross sliding; amplitudes Q / (f P) of cycles.
+#: Forces Q / (f P) of loading from rest, and amplitudes Q / (f P) of cycles; both are closer
+#: together near gross sliding.
 FRACTIONS = np.union1d(np.linspace(0.0, 1.0, 51), 1.0 - np.linspace(0.0, 1.0, 31) ** 2)
 AMPLITUDES = np.union1d(
     np.concatenate((np.geomspace(1e-3, 0.0125, 6), np.linspace(0.0125, 1.0, 80))),
@@ -21,13 +22,16 @@ AMPLITUDES = np.union1d(
 
 
 class PaperStates:
-    """The results that the figures and their tables show, for a pressed contact with friction.
+    """The results that the paper's figures and their tables show, for a contact with friction.
 
     limit  : [force] friction limit f P
-    named  : touching asperities by ring, from the axis outwards; the last ring is A
+    named  : indices of touching asperities by the letter of their ring, from the axis outwards; the
+        outermost ring has the letter A
     onsets : (n,) Q / (f P) at which each asperity starts to slide
-    half   : state at half of the limit;  steady, loop : cycle between plus and minus this force
-    path   : loading from rest to Q / (f P) = `fractions`, which include the onsets of all rings
+    half   : state at half of the limit;  steady, loop : cycle between plus and minus half of the
+        limit, and its loop
+    path   : loading from rest through Q / (f P) = `fractions`, which include the onsets of all
+        rings
     cycles : steady cycles at `AMPLITUDES`
     """
 
@@ -46,7 +50,7 @@ class PaperStates:
 
 
 def lettered(contact: cr.Contact) -> dict[str, Indices]:
-    """The touching asperities by ring, from the axis outwards; the last ring is A."""
+    """Indices of touching asperities by ring, from the axis outwards; the outermost ring is A."""
     groups = rings(contact.scene.asperities.distances, contact.loads)
     several = -(-len(groups) // 26)
     letters = [chr(ord("A") + k) * (turn + 1) for turn in range(several) for k in range(26)]

@@ -16,8 +16,8 @@ from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, image_tag, new_axes
 from convexrough.plots.style import SINGLE, legend_below, say_nothing
 
-#: The module and function that draw a result into axes, by the name of its class. A module is
-#: imported when such a result is drawn.
+#: The module and the function that draw a result into axes, by the name of the result's class. A
+#: module is imported only when its function is needed.
 PICTURES = {
     "Contact": "press.draw_pressure",
     "ShearState": "shear.draw_one_state",
@@ -69,7 +69,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(result: object) -> str:
-    """A small picture of a result as an HTML image; for a cycle or path it is a map of statuses."""
+    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses."""
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):

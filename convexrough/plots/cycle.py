@@ -1,4 +1,4 @@
-"""Figures of steady cycles: hysteresis loops, energy losses, and fretting."""
+"""Figures of steady cycles: hysteresis loops and energy losses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from convexrough.sphere.smooth import SmoothSphere
 
 MOST_LOOPS, MOST_ASPERITIES = 4, 6
 POINTS = 400  # number of points of a loop
-#: Line styles of the chosen asperities from the centre outwards, distinct also without colours.
+#: Line styles of the chosen asperities, from the centre outwards; distinct without colours, too.
 DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-"]
 
 
@@ -40,9 +40,9 @@ def cycle_figures(
     asperities : indices of asperities whose loops are drawn; default: one at each distance from the
         centre, at most 6
 
-    "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles only the four
-        whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest. Also loops of the asperities
-        in the cycle of the widest range
+    "hysteresis" : loops of the cycles and of the smooth sphere. If there are more than 4 cycles,
+        only those whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest are drawn. Also
+        loops of the asperities in the cycle of the widest range
     "loss" : energy against amplitude, for cycles of several ranges
     """
     if not cycles:
@@ -87,10 +87,11 @@ def loops_figure(
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """The figure of loops: of the contact, of the contact less an elastic part, and of asperities.
+    """The figure of loops of the contact, of the contact less an elastic part, and of asperities.
 
-    names, meaning : entries and title of the legend of the asperities
-    loops : loops of the cycles, with loops of the asperities;  count : number of all cycles
+    names, meaning : entries and title of the legend for the asperities
+    loops : loops of the cycles, with those of the asperities;  count : number of all cycles, of
+        which `cycles` are drawn
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
@@ -130,7 +131,7 @@ def loops_figure(
 
 
 def draw_cycle(axes: Axes, cycle: Cycle) -> None:
-    """Draw the loop of a cycle, or its path in the plane of loads if the normal load varies."""
+    """Draw the loop of a cycle or, if the normal load varies, its path in the plane of loads."""
     if np.ptp(cycle.loads) > 0:
         return draw_closed(axes, cycle)
     scale = Scale(cycle.contact)
@@ -155,8 +156,9 @@ def draw_loop(
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
     """[length] displacements X of the smooth sphere at the forces of a steady loop.
 
-    From a turning point (Q1, X1), X = X1 + 2 X0((Q - Q1) / 2), where X0(Q) is the displacement
-    after loading from rest to Q. The first loading goes to the turning point with the larger |Q|.
+    After a turning point (Q1, X1), X = X1 + 2 X0((Q - Q1) / 2), where X0(Q) is the displacement
+    after loading from rest to Q. The loading from rest goes to the turning point with the larger
+    |Q|.
     """
     turn = int(np.argmin(forces))
     maximum, minimum = forces[0], forces[turn]
@@ -175,7 +177,7 @@ def _draw_asperity_loops(
     cycle: Cycle,
     scale: Scale,
 ) -> None:
-    """Draw Q_i / (f P_i) against X_i + slip_i; while an asperity slides the ordinate is +-1."""
+    """Draw Q_i / (f P_i) against X_i + slip_i; the ordinate is 1 or -1 while an asperity slides."""
     limits = scale.limit * cycle.contact.loads / cycle.contact.load
     kept = loop.asperities.tolist()
     for order, (i, name) in enumerate(zip(asperities, names, strict=True)):

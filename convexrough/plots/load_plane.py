@@ -1,4 +1,7 @@
-"""Figures in the plane of normal load P and T = Q / f, with shear force Q and friction f."""
+"""Figures in the plane of the normal load P and T = Q / f, and figures of losses by phase.
+
+Q is the shear force and f the coefficient of friction.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,10 @@ from convexrough.scene.rings import evenly_chosen
 
 MOST_CURVES = 4
 
-#: Line patterns by which memory curves can be told apart also in grey.
+#: Line patterns that tell memory curves apart even without colour.
 PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 
-#: Losses are drawn for at most this many sizes of ellipses, the largest ones.
+#: Losses are drawn for at most this many factors (sizes of elliptic paths), the largest ones.
 MOST_FACTORS = 5
 
 
@@ -56,7 +59,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
 
 
 def draw_losses(axes: Axes, found: PhaseLosses) -> None:
-    """Draw loss / factor^3; for small cycles the loss grows as factor^3, so the lines coincide."""
+    """Draw loss / factor^3. The loss of small cycles grows as factor^3, so their lines coincide."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
@@ -118,7 +121,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
-    """Label both axes and draw |T| = P (gross sliding); return the measure of both axes."""
+    """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
     unit = measure(most, force_unit, "P_m")
     for sign in (1.0, -1.0):
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,

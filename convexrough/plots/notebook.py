@@ -15,11 +15,11 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from convexrough.errors import InputError
 
-#: The formats of files; and the limits of the resolution [pixels per inch].
+#: Formats of files, and the limits of their resolution [pixels per inch].
 FORMATS = ("png", "svg", "pdf")
 LEAST_DPI, MOST_DPI = 50, 600
 
-#: Keep text as text in SVG and as TrueType in PDF, with fixed ids, so that files can be compared.
+#: Settings that keep text as text in SVG and PDF, and use fixed ids, so that files can be compared.
 REAL_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "convexrough"}
 
 
@@ -66,7 +66,7 @@ def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
 
 
 def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
-    """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is for its pixels.
+    """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is its resolution.
 
     Raises InputError for another format, or a `dpi` out of range.
     """

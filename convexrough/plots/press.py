@@ -22,11 +22,11 @@ from convexrough.sphere import hertz
 def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
-    "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, if they are not in
-        rows or if very many touch, peak pressures of all asperities against the distance from the
-        centre replace the profile
-    "loads"    : load of each touching asperity against the distance from the centre
+    "pressure" : map of the contact discs; and the pressure along y = 0 with that of the smooth
+        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, if asperities are
+        not in rows or if very many touch, the second plot shows the peak pressures of all
+        asperities against the distance from the centre
+    "loads"    : load of each touching asperity against its distance from the centre
     """
     if not contact.loads.any():
         return style.no_contact("pressure", "loads")
@@ -57,8 +57,9 @@ def pressure_figure(scale: Scale) -> Figure:
 def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
     """Draw a map of contact pressures with a colour bar; return the colours.
 
-    The pressure p0 sqrt(1 - (r/a)^2) of a contact is a stack of discs in equal steps of pressure.
-    If many asperities touch, it is one disc with the colour of the peak pressure.
+    Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is drawn as a stack of discs in equal
+    steps of pressure. If many asperities touch, each is one disc in the colour of its peak
+    pressure.
     """
     scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))
@@ -113,7 +114,7 @@ def distances(scale: Scale) -> Array:
 
 
 def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
-    """Draw a dot for each point; if there are many, their density and median."""
+    """Draw a dot for each point or, if there are many points, their density and median."""
     if len(x) >= CROWDED:
         style.draw_density(axes, x, y, top, name)
     else:
@@ -153,7 +154,7 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Draw 100 p(r) A / P of the smooth sphere, with the median cell area A of the asperities."""
+    """Draw 100 p(r) A / P for the smooth sphere, with the median cell area A of asperities."""
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points

@@ -18,8 +18,8 @@ from convexrough.plots.style import DOUBLE, SINGLE, TICK
 def fretting_figures(worn: Fretting) -> Figures:
     """The figure of fretting in a steady cycle.
 
-    "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle, the
-        mean and the largest shear traction, both at the largest force
+    "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle and,
+        at the largest force, the mean and the largest shear traction
     """
     if not worn.contact.loads.any():
         return style.no_contact("fretting")
@@ -62,8 +62,8 @@ def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, sym
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     """The map of derivatives with respect to heights.
 
-    "gradient" : contact discs, coloured by D0 / J times dJ / dz, with the approach D0, the number J
-        and the height z of the asperity; open asperities as dots
+    "gradient" : contact discs, coloured by (D0 / J) dJ / dz, with the approach D0, the
+        differentiated number J and the height z of the asperity; open asperities are dots
     of : symbol of J, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")

@@ -1,6 +1,6 @@
-"""The tables of a scene file as one model: the type of each key, and messages for all mistakes.
+"""The tables of a scene file as one model, with the type of each key and messages for mistakes.
 
-`read_scene` imports this module when a file is read, and not before.
+`read_scene` imports this module only when it reads a file.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class UnitsTable(FileTable):
 
     @property
     def names(self) -> UnitNames:
-        """The units of length and force; force is by default pressure times length squared."""
+        """The units of length and force. By default, force is pressure times length squared."""
         pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
         made = force_of(pressure, length) if pressure and length else ""
         return UnitNames(self.length.strip(), self.force.strip() or made)
@@ -176,7 +176,7 @@ REQUIRED: dict[str, type[FileTable]] = {
 
 
 class Study(FileTable):
-    """All tables of a scene file; `_model` adds the tables of stages."""
+    """All tables of a scene file except those of further stages, which `_model` adds."""
 
     sphere: SphereTable
     material: Annotated[
@@ -194,13 +194,13 @@ class Study(FileTable):
 
     @property
     def stages(self) -> dict[str, Stage]:
-        """The stages that the file requests, in the order of results."""
+        """The stages that the file asks for, by name, in the order of results."""
         found = {name: getattr(self, name) for name in STAGES}
         return {name: stage for name, stage in found.items() if stage is not None}
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: tables that are unknown, missing, or used without another one they require."""
+        """Mistakes: unknown tables, missing tables, and keys that need a key of another table."""
         for name, keys_within in keys.items():
             if name == "sweep":
                 yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"
@@ -219,7 +219,7 @@ class Study(FileTable):
         yield from _unbounded(*(keys.get(name) for name in ("asperities", "normal", "sphere")))
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        """A mistake for a modulus that no solid has, if units are named."""
+        """A mistake for each modulus that no solid has, if the file names units."""
         material, unit = self.material, self.units.names.unit("pressure")
         if unit is None:
             return
@@ -236,7 +236,7 @@ class Study(FileTable):
 
 
 def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
-    """A mistake if a lattice lacks `within` and nothing else limits its number of asperities."""
+    """A mistake if a lattice lacks `within` and nothing else limits the number of asperities."""
     if not isinstance(lattice, dict) or lattice.get("pattern") == "file" or "within" in lattice:
         return
     missing = "[asperities] within: missing, needed with"
@@ -258,7 +258,7 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The checked tables of a parsed file, or None; and the messages, in the order of the file."""
+    """The checked tables of a parsed file or None; and the messages, in the order of the file."""
     if "" in contents:
         return None, ['[""]: unknown table, expected a name']
     model = _model(tuple(STAGES.values()))
@@ -276,7 +276,7 @@ T = TypeVar("T", bound=FileTable)
 
 
 def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list[str]]:
-    """The checked table, or None if it has mistakes; and the messages of all mistakes in it."""
+    """The checked table, or None if it has mistakes; and a message for each mistake in it."""
     try:
         return model.model_validate(keys), []
     except ValidationError as error:

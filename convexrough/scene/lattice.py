@@ -1,4 +1,4 @@
-"""The lattice on which points lie, found from their coordinates."""
+"""The lattice on which given points lie, found from their coordinates."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from convexrough.checks import SMALLEST
 Sites = NDArray[Any]  # whole numbers
 
 #: Largest accepted distance of points from the sites of a lattice, divided by the largest
-#: coordinate. It is a little more than the rounding errors of coordinates.
+#: coordinate. This is a little more than the rounding errors of coordinates.
 SITE_ERROR = 32 * 2.0**-53
 
-#: Largest accepted distance of points from the sites, divided by the spacing.
+#: Largest accepted distance of points from the sites, divided by the spacing of the lattice.
 CLOSEST = 1e-7
 
 #: Lattices with a spacing below this part of the largest coordinate are not used.
@@ -35,10 +35,11 @@ SPARSEST = 50
 class Lattice(Cached):
     """The sites origin + i b1 + j b2 with whole numbers i and j.
 
-    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2: a reduced (shortest) basis
+    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2, a reduced basis (of shortest
+        vectors)
     site_error : [length] bound on the distance of points from their sites along x and along y
-    shrink, unshrunk : if `shrunk` made this lattice, the factors along x and y, and the basis
-        before; else 1, 1 and None
+    shrink, unshrunk : if `shrunk` made this lattice, its factors along x and y, and the basis
+        before shrinking; else 1, 1 and None
     """
 
     origin: Array
@@ -48,8 +49,9 @@ class Lattice(Cached):
     unshrunk: Array | None = None
 
     def shrunk(self, along_x: Fraction, along_y: Fraction) -> Lattice | None:
-        """The lattice of the points times these factors of at most 1; None if `basis` is not
-        reduced any more. `site_error` includes the rounding errors.
+        """The lattice of points whose coordinates are multiplied by these factors of at most 1.
+
+        None if the new basis is not reduced. The new `site_error` includes rounding errors.
         """
         assert self.unshrunk is None
         times = np.array([float(along_x), float(along_y)])
@@ -62,7 +64,7 @@ class Lattice(Cached):
 
     @property
     def exactly(self) -> list[list[Fraction]]:
-        """The rows b1 and b2 of the exact basis, as fractions."""
+        """The rows b1 and b2 of the basis without rounding, as fractions."""
         given = self.basis if self.unshrunk is None else self.unshrunk
         return [[t * Fraction(x) for t, x in zip(self.shrink, row, strict=True)] for row in given]
 
@@ -74,16 +76,18 @@ class Lattice(Cached):
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
-        """The lattice on which these points (n, 2) lie, up to rounding, each on a different site.
+        """The lattice on which these points (n, 2) lie, up to rounding, each on its own site.
 
-        None if there is none, or if the spacing is too small for float64.
+        None if there is no such lattice, if its spacing is too small for float64, or if it has far
+        more sites than points.
         """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points. For sites relative to their middle, the fits decouple.
+        # Fit origin and basis to all points. With sites relative to the middle, the two fits
+        # decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
@@ -113,7 +117,7 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 
 
 def _shortest(points: Array) -> Array | None:
-    """The reduced basis (2, 2), from points near the origin; None if these are on a line."""
+    """The reduced basis (2, 2), from points near the origin; None if they lie on one line."""
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]

@@ -12,13 +12,14 @@ from convexrough.errors import InputError
 class Material:
     """The material of both bodies; `pair` combines two different materials.
 
-    contact_modulus : [force / length^2] E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2, with
-        the Young's moduli E and Poisson's ratios nu of bodies 1 and 2
-    poisson_ratio   : nu, from 0 to 0.5; for a pair the mean weighted by 1 / G (shear modulus G)
+    contact_modulus : [force / length^2] E*, where 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
+        with the Young's moduli E and Poisson's ratios nu of bodies 1 and 2
+    poisson_ratio   : nu, from 0 to 0.5. For a pair it is the mean, weighted by 1 / G with the shear
+        moduli G
     hardness        : [force / length^2] mean pressure at which asperities yield; None if unknown.
-        It is used only for a warning
-    mismatch        : Dundurs' beta of a pair, 0 for equal materials. It measures the coupling of
-        normal and tangential displacements, which is neglected
+        The value is used only for a warning
+    mismatch        : Dundurs' beta of a pair, 0 for equal materials. This number measures the
+        coupling of normal and tangential displacements, which the package neglects
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")
@@ -54,7 +55,7 @@ class Material:
     def from_youngs(
         cls, modulus: float, poisson_ratio: float, hardness: float | None = None
     ) -> Material:
-        """The material if both bodies have the same elastic constants: E* = E / (2 (1 - nu^2)).
+        """The material of bodies with the same elastic constants; E* = E / (2 (1 - nu^2)).
 
         modulus : [force / length^2] Young's modulus E;  hardness : as in `Material`
         """
@@ -96,10 +97,13 @@ class Material:
 
     @property
     def youngs_modulus(self) -> float:
-        """[force / length^2] E = 2 (1 - nu^2) E*, of two equal bodies with this E* and nu."""
+        """[force / length^2] E = 2 (1 - nu^2) E* of two equal bodies with this E* and nu."""
         return 2.0 * (1.0 - self.poisson_ratio**2) * self.contact_modulus
 
     @property
     def shear_modulus(self) -> float:
-        """[force / length^2] G = E / (2 (1 + nu)) = (1 - nu) E*; 2 / G = 1 / G_1 + 1 / G_2."""
+        """[force / length^2] G = (1 - nu) E* of two equal bodies with this E* and nu.
+
+        For a pair, 2 / G = 1 / G_1 + 1 / G_2.
+        """
         return (1.0 - self.poisson_ratio) * self.contact_modulus

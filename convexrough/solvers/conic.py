@@ -1,14 +1,15 @@
-"""The contact law as one second-order cone program: boxes of loads, checks of answers, Clarabel.
+"""The contact law as one second-order cone program, and its solution by Clarabel.
 
 docs/theory/exact-cones.md states the program (1) and proves that its solution satisfies the contact
 law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
-approach; if the load is prescribed, an upper bound takes the place of the approach.
+approach. If the load is prescribed, the approach is unknown, and an upper bound replaces it.
 
-The loads are limited to boxes 0 <= P_i <= B_i ("Which box" of that page). The numbers
-S_i = (3/2) sigma_i B_i^(1/3) / k_i, with the coefficients k, must be at most 21/25 for the form
-with four cones per asperity, or 1 for that with five. Where S_i would be larger, B_i is reduced:
-the box is cut. If a cut box limits a load, five cones are tried; if that happens again, the scene
-is refused.
+The loads are limited to boxes 0 <= P_i <= B_i ("Which box" of that page). Let the number S_i be
+(3/2) sigma_i B_i^(1/3) / k_i, with Hertz's coefficients k_i. It must be at most 21/25 in the form
+of the program with four cones per asperity, and at most 1 in the form with five. Where S_i would be
+larger, B_i is reduced. A box is called cut if B_i is below the a priori bound, which is the load
+that the asperity would carry alone. If a cut box limits a load, the program with five cones is
+tried; if a cut box limits a load again, the scene is refused.
 """
 
 from __future__ import annotations
@@ -30,21 +31,23 @@ from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
 #: Asperities whose a priori bound on the load is below this part of the largest such bound are left
-#: out of the program. A Newton step can give them a load. A heuristic: all loads are checked.
+#: out of the program. The Newton step can still give them a load. The value can be a heuristic,
+#: because all loads are checked.
 NEGLIGIBLE = 1e-12
 
-#: Contact radius at the upper end of a box that is not cut, divided by the contact radius at the a
-#: priori bound on the load. If the box ended at this bound, an isolated asperity would have a slack
-#: and a multiplier of 0, and interior-point methods would lose half their digits. A heuristic.
+#: Largest contact radius at the upper end of a box, divided by the contact radius at the a priori
+#: bound on the load. If the box ended at this bound, an isolated asperity would have a slack and a
+#: multiplier that are both 0, and interior-point methods would lose half their digits. A heuristic.
 WIDENED = 1.1
 
 #: With a Newton step: the largest accepted residual of the contact law, divided by |D0| + max |d_i|
-#: with the approach D0 and the offsets d. If the first step leaves more, a second one follows.
+#: with the approach D0 and the offsets d. If the residual is larger after the first step, a second
+#: step follows.
 ACCURATE = 1e-13
 
 #: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
-#: the tolerance: errors of loads are proportional to the root of that of the energy. P(delta) is
-#: Hertz's load at the indentation delta. The value is a heuristic.
+#: the tolerance. Here P(delta) is Hertz's load at the indentation delta. The square root is taken
+#: because an error of the energy causes errors of loads in proportion to its root. A heuristic.
 ROOTS = 10.0
 
 #: Number of asperities from which Clarabel's supernodal factorisation is faster.
@@ -56,11 +59,12 @@ STOPPED = ("Solved", "AlmostSolved")
 
 
 class TooDenseError(InputError):
-    """Some asperities have contact radii too large for a convex program: a_i > (pi/2) s_i.
+    """Some asperities are pressed to contact radii that are too large for a convex program.
 
     asperities : (m,) the indices of these asperities in the scene
-    ratios     : (m,) an estimate of the contact radius that each would have if its box did not
-        limit its load, divided by (pi/2) s_i; s_i is half the distance to the nearest neighbour
+    ratios     : (m,) for each, an estimate of the contact radius that it would have if its box did
+        not limit its load, divided by (pi/2) s_i, where s_i is half the distance to the nearest
+        neighbour. The form with five cones needs ratios below 1
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -83,7 +87,7 @@ class ConeBoxes:
 
     members : (m,) the asperities in the program, as indices into `problem.candidates`
     loads   : (m,) B_i, upper ends of the boxes
-    S       : (m,) convexity numbers of the boxes
+    S       : (m,) the numbers S_i of the boxes
     cut     : (m,) True where B_i is below the a priori bound, the load that the asperity would
         carry alone (`NormalProblem.bounds`)
     five    : True for the form with five cones per asperity, False for four
@@ -99,7 +103,7 @@ class ConeBoxes:
 
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
-        """Boxes that end above the a priori bounds, cut where S_i would exceed `limit`."""
+        """Boxes that end above the a priori bounds, or lower where S_i would exceed `limit`."""
         bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
         bounds, k = bounds[members], problem.coefficients[members]
@@ -133,17 +137,18 @@ class ConeBoxes:
 
 @dataclass(frozen=True)
 class ConeSolver(ABC):
-    """Base class of the solvers of the cone program; it checks their answers.
+    """Base class of the solvers of the cone program. The class checks their answers.
 
     tolerance   : tolerance of the cone solver, in scaled units
-    newton_step : True to end with a step of Newton's method, which reduces errors of some 1e-8 of
-        the largest load to rounding. If one step is not accurate enough, a second follows
+    newton_step : True to end with a step of Newton's method, which reduces errors of about 1e-8 of
+        the largest load to rounding errors. If one step is not accurate enough, a second follows
 
-    The checks use the loads P, gaps g, approach D0, offsets d and D = D0 + d. With `newton_step`,
-    |g_i| where loaded and -g_i elsewhere must be at most 1e-13 (|D0| + max |d_i|). Without it,
-    |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance) times the largest load, where
-    P(delta) is Hertz's load at the indentation delta. If a check fails, SolverError is raised. If
-    the cut boxes do not contain the solution, TooDenseError is raised.
+    With the loads P, gaps g, approach D0, offsets d and D = D0 + d, the checks are as follows. With
+    `newton_step`, |g_i| at loaded asperities and -g_i at all others must be at most 1e-13
+    (|D0| + max |d_i|). Without it, |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance)
+    times the largest load, where P(delta) is Hertz's load at the indentation delta. If a check
+    fails, SolverError is raised. If the cut boxes do not contain the solution, TooDenseError is
+    raised.
     """
 
     tolerance: float = 1e-9
@@ -181,7 +186,7 @@ class ConeSolver(ABC):
 
 
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
-    """The checked solution of the cone program on these boxes."""
+    """The solution of the cone program on these boxes, after all checks."""
     most = float(boxes.loads.sum())
     if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
@@ -230,7 +235,7 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) `TooDenseError.ratios` of members whose load a cut box limits; 0 for other members.
+    """(m,) `TooDenseError.ratios` of members whose load is limited by a cut box; 0 for the others.
 
     indentation : (n,) D - A P for P = `loads`
     """
@@ -248,9 +253,9 @@ def _after_newton_step(
 
     alone : (n,) Hertz's loads at the indentations D - A P for P = `loads`
 
-    An error e of the loads changes the indentation k_i P_i^(2/3) by h_i e_i, with the compliance
-    h_i, and D - A P by -A e. So asperity i starts from its load in `alone` where h_i exceeds the
-    sum of row i of A, and from its load in `loads` elsewhere.
+    An error e of the loads changes k_i P_i^(2/3) by h_i e_i, with the compliance h_i, and D - A P
+    by -A e. So the load `alone` of asperity i is more accurate if h_i exceeds the sum of row i of
+    A. The first step then starts from this load, and otherwise from that in `loads`.
     """
     light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)
@@ -311,9 +316,9 @@ class Conic(ConeSolver):
 class LiftedProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity these
-    stand for powers of t = (p / B)^(1/3), where B is the upper end of the box: t^2 to t^5, and
-    t^5 - t^6. The form with five cones, for larger boxes, also has y1 for t, before y2.
+    The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity, let
+    t = (p / B)^(1/3), where B is the upper end of the box. Then y2 to y5 stand for t^2 to t^5, and
+    z for t^5 - t^6. The form with five cones, for larger boxes, also has y1 for t, before y2.
     """
 
     problem: NormalProblem
@@ -326,7 +331,7 @@ class LiftedProgram:
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:
-        """The program; its rows are the prescribed total load, if any, p = B y3, and the cones."""
+        """The program. Its rows are the prescribed total, if any, then p = B y3, then the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, boxes = self.problem, self.boxes
@@ -359,7 +364,7 @@ class LiftedProgram:
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads and the approach, which follows from the multiplier of a prescribed load."""
+        """The loads and the approach, which is found from the multiplier if the load is given."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

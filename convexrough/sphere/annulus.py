@@ -1,12 +1,13 @@
 """The tangential law of one sphere, as polynomials of the width of its slip annulus.
 
-Let s = c / a be the stick radius over the contact radius, x = 1 - s, t = |Q| / (f P) the shear
-force over the friction limit, and phi the deflection over its largest value. In partial slip
+Let s = c / a be the stick radius divided by the contact radius, x = 1 - s the width of the annulus,
+t = |Q| / (f P) the shear force divided by the friction limit, and phi the deflection divided by its
+largest value. In partial slip
 
     t = 1 - s^3,    phi = 1 - s^2,
 
-and the energies of `mindlin` are polynomials of x. They are written without subtractions, so that
-each keeps its relative accuracy down to x = 0. The sphere slides at x = 1.
+and the energies of `mindlin` are polynomials of x. The code writes them with s = 1 - x as sums of
+positive terms, so that each keeps its relative accuracy down to x = 0. The sphere slides at x = 1.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def width_under(force: Number) -> Number:
 
 
 def width_between(force: Number, left: Number) -> Number:
-    """The width x under a force t >= 0, with `left` = 1 - t given to full relative accuracy."""
+    """The width x under a force t >= 0; `left` is 1 - t, given to full relative accuracy."""
     s = np.cbrt(np.maximum(left, 0.0))
     return np.minimum(force, 1.0) / (1.0 + s + s * s)
 

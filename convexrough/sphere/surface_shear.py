@@ -1,12 +1,13 @@
 """One sphere under a shear force along x: traction and tangential displacement of the surface.
 
-In the theory of Cattaneo and Mindlin, with t = Q / (f P), the peak pressure p0, the contact radius
-a and the stick radius c = a (1 - |t|)^(1/3), the traction is
+The theory is that of Cattaneo and Mindlin. Let Q be the shear force, P the load, f the coefficient
+of friction, t = Q / (f P), p0 the peak pressure, a the contact radius and c = a (1 - |t|)^(1/3) the
+stick radius. For t >= 0 the traction is
 
-    q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)],    the last root 0 for r > c.
+    q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)],
 
-Both terms become equal as t -> 0. The functions use 1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from
-`mindlin.deflection`, and so keep their relative accuracy.
+without the second term for r > c. As t -> 0, both terms become equal. The functions use
+1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from `mindlin.deflection`, and so keep their relative accuracy.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 7.
 """
 
@@ -23,8 +24,8 @@ def traction(distance: Number, contact_radius: Number, share: Number, peak: Numb
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2]
 
-    It is computed as A - C = (A^2 - C^2) / (A + C), with A = sqrt(1 - r^2/a^2) and
-    C = sqrt(c^2/a^2 - r^2/a^2), or C = 0 in the slip annulus.
+    The code computes A - C = (A^2 - C^2) / (A + C), where A = sqrt(1 - r^2/a^2) and
+    C = sqrt(c^2/a^2 - r^2/a^2). In the slip annulus, C = 0.
     """
     left_by_stick = np.abs(mindlin.deflection(share))  # 1 - c^2/a^2
     ratio = np.divide(distance, contact_radius)
@@ -43,7 +44,7 @@ def surface_displacement(
     shear_modulus: float,
     poisson_ratio: float,
 ) -> Number:
-    """[length] the sum of both surfaces' displacements along x, at the point (x, y).
+    """[length] the sum of the displacements of both surfaces along x, at the point (x, y).
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2];  shear_modulus : G
 
@@ -52,14 +53,15 @@ def surface_displacement(
         (q0/(4 G a)) {(2 - nu) [pi (a^2 - b^2) + r^2 (sin(2 phi)/2 - phi cos(2 phi))]
                       + (nu/2) (x^2 - y^2) [phi - sin(4 phi)/4]},   sin(phi) = b/r,  b = min(a, r)
 
-    (Johnson 3.91; [A3] of the source paper, corrected). The stick disc subtracts the same term with
-    c in place of a, except in q0/a. The differences of both brackets follow from the accurate angle
-    phi_a - phi_c by the addition theorems of sine and cosine.
+    (Johnson 3.91; [A3] of the source paper, corrected). The stick disc subtracts the same
+    expression with c in place of a, except in q0/a. The difference of the two values of each
+    bracket is computed by the addition theorems of sine and cosine from the angle phi_a - phi_c,
+    which is accurate.
     """
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
     slip_area = a_squared * np.abs(
         mindlin.deflection(share)
-    )  # a^2 - c^2, an area over pi like all areas here
+    )  # a^2 - c^2; all areas here are divided by pi
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
     sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a)

@@ -4,8 +4,8 @@ Each pixel is a rectangle of uniform pressure p on an elastic half-space. The co
 
     p >= 0,    g = K p - h >= 0,    p g = 0
 
-for each pixel. Here g is the gap, h the overlap of the undeformed bodies at the approach, and K the
-compliance operator of the half-space. Pixels with h <= 0 are open, because pressures can only
+for each pixel. Here g is the gap, h the overlap of the undeformed bodies at the given approach, and
+K the compliance operator of the half-space. Pixels with h <= 0 are open, because pressures can only
 increase gaps.
 """
 
@@ -28,7 +28,8 @@ from convexrough.influence.convolution import SiteBox
 from convexrough.record import Along, Table
 from convexrough.surface.surface import Surface
 
-#: Largest number of steps of conjugate gradients; accepted error of gaps over the largest overlap.
+#: Largest number of steps of conjugate gradients, and accepted error of gaps, divided by the
+#: largest overlap.
 STEPS, ACCURACY = 2000, 1e-4
 
 
@@ -42,7 +43,7 @@ def half_space(
     """The operator from pressures to the sum of the displacements of both bodies.
 
     A pixel of unit pressure displaces a point by (1 / (pi E*)) times the integral of 1/r over the
-    pixel, where r is the distance from this point. Love (1929) gives it in closed form.
+    pixel, where r is the distance from this point. Love (1929) gives this integral in closed form.
     """
 
     def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
@@ -63,9 +64,9 @@ def touch(
     """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
     This is the method of Polonsky and Keer (Wear 231, 1999) at a given approach. Each step sets
-    negative pressures to 0 and adds pixels on which the bodies overlap. After an addition the
-    search directions restart. The method ends if |g| <= accuracy * max h on pixels with p > 0, and
-    g >= -accuracy * max h on pixels with p = 0 < h.
+    negative pressures to 0, and pixels on which the bodies overlap are added to the touching ones.
+    After an addition the search directions restart. The method ends if |g| <= accuracy * max h on
+    pixels with p > 0, and g >= -accuracy * max h on pixels with p = 0 < h.
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
@@ -99,14 +100,14 @@ def touch(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Whole(Table):
-    """The contact of a whole map by boundary elements, and of the asperities at the same approach.
+    """The contact of a whole map, by boundary elements, and of asperities at the same approach.
 
     contact   : contact of the asperities
     pressures : (ny, nx) [force/length^2] pressures on the pixels
     loads     : (n,) [force] total load on the pixels nearest to each asperity
     load, area : [force], [length^2] total load and contact area of the map
-    pieces    : number of connected sets of loaded pixels
-    resolution : relative change of the load for pixels twice as wide, an indication of the error
+    pieces    : number of connected regions of loaded pixels
+    resolution : relative change of the load if pixels are twice as wide, which indicates the error
         due to the pixel size
     """
 
@@ -121,7 +122,7 @@ class Whole(Table):
     resolution: float
 
     def compared(self) -> list[tuple[str, float, float]]:
-        """Rows of three: a quantity, its value for the asperities, its value for the whole map."""
+        """Rows of a quantity, its value for the asperities, and its value for the whole map."""
         model = self.contact
         area = float((np.pi * model.contact_radii**2).sum())
         touching = int(np.count_nonzero(model.loads))
@@ -142,7 +143,7 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits, which gives the approach and the (centred) sphere
+    contact : contact of the map's summits. Its approach is used, and its sphere, centred on the map
 
     Raises InputError if the asperities are not `Summits` of this map, if no pixel touches, or if
     the contact reaches the edge of the map.

@@ -11,24 +11,25 @@ from convexrough.arrays import Array, Indices
 #: Steps (row, column) from a pixel to the four neighbours with which it shares a side.
 SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
-#: Entries of a map in which holes are numbered: for a pixel with a height, and outside of the map.
+#: Entries in a map of hole numbers: for a pixel that has a height, and outside of the map.
 KNOWN, OUTSIDE = -1, -2
 
-#: Least distance of a spike's height from the median, divided by the standard deviation that the
+#: Least difference of a spike's height from the median, divided by the standard deviation that the
 #: quartiles of the heights suggest.
 OUTLYING = 6.0
 
 
-#: About this many pixels form the sample in which `repeated` counts heights.
+#: Approximate number of pixels in the sample in which `repeated` counts heights.
 SAMPLE = 2**17
 
 
 def spikes(heights: Array) -> Indices:
-    """(m, 2) row and column of outlying pixels of which at most one neighbour is similar.
+    """(m, 2) row and column of outlying pixels that have at most one similar neighbour.
 
     A pixel is outlying if its height differs from the median by more than OUTLYING standard
-    deviations. A neighbour is similar if its height differs from that of the pixel by less than
-    half of this difference. Holes (nan) are neither outlying nor similar.
+    deviations. One of the eight neighbours is similar if the heights of neighbour and pixel differ
+    by less than half of the difference between pixel and median. Holes (nan) are neither outlying
+    nor similar.
     """
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
@@ -44,8 +45,9 @@ def spikes(heights: Array) -> Indices:
 def clipped(heights: Array) -> int:
     """The number of pixels with the largest height if these are surprisingly many, else 0.
 
-    They are many if there are at least ten, and more than all other pixels together whose heights
-    are at most 1 % of the range below the largest height, or equal the second largest height.
+    They are surprisingly many if there are at least ten, and more than there are pixels just below.
+    A pixel is just below if its height is less than the largest one by at most 1 % of the range of
+    heights. If there is no such pixel, those with the second largest height count instead.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -55,10 +57,11 @@ def clipped(heights: Array) -> int:
 
 
 def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height; 0 if it is the largest or not surprising.
+    """The number of pixels with the most frequent height if it is surprising, else 0.
 
-    The number is surprising if the height is 20 times as frequent in a sample as any other height,
-    and occurs on at least 20 pixels of the sample.
+    The number is surprising if the height is at least 20 times as frequent in a sample as any other
+    height, and occurs on at least 20 pixels of the sample. The largest height does not count:
+    `clipped` treats it.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)
@@ -70,9 +73,10 @@ def repeated(heights: Array) -> int:
 
 
 def copied(heights: Array) -> float:
-    """The share of rows that equal the row before, or that of columns if this is larger.
+    """The share of rows that equal the row before, or of columns that equal the column before.
 
-    Rows and columns in which all heights are equal do not count.
+    The result is the larger of the two. Rows and columns in which all heights are equal do not
+    count.
     """
     return max(
         float(((lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)).mean())
@@ -83,9 +87,9 @@ def copied(heights: Array) -> float:
 
 
 def filled(heights: Array) -> Array:
-    """The map with holes (nan) filled; each is the mean of the pixels with which it shares a side.
+    """The map with filled holes (nan): each is the mean of the pixels that share a side with it.
 
-    So no filled pixel becomes a summit. At least one pixel must not be a hole.
+    So no filled pixel becomes a summit. At least one pixel of the map must not be a hole.
     """
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:

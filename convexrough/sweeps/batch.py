@@ -37,9 +37,10 @@ Row = tuple[str, str, list[float]]
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of a grid over keys of the scene file at `path`.
+    """The scenes of a sweep over a grid of values for keys of the scene file at `path`.
 
-    Paths in the tables are relative to the folder of this file.
+    `tables` are the contents of this file without [sweep]. Paths in them are relative to its
+    folder.
     """
 
     grid: Grid
@@ -51,7 +52,7 @@ class Tables:
         return self.grid.count
 
     def labels(self, numbers: range) -> Columns:
-        """The columns that identify scenes: the swept keys, and the seed."""
+        """The columns that identify scenes: the swept keys and the seed."""
         points = [self.grid.point(number) for number in numbers]
         known = table_in(self.tables, "asperities").get("seed", NO_SEED)
         found: Columns = {}
@@ -65,11 +66,11 @@ class Tables:
         return found | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
-        """The source of the scenes with these numbers, for a worker."""
+        """A source that contains the scenes with these numbers, for a worker."""
         return self
 
     def opened(self) -> Callable[[int], Task]:
-        """A function that makes the scene of a number; consecutive scenes share common data."""
+        """A function from numbers to scenes; consecutive scenes share common data."""
         layouts: Any = {
             "summits": lru_cache(KEPT)(read_summits),
             "lattice": lru_cache(KEPT)(regular),
@@ -124,7 +125,7 @@ Source: TypeAlias = Tables | Tasks
 
 @dataclass(frozen=True)
 class Batch:
-    """Consecutive scenes of a source, by their numbers, and the columns to measure."""
+    """The numbers of consecutive scenes of a source, and the columns to measure."""
 
     source: Source
     columns: tuple[Column, ...]
@@ -147,9 +148,9 @@ class Batch:
 def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     """The columns of a batch, and the versions of the packages that computed them.
 
-    The values of a scene do not depend on the other scenes of the batch. The last bits of its error
-    bounds may, because the rounding of matrix products depends on the number of rows. The row of a
-    failed scene contains the message of its error.
+    The values of a scene do not depend on the other scenes of the batch. But the last bits of error
+    bounds may depend on them, because the rounding of matrix products depends on the number of
+    rows. The row of a failed scene contains the message of its error.
     """
     with one_thread():
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
@@ -165,7 +166,7 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
 
 
 def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
-    """The row of a scene; `known` has its numbers if it was computed together with others."""
+    """The row of a scene; `known` holds its numbers if they were measured with those of others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)
@@ -184,7 +185,7 @@ def _failed(error: Exception, columns: Sequence[Column]) -> Row:
 
 
 def different(versions: Mapping[str, str]) -> str:
-    """The versions that differ from those of this process, as text; "" if none differs."""
+    """The versions that differ from those in this process, as text; "" if there are none."""
     said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
             if versions.get(name) != here)  # fmt: skip
     return ", ".join(said)

@@ -20,14 +20,14 @@ Columns = dict[str, list[Any]]
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: Errors from a file that is corrupted, or not in the format of its extension, besides OSError.
+#: Errors, besides OSError, from a file that is corrupted or not in the format of its extension.
 #: `foreign` converts errors of other packages to ValueError.
 SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Raise a FileError for every error that keeps a file from being read."""
+    """Turn every error that keeps a file from being read into a FileError."""
     try:
         yield
     except ConvexroughError:
@@ -48,7 +48,7 @@ def foreign() -> Iterator[None]:
     """Turn any error that another package raises on a corrupted file into a ValueError.
 
     numpy, scipy, pyarrow and openpyxl raise errors of many kinds that they do not document. The
-    body should only call readers.
+    body of the `with` statement should only call readers.
     """
     try:
         yield
@@ -59,7 +59,7 @@ def foreign() -> Iterator[None]:
 
 
 def needed(path: Path, package: str) -> Any:
-    """The imported package that reads such a file. Raises FileError if it is not installed."""
+    """The imported `package`, which reads such files. Raises FileError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -89,10 +89,11 @@ def named_arrays(path: Path) -> dict[str, Any]:
 def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     """Columns of a file by name; columns without names are numbered from "1".
 
-    known : names to read, in lower case; other columns are kept only if they have the same length
+    known : names to read, in lower case; other columns are kept only if they have the same length.
+        If no column has one of these names, all columns are read
 
-    Raises FileError if the package for such files is missing or no columns are found, OSError, and
-    the errors of corrupted files.
+    Raises FileError if the package for such files is missing or no columns are found; OSError; and
+    ValueError, or another error of corrupted files, if the file is corrupted or lengths differ.
     """
     named = named_arrays(path)
     (first, values), *others = named.items() or [("", np.zeros(0))]
@@ -117,7 +118,7 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
 
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
-    """All vectors; or, if the arrays `known` have one two-dimensional shape, all of this shape."""
+    """All vectors or, if the `known` arrays have one shape of two dimensions, all of that shape."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
@@ -138,7 +139,7 @@ def _table(values: NDArray[Any]) -> Columns:
 
 
 def _matlab(path: Path) -> dict[str, Any]:
-    """The variables of a file, or the fields of its only variable if that is a structure."""
+    """The variables of a file or, if its only variable is a structure, the fields of this."""
     from scipy.io import loadmat  # takes 0.1 s to import
 
     with path.open("rb") as raw:

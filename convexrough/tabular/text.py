@@ -2,7 +2,7 @@
 
 Common readers either support neither decimal commas nor D exponents (csv.Sniffer, numpy.loadtxt) or
 stop at the first mistake without showing the line (pandas, polars). So this module chooses the
-style, and the standard library splits the lines.
+separator and the decimal mark, and the standard library splits lines.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 #: The sign # that starts a comment, but not the # in #N/A or -1.#IND.
 _SIGN = r"#(?![A-Z]+[/!?])"
 
-#: The beginning of a line that is a comment, and of a comment that follows cells on their line.
+#: The beginning of a line that is a comment, and of a comment that follows cells on a line.
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 #: `_GROUPED`: a number whose digits are certainly in groups of three, as 1,234,567.
-#: `_PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
+#: `_PERHAPS_GROUPED`: a number such as 3,134, in which the mark can also be a decimal mark.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
@@ -74,7 +74,7 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells, the decimal mark, and for a workbook the name of the sheet."""
+    """The separator of cells, the decimal mark and, for a workbook, the name of the sheet."""
 
     separator: str
     decimal: str
@@ -109,7 +109,7 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[str]) -> Array | None:
-        """The numbers in cells; None if any cell is not a number. Plain numbers are faster."""
+        """The numbers in cells; None if any cell is not a number. Plain numbers are read faster."""
         joined = "\n".join(cells)
         if "_" not in joined and (self.decimal == "." or "." not in joined):
             with suppress(ValueError):
@@ -129,7 +129,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 class TextRow(NamedTuple):
-    """A line of a file: its number, text and cells; `wrong` is the error if it cannot be split."""
+    """A line of a file: its number, text and cells; `wrong` is the error if splitting failed."""
 
     number: int
     text: str
@@ -138,7 +138,7 @@ class TextRow(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """The header of a file, whose cells are names, or None; the rows, the style, and comments."""
+    """The header of a file (a row of names) or None; the other rows; the style; the comments."""
 
     header: TextRow | None
     rows: list[TextRow]
@@ -153,7 +153,7 @@ def bare(name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """The unit in the name of a column, in brackets or after a slash; else ""."""
+    """The unit in the name of a column, in brackets or after a slash; "" if there is none."""
     found = _with_unit(name)
     return (found["unit"] or found["per"] or found["tight"] or "").strip() if found else ""
 
@@ -169,10 +169,10 @@ def read_text_table(
     comment: re.Pattern[str] = COMMENT,
     required: Sequence[str] = (),
 ) -> TextTable:
-    """The cells of a text file or workbook. Raises FileError if it is empty or of another kind.
+    """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
-    known : names of columns, in lower case; the line with most of them is the header
-    required : those of them without which a sheet of a workbook is not read if another has them
+    known : names of columns, in lower case; the line with most of these names is the header
+    required : the names in `known` that decide which sheet of a workbook is read: the one with most
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
@@ -211,7 +211,7 @@ def read_text_table(
 def _headed(
     rows: list[TextRow], title: str, style: Style, known: Sequence[str]
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header, with units if the next line has them, or None; and the rows below them."""
+    """The header or None, and the rows below; a header gets the units that the next line has."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -242,7 +242,7 @@ def _headed(
 def _listed(
     header: list[str], line: TextRow, rows: list[TextRow], style: Style
 ) -> tuple[list[str], list[TextRow]]:
-    """Names and rows of a finite-element listing, without titles and repetitions of `line`."""
+    """Names and rows of a finite-element listing, without titles and repeated header lines."""
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
     width = len(rows[first].cells) if rows else 0
     apart = re.split(r"\s{2,}", line.text.strip())
@@ -285,10 +285,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _sheet_lines(
     path: Path, known: Sequence[str], required: Sequence[str]
 ) -> tuple[str, Iterator[tuple[int, str]]]:
-    """The name and the numbered rows of the first sheet with most of the columns `required`.
+    """The name and the numbered rows of the sheet that has most of the columns `required`.
 
-    Without any, it is the first with a column of `known`, or the first. Tabs separate cells. The
-    name is in quotes, and followed by the names of other sheets that would do as well.
+    Of equal sheets, those with a column of `known` are preferred, then the first. Tabs separate
+    cells. The name is in quotes, and followed by the names of other sheets that are as suitable.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -315,7 +315,7 @@ def _sheet_lines(
 
 
 def _plain(cell: Any) -> str:
-    """The text of a cell on one line, without quotes; a decimal comma becomes a point."""
+    """The text of a cell, on one line and without quotes, with a point for a decimal comma."""
     text = " ".join(str(cell).replace('"', "").split())
     return text if Style("\t", ",").number(text) is None else text.replace(",", ".")
 
@@ -358,7 +358,8 @@ def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style)
     """Raise FileError for numbers with thousands separators.
 
     Numbers such as 3,134 could have three decimals. They are refused if a column contains at least
-    ten of them, also whole numbers below 1000, and at most one cell of another form.
+    ten such numbers and at least one whole number below 1000, but at most one cell of any other
+    form.
     """
     columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
     for number, line in lines:
@@ -393,7 +394,7 @@ def _row(number: int, text: str, style: Style) -> TextRow:
 
 
 def _header(text: str, style: Style) -> list[str]:
-    """The cells of a header line: names of columns, each with the unit in brackets after it."""
+    """The cells of a header line: names of columns, each perhaps followed by a unit in brackets."""
     row = _row(0, _UNIT_APART.sub("", text) if style.separator == " " else text, style)
     return row.cells or [text]
 
@@ -415,7 +416,7 @@ def _stripped(cells: list[str]) -> list[str]:
 def _trimmed(
     header: TextRow | None, rows: list[TextRow], style: Style
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """Header and rows without trailing empty cells; R's nameless row numbers get the name ""."""
+    """Header and rows without empty cells at the end; the column of R's row numbers is named ""."""
     if header is None:
         width = max((len(_stripped(row.cells)) for row in rows), default=0)
     else:

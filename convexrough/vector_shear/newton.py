@@ -1,12 +1,12 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-docs/theory/vector-friction.md, "Newton's method", describes it. The unknown eta_i is the sum of
-deflection and slip of asperity i. For the forces q, their total T, the kernel B and the rigid
-displacement X, all in scaled units, `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", describes the method. The unknown eta_i is the
+sum of deflection and slip of asperity i. With the forces q, their total T, the kernel B and the
+rigid displacement X, all in scaled units, `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-With the derivative dq_i/deta_i = W_i W_i' (2, 2) of each asperity, a step solves
+The derivative of each asperity is the matrix dq_i/deta_i = W_i W_i' (2, 2). A step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
 """
@@ -28,7 +28,7 @@ from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 @dataclass(frozen=True)
 class FrictionNewton:
-    """A solver of `shear_vector` by Newton's method, which starts from the state of `shear`.
+    """A solver for `shear_vector`: Newton's method, started from the state that `shear` finds.
 
     The method stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not
     halve this residual. If this takes more than `max_iterations` steps, `shear_vector` raises
@@ -65,7 +65,7 @@ class FrictionNewton:
 
 
 class _At(NamedTuple):
-    """What the law knows at a state, besides the fields of `newton.Iterate`."""
+    """Values at a state that are not among the fields of `newton.Iterate`."""
 
     coupling: Array  # (n, 2) B q
     roots: Array  # (n, 2, 2) W
@@ -83,7 +83,7 @@ class _Friction:
     unit: ClassVar[str] = "the displacement"
 
     def evaluate(self, unknown: Array) -> newton.Iterate | None:
-        """The state at eta, shifted so that forces add up to T; None if no shift is found."""
+        """The state at eta plus a shift with which forces add up to T; None if none is found."""
         problem = self.problem
         shifted = _onto_total(problem, unknown, self.total)
         if shifted is None:
@@ -103,7 +103,7 @@ class _Friction:
         return newton.Iterate(shifted, q, defect, energy, residual, scale, at)
 
     def direction(self, state: newton.Iterate, left: float) -> Array:
-        """The Newton step, from a direct solution that needs no tolerance."""
+        """The Newton step. The linear system is solved directly, so `left` is not used."""
         return _direction(self.problem, state)
 
     def gradient(self, state: newton.Iterate) -> Array:
@@ -117,7 +117,7 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: newton.Iterate) -> float:
-        """A lower bound on the rounding error of F; on symmetric layouts it ends the iteration."""
+        """A lower bound on the rounding error of F. It ends the iteration on symmetric layouts."""
         return ROUNDOFF * state.scale
 
     def advice(self, state: newton.Iterate) -> str:
@@ -127,8 +127,8 @@ class _Friction:
 def _direction(problem: FrictionProblem, state: newton.Iterate) -> Array:
     """The step d(eta).
 
-    If the matrix is not positive definite, the shift, a diagonal that makes the kernel positive
-    semidefinite, is added to the kernel.
+    If the matrix is not positive definite, a diagonal that makes the kernel positive semidefinite
+    is added to the kernel.
     """
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
@@ -172,7 +172,7 @@ def _roots(problem: FrictionProblem, eta: Array) -> Array:
 
 
 def _onto_total(problem: FrictionProblem, eta: Array, total: Array) -> Array | None:
-    """eta + s, with the vector s for which forces add up to T; None if it is not found."""
+    """eta + s with the vector s for which the forces add up to T; None if no s is found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
     size = float(np.hypot(*total))

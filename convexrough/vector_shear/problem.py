@@ -1,19 +1,23 @@
-"""The friction problem of the loaded asperities: docs/theory/vector-friction.md.
+"""The friction problem of the loaded asperities, with vectors of shear forces.
+
+docs/theory/vector-friction.md derives the equations.
 
 Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
 in units of c_t f^2, with Poisson's ratio nu and Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An
 asperity with the load P and the shear force u has the deflection
-own(u) = threshold [1 - (1 - u / P)^(2/3)] with threshold = k P^(2/3) and Hertz's coefficient k. An
-asperity that must take up a displacement longer than threshold slides. With the compliance operator
-A and bias = nu / (2 - nu) the tangential kernel is, by (1) of that page,
+own(u) = threshold [1 - (1 - u / P)^(2/3)], where threshold = k P^(2/3) and k is Hertz's
+coefficient. An asperity that must take up a displacement longer than threshold slides. Let A be the
+compliance operator and bias = nu / (2 - nu). By (1) of the page above, the tangential kernel is
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'],
 
-for the unit vector d from j to i. Q is the shear force, and T = Q / f. The forces q_i on the
-asperities have sizes |q_i| <= P_i and the sum T. With the rigid displacement X the forces and slips
-satisfy
+where d is the unit vector from j to i. Q is the shear force on the contact, and T = Q / f. The
+forces q_i on the asperities add up to T, and |q_i| <= P_i. With the rigid displacement X, forces
+and slips satisfy
 
-    X = own(q_i) + (B q)_i + slip_i,   own(q) parallel to q.
+    X = own(q_i) + (B q)_i + slip_i,
+
+where own(q) is the vector of length own(|q|) in the direction of q.
 """
 
 from __future__ import annotations
@@ -40,8 +44,8 @@ from convexrough.sphere import annulus, mindlin
 #: Margins of convexity for which a Cholesky factorisation is tried, the largest first.
 MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
-#: If the shear force over f is below this fraction of the total load, the state is proportional to
-#: the force to all digits.
+#: If the shear force divided by f is below this fraction of the total load, the state is
+#: proportional to the force, to all digits.
 ELASTIC = Fraction(1, 10**15)
 
 
@@ -64,11 +68,11 @@ class FrictionProblem:
     Arrays are (n,), in scaled units. Raises InputError without friction.
 
     levels   : the `FrictionLevels` of the contact: solutions of the normal problem at loads up to
-        its own
+        that of the contact
     scope    : scope of the contact's certificate; "none" without a proof
     touching, places : indices of the loaded asperities in the scene, and in `levels.candidates`,
         the asperities that may touch
-    loads, errors : P, and bounds on the errors;  most : upper bounds on P
+    loads, errors : P, and bounds on its errors;  most : upper bounds on P
     thresholds : k P^(2/3)
     compliance : h_i = (2/3) threshold_i / P_i; the Hessian of the local energy is at least h_i I
     sure     : True where proved to touch
@@ -116,7 +120,7 @@ class FrictionProblem:
 
     @cached_property
     def shells(self) -> Array:
-        """(n,) a diagonal; A + diag(shells) is positive semidefinite."""
+        """(n,) a diagonal for which A + diag(shells) is positive semidefinite."""
         return shells(self.influence)
 
     @cached_property
@@ -138,7 +142,10 @@ class FrictionProblem:
 
     @property
     def convexity_numbers(self) -> Array:
-        """(n,) a_i / ((pi/2) s_i), with s_i half the distance to the nearest loaded asperity."""
+        """(n,) a_i / ((pi/2) s_i), with the contact radii a_i.
+
+        s_i is half the distance to the nearest loaded asperity.
+        """
         numbers: Array = self.shells / self.compliance
         return numbers
 
@@ -156,13 +163,14 @@ class FrictionProblem:
     def elastic(self) -> Ball:
         """(n,) parts of a shear force that the asperities carry if all stick.
 
-        They are the derivatives of the loads with respect to the total load.
+        These parts are the derivatives of the loads with respect to the total load.
         """
         return self.levels.top.tangent.loads[self.places]
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) the shear forces u and the displacements eta (deflection plus slip) by the simple
-        model of `shear`, in scaled units.
+        """(n,) the shear forces u and the displacements eta in the simpler model of `shear`.
+
+        Both are in scaled units; eta is the sum of deflection and slip.
 
         height : [force] T = Q / f
         """
@@ -174,7 +182,7 @@ class FrictionProblem:
         return u.value[self.places], eta.value[self.places]
 
     def deflections(self, increments: Array) -> Array:
-        """(n,) the deflections of these shear forces, 0 <= u <= P."""
+        """(n,) the deflections under the shear forces u = `increments`, 0 <= u <= P."""
         left = (self.loads - increments) / self.loads
         x = annulus.width_between(increments / self.loads, left)
         eta: Array = self.thresholds * annulus.deflection(x)
@@ -196,14 +204,18 @@ class FrictionProblem:
         return product.reshape(-1, 2)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, or P_i if they differ by rounding only, as deflections are steep near P_i."""
+        """(n,) |q_i|, set to P_i where the two differ by rounding only.
+
+        Near P_i small changes of q_i would change deflections much.
+        """
         size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) the forces q(eta) of asperities that must take up the displacements eta by
-        deflection and slip; |q_i| = P_i where sliding.
+        """(n, 2) the forces q(eta) of asperities that take up displacements by deflection and slip.
+
+        |q_i| = P_i where an asperity slides.
 
         deflections : (n, 2) eta
         """
@@ -225,8 +237,8 @@ class FrictionProblem:
         """The largest relative violation of the conditions of least energy.
 
         The violations are: the error of the equation for X (top of the module), the part of a slip
-        across its force, and |slip_i| (1 - |q_i| / P_i), all divided by |X|; the part of |q_i|
-        beyond P_i, divided by P_i; and the error of the total, divided by |T|.
+        that is not along its force, and |slip_i| (1 - |q_i| / P_i), all divided by |X|; the part of
+        |q_i| beyond P_i, divided by P_i; and the error of the total, divided by |T|.
         """
         if not np.isfinite(state.displacement).all():
             return np.inf
@@ -260,7 +272,7 @@ class FrictionProblem:
     def margin(self) -> float:
         """A proved mu > 0 with I + H^-1/2 B H^-1/2 >= mu I for the true loads; 0 if none is found.
 
-        H = diag(h_i) of `compliance`. Asperities not proved to touch are left out.
+        H is the diagonal matrix of `compliance`. Asperities not proved to touch are left out.
         """
         root = np.repeat(np.sqrt(self.stiffness), 2)
         scaled = self.kernel * root * root[:, None]
@@ -276,8 +288,8 @@ class FrictionProblem:
 def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
     """(n,) eigenvalues of dq/deta along and across eta.
 
-    They follow from scale = P / threshold and share = |eta| / threshold. The force is
-    q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0). The second eigenvalue is
+    The arguments are scale = P / threshold and share = |eta| / threshold. The force is
+    q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0). The eigenvalue across eta is
     |q| / |eta|.
     """
     left = np.maximum(1.0 - share, 0.0)

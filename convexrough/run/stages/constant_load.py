@@ -1,4 +1,4 @@
-"""[shear], [cycle] and [history]: shear forces at constant load."""
+"""The tables [shear], [cycle] and [history] of scene files: shear forces at constant load."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from convexrough.scene.rings import one_of_each_ring
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
 MOST_LOOPS = 12
 
-#: Most and fewest points of a loop by default, and the limit on touching asperities times points.
+#: Most and fewest points of a loop by default. Between these, the number of touching asperities
+#: times points is at most AFFORDABLE.
 MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
 
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
@@ -84,11 +85,11 @@ class ShearResult(Result):
 class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
-    minimum_fraction : one for each maximum; default: the negatives of the maxima
+    minimum_fraction : the smallest force for each largest one; default: minus the largest force
     loop_points : approximate number of points of a loop; default: fewer for more asperities, and
         where order fails
-    loop_asperities : asperities whose loops are computed: indices or "all"; default: one at each of
-        at most 12 distances from the axis
+    loop_asperities : indices of asperities whose loops are computed, or "all"; default: one
+        asperity at each of at most 12 distances from the axis
     """
 
     name = "cycle"
@@ -175,7 +176,7 @@ class CycleResult(Result):
 
     @cached_property
     def loops(self) -> list[Loop]:
-        """The loops of each cycle, of the whole contact and of some asperities."""
+        """For each cycle, the loops of the whole contact and of some asperities."""
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
@@ -195,7 +196,7 @@ class CycleResult(Result):
         return [fretting(each) for each in self.found]
 
     def tables(self) -> dict[str, Columns]:
-        """The tables of cycles, of fretting by asperity, and of loops, in total and by asperity."""
+        """The tables of cycles, of loops (in total and by asperity) and of fretting by asperity."""
         worn = self.stacked([fretting_columns([each]) for each in self.worn])
         del worn["maximum"], worn["minimum"]  # fractions replace forces, as in the other tables
         curves = self.stacked([_curves(loop) for loop in self.loops])
@@ -223,7 +224,7 @@ class CycleResult(Result):
 
 
 def _curves(loop: Loop) -> Columns:
-    """The points of a loop in total, and below them those of each asperity."""
+    """Columns: the points of the loop of the whole contact, then those of each asperity."""
     names = ["total", *loop.asperities.astype(str)]
     return {
         "curve": np.repeat(names, len(loop.forces)),
