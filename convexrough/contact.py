@@ -17,7 +17,7 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
-from convexrough.errors import InputError, SolverError
+from convexrough.errors import InputError, ProofError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
@@ -30,6 +30,7 @@ from convexrough.normal.refine import refined_loads, refines
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table
+from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
@@ -124,11 +125,12 @@ class Contact(Cached, Table, Plottable):
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
-        sheared : results of `shear` for this contact. For each, the proof includes the state at the
-            shear force Q and the loss of the cycle between +Q and -Q; the sign of Q does not matter
+        sheared : results of `shear` for this contact, with 0 < |Q| < f P. For each, the proof
+            includes the state at the shear force Q and the loss of the cycle between +Q and -Q; the
+            sign of Q does not matter
 
         Raises InputError for scenes too large for exact arithmetic, and ProofError if nothing is
-        proved.
+        proved, as for states whose `order` is "fails".
         """
         from convexrough.proof import NearState, prove, refuse_many  # a higher layer
 
@@ -141,10 +143,16 @@ class Contact(Cached, Table, Plottable):
                 raise InputError(f"sheared[{k}]", found=found[:60], expected=expected)
         by_load, n = self.prescribed_load is not None, len(self.scene)
         levels, states = self.cached(levels_of), []
-        for state in given:
+        for k, state in enumerate(given):
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
-            level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
-            states.append((state.force, NearState.of(level, n)))
+            if drop == 0 or drop >= (1 - 16 * Fraction(ROUNDOFF)) * Fraction(self.load):
+                found = f"the shear force {state.force:.17g}"
+                expected = "one between 0 and f P: there is no proof of rest or gross sliding"
+                raise InputError(f"sheared[{k}]", found=found, expected=expected)
+            if getattr(state, "order", "") == "fails":
+                raise ProofError(f"sheared[{k}]: an indentation may fall as the load rises")
+            left = levels.top.load - Ball.exact(drop / Fraction(levels.problem.units.force))
+            states.append((state.force, NearState.of(levels.at(left), n)))
         return prove(
             self.scene,
             NearState.of(levels.top, n),

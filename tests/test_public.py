@@ -77,6 +77,10 @@ def wrong(call: str) -> Any:
         ("cr.read_scene(5)", "path: found 5, expected the name of a scene file"),
         ("contact.proof(sheared=[1e-8])", r"sheared\[0\]: found 1e-08, expected a shear state"),
         (
+            "contact.proof(sheared=[cr.shear(contact, force=0)])",
+            r"sheared\[0\].*force 0, expected one",
+        ),
+        (
             "contact.proof(sheared=[cr.shear(cr.press(scene, load=1e-7), force=0)])",
             "another contact",
         ),

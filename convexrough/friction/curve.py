@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table, in_text
+
+#: A point (P, T = Q / f) of a path, as exact fractions.
+Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 class Piece(NamedTuple):

@@ -27,15 +27,14 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Piece
-from convexrough.friction.levels import FrictionLevels, height_at, rounded
+from convexrough.friction.curve import MemoryCurve, Piece, Point
+from convexrough.friction.levels import FrictionLevels, forces_at, height_at, rounded
 from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import Walk, points_of, pressed_for
 from convexrough.friction.state import (
     LevelSums,
-    Point,
     by_status,
     displacements_of,
     states_of,
@@ -290,6 +289,9 @@ def cycle(
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
 
+    As in `shear`, forces and displacements count as those of gross sliding if they differ from
+    these only by rounding; the result contains those of gross sliding.
+
     Raises InputError if the scene has no friction, if the minimum exceeds the maximum, if a force
     exceeds the friction limit f P, or if the displacement exceeds that of gross sliding.
 
@@ -362,7 +364,8 @@ def steady(
     """The steady state of a closed path of load and shear force that is repeated.
 
     loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
-        segments between points are straight, and the last one returns to the first point
+        segments between points are straight, and the last one returns to the first point. As in
+        `shear`, Q counts as f P if they differ only by rounding
     influence : how the compliance matrix is stored, as in `press`
 
     Raises the errors of `load_path`.
@@ -476,7 +479,7 @@ def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved:
     found = Cycle(
         contact=contact,
         loads=frozen(np.array([float(load) for load in loaded])),
-        forces=frozen(forces),
+        forces=forces_at(closed.points[: closed.once], forces.tolist(), contact.scene),
         loss=float(loss),
         loss_error=float(error),
         loss_first=float(first),

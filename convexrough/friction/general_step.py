@@ -36,9 +36,9 @@ from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import SolverError
-from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.state import Point, States, by_status
+from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF

@@ -26,13 +26,14 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
+from convexrough.friction.curve import Point
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
-#: A shear force that exceeds f P by at most this many roundoffs counts as f P: gross sliding.
+#: A shear force within this many roundoffs of f P counts as f P: gross sliding.
 AT_THE_END = 16
 
 
@@ -117,7 +118,7 @@ class FrictionLevels:
             expected = f"at most X = {farthest:.17g}, where the last asperity slides"
             raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
-        if not (room - lowered).positive:
+        if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:
             return Fraction(0)
         if displacement == 0.0:
             return self.load
@@ -189,9 +190,16 @@ class FrictionLevels:
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
     """[force] T = Q / f as an exact fraction; P or -P if |T| and P differ only by rounding."""
     height = Fraction(force) / Fraction(checks.friction(scene.friction))
-    if not load < abs(height) <= (1 + AT_THE_END * Fraction(ROUNDOFF)) * load:
+    if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
         return height
     return load if height > 0 else -load
+
+
+def forces_at(points: Sequence[Point], forces: Iterable[float], scene: Scene) -> Array:
+    """(m,) [force] the shear forces Q at points (P, T): f P or -f P if |T| = P, else as given."""
+    f = Fraction(checks.friction(scene.friction))
+    both = zip(points, forces, strict=True)
+    return frozen(np.array([float(f * T) if abs(T) == P else Q for (P, T), Q in both]))
 
 
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:

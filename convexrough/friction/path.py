@@ -30,12 +30,12 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.curve import MemoryCurve, Piece, Point
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
-from convexrough.friction.levels import FrictionLevels, height_at, rounded
+from convexrough.friction.levels import FrictionLevels, forces_at, height_at, rounded
 from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import Point, States, states_of, statuses_of
+from convexrough.friction.state import States, states_of, statuses_of
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
@@ -46,6 +46,9 @@ if TYPE_CHECKING:
 
 #: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
+
+#: Largest number of vertices of the memory curves at all points of a path. One takes 300 bytes.
+MOST_VERTICES = 2 * 10**7
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +72,16 @@ class Walk:
 
     @cached_property
     def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:
-        curve, found = self.start, list[tuple[MemoryCurve, list[Piece]]]()
-        for load, height in self.points:
+        curve, segments, vertices = self.start, list[tuple[MemoryCurve, list[Piece]]](), 0
+        for k, (load, height) in enumerate(self.points, 1):
             curve, pieces = curve.go(load, height)
-            found.append((curve, pieces))
-        return found
+            segments.append((curve, pieces))
+            vertices += len(curve.levels)
+            if vertices > MOST_VERTICES:
+                found = f"{vertices:,} vertices of memory curves up to point {k:,}"
+                expected = f"at most {MOST_VERTICES:,}, so fewer reversals within reversals"
+                raise InputError("path", found=found, expected=expected)
+        return segments
 
     @property
     def curves(self) -> list[MemoryCurve]:
@@ -247,7 +255,7 @@ def load_path(
     """The friction states along a path of load and shear force with straight segments.
 
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
-        separate where P = 0
+        separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
     general_steps : number of general steps per segment. General steps also apply if an indentation
@@ -269,7 +277,8 @@ def load_path(
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     """The friction states along a sequence of shear forces at constant load P.
 
-    forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear
+    forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear. As in
+        `shear`, Q counts as f P if they differ only by rounding
 
     Raises InputError if the scene has no friction, if m = 0, or if a force exceeds f P.
 
@@ -352,7 +361,7 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
     return LoadPath(
         contact=contact,
         loads=frozen(np.array(points, dtype=np.float64)),
-        forces=frozen(np.array(forces)),
+        forces=forces_at(walk.points, forces.tolist(), contact.scene),
         displacements=displacements,
         displacement_errors=displacement_errors,
         approaches=frozen(rows.approach.value * levels.units.length),

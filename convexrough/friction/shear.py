@@ -160,9 +160,12 @@ def shear(
 
     Prescribe one of the two:
 
-    force        : [force] shear force Q. If it exceeds the friction limit f P by a rounding error,
-        at most 16 * 2^-53 of f P, it counts as f P, which means gross sliding
+    force        : [force] shear force Q
     displacement : [length] relative tangential displacement of distant points
+
+    If the relative difference of |Q| from the friction limit f P is at most 16 * 2^-53, it counts
+    as f P: gross sliding. So does a displacement this close to that at which gross sliding starts.
+    Then the result contains the force f P and the displacement at which gross sliding starts.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
     that at which gross sliding starts; SolverError if a normal problem is not solved.
@@ -201,12 +204,12 @@ def shear(
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         total = (levels.top.load - level.load) * levels.force_unit
-        total = total if (displacement or 0.0) >= 0 else -total
+        total = total if height >= 0 else -total
+    if abs(height) == levels.load:  # what is given may differ from gross sliding by rounding
+        force = displacement = None
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
-    off = 0.0 if displacement is None else float((moved - displacement).size)  # past gross sliding
-    slips = drifts.error + off
-    most = np.abs(drifts.value) + slips  # the slip is 0 if the asperity does not touch
-    slip_errors = np.where(loaded, slips, 0.0) + np.where(unsure, most, 0.0)
+    most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
+    slip_errors = np.where(loaded, drifts.error, 0.0) + np.where(unsure, most, 0.0)
     unknown = np.inf if order == "fails" else 0.0
     status = walk.status()[0]
     certificate = ShearCertificate(

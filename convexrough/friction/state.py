@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,6 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
 from convexrough.normal.level import Level
-
-#: A point (P, T = Q / f) of a path, as exact fractions.
-Point: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):

@@ -10,6 +10,7 @@ from collections import Counter
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -38,9 +39,9 @@ def honest() -> list[Any]:
         contact = cr.press(scene, approach=2e-5)
         for each in (contact, cr.press(scene, load=contact.load)):
             forces = [0.3 * friction * each.load, 0.9 * friction * each.load] if friction else []
-            proofs.append(each.proof(sheared=[cr.shear(each, force=Q) for Q in forces]))
+            proofs.append(each.proof(sheared=[SimpleNamespace(force=Q) for Q in forces]))
     lifted = cr.press(shaded(), load=2.96)
-    proofs.append(lifted.proof(sheared=[cr.shear(lifted, force=0.4 * lifted.load)]))
+    proofs.append(lifted.proof(sheared=[SimpleNamespace(force=0.4 * lifted.load)]))
     loads = cr.press(lifted.scene, load=2.96).loads * (1 + 1e-3 * (np.arange(6) == 0))
     proofs.append(prove(lifted.scene, loads, load=2.96))
     proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
