@@ -24,9 +24,9 @@ from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import NormalProblem, Units
+from convexrough.normal.problem import ALL_SHARP, NormalProblem, Units
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import refined_loads, refines
+from convexrough.normal.refine import refined_loads
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table
@@ -313,9 +313,9 @@ def _contact(
         else:
             solution = _solved(solver, problem, first)
         state = solution.trial
-        if refine := bool(solution.refine and len(problem) and refines(problem)):
+        if refine := bool(solution.refine and len(problem)):
             if state is None or not np.array_equal(state.loads.high, solution.loads):
-                state = refined_loads(problem, solution.loads)
+                state = refined_loads(problem, solution.loads, problem.pressed_product)
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))
         radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
@@ -325,7 +325,7 @@ def _contact(
             assert state is not None
             level = proved(problem, state)
             certificate = certificate_of(level, loads, state)
-            top = level if problem.influence.stored else None  # a small problem
+            top = level if problem.influence.stored and len(problem) <= ALL_SHARP else None
         else:
             certificate = certify_on(problem, loads)
     contact = Contact(

@@ -24,7 +24,7 @@ from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, completed, refined, refines, scaled, trial
+from convexrough.normal.refine import Trial, completed, refined, scaled, trial
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -183,10 +183,9 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
     pair, missing = completed(problem, scaled(problem, Pair.exact(given)))
-    product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
-    start = trial(problem, pair, missing, product)
+    start = trial(problem, pair, missing, problem.pressed_product(pair))
     level = proved(problem, start)
-    if refines(problem) and len(problem):
+    if len(problem):
         better = proved(problem, refined(problem, start))
         level = level if better.box is None else better
     return certificate_of(level, loads, start)

@@ -11,20 +11,20 @@ the arithmetic. A correction is one step of docs/theory/newton.md in float64.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import TINY, Ball, of_rows, residual
+from convexrough.arithmetic.balls import TINY, Ball, of_rows, quietly, residual
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.law import Problem
-from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
 #: Largest number of corrections.
@@ -33,13 +33,12 @@ CORRECTIONS = 12
 #: A correction aims to reduce the residual to this fraction of the residual's rounding error.
 ENOUGH = 0.1
 
-#: Number of candidates (asperities that could touch) up to which refinement with a stored matrix
-#: costs no more than the solution.
-FEW = 700
-
 #: If the sum of the loads misses the total by less than this part, only the largest load is
 #: changed; otherwise all loads are scaled first. A heuristic.
 FITS = 1e-6
+
+#: A function that returns A P for loads P.
+Product: TypeAlias = Callable[[Pair], Ball]
 
 #: Number of loads up to which `math.fsum`, which rounds once, is fastest.
 FEW_TERMS = 128
@@ -121,16 +120,6 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     return Trial(problem, loads, product, local, above - approach, approach, missing)
 
 
-def refines(problem: NormalProblem) -> bool:
-    """True if refinement costs no more than the solution; only then loads are refined.
-
-    Refinement corrects the loads until the residual is about as small as the error bound of a sharp
-    product (docs/theory/operators.md). With a stored matrix and more than `FEW` candidates, loads
-    are not refined.
-    """
-    return not problem.influence.stored or len(problem) <= FEW
-
-
 def refined(problem: Problem, best: Trial) -> Trial:
     """The trial `best`, corrected until its residual is within rounding or no longer halves."""
     size, rounding = defect_of(best), rounding_of(best)
@@ -153,17 +142,21 @@ def refined(problem: Problem, best: Trial) -> Trial:
     return best
 
 
-def refined_loads(problem: Problem, loads: Array) -> Trial:
+def refined_loads(problem: Problem, loads: Array, product: Product | None = None) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
-    return refined(problem, trial_of(problem, loads))
+    return refined(problem, trial_of(problem, loads, product))
 
 
-def trial_of(problem: Problem, loads: Array) -> Trial:
-    """The trial of loads (n,) >= 0, which are changed to have the prescribed total."""
+def trial_of(problem: Problem, loads: Array, product: Product | None = None) -> Trial:
+    """The trial of loads (n,) >= 0, which are changed to have the prescribed total.
+
+    product : function that returns A P for loads P; default `problem.product`
+    """
     pair, missing = completed(problem, Pair.exact(loads))
-    return trial(problem, pair, missing, problem.product(pair))
+    return trial(problem, pair, missing, (product or problem.product)(pair))
 
 
+@quietly
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
     """The trial after one Newton step in the rows for which `todo` is True.
 
@@ -235,5 +228,9 @@ def defect_of(state: Trial) -> Any:
 
 
 def rounding_of(state: Trial) -> Any:
-    """The 2-norm of the rounding errors of the residual: a number, or (m,) for a stack."""
-    return np.sqrt((state.gap.radius**2).sum(axis=-1))
+    """The 2-norm of the rounding errors of the residual: a number, or (m,) for a stack.
+
+    Errors of positive gaps are left out, because they do not change the residual.
+    """
+    counts = state.inside | (state.gap.value <= state.gap.radius)
+    return np.sqrt((np.where(counts, state.gap.radius, 0.0) ** 2).sum(axis=-1))

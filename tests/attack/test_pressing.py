@@ -1,6 +1,7 @@
 """Certificates under attack at the ends of arithmetic; judged in whole numbers and in 60 digits."""
 
 from fractions import Fraction
+from typing import Any
 
 import multiprecision
 import numpy as np
@@ -23,6 +24,26 @@ def test_the_duality_gap_where_heights_cancel_drops(radius: float) -> None:
     assert contact.certificate.duality_gap >= excess(scene, contact.loads, exact)
 
 
+def test_a_stored_matrix_of_many_rows_decides_what_grazes() -> None:
+    """729 summits anywhere, one of which is raised until it touches, to within rounding."""
+    rng = np.random.default_rng(2)
+    i, j = np.divmod(np.arange(729), 27) - np.array([[13], [13]])
+    points = 0.0025 * np.column_stack((i, j)) + rng.uniform(-2e-4, 2e-4, (729, 2))
+
+    def pressed(heights: Any) -> cr.Contact:
+        asperities = cr.Asperities(points, 0.02, heights)
+        return cr.press(
+            cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), approach=8e-4, influence="dense"
+        )
+
+    contact, heights = pressed(0.0), np.zeros(729)
+    assert contact.certificate.load_error < 2e-16 * contact.loads.max()
+    which = int(np.argmin(np.where(contact.gaps > 0, contact.gaps, np.inf)))
+    for off, status in ((-1e-15, "open"), (1e-15, "contact")):
+        heights[which] = contact.gaps[which] + off
+        assert pressed(heights).status[which] == status
+
+
 @pytest.mark.parametrize("load", [1e-320, 5e-324])
 def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
     """The solution carries nothing and has no energy; these loads have some."""
@@ -32,7 +53,6 @@ def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
     assert Fraction(gap) >= Fraction(5e-9) * Fraction(load)
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("load", [1e-310, 5e-324])
 def test_bounds_of_the_smallest_loads_on_a_lattice(load: float) -> None:
     scene, given = paper(), np.full(61, load)
