@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -29,7 +29,7 @@ from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
-from convexrough.record import LINE, Along, Table
+from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
@@ -39,6 +39,10 @@ from convexrough.sphere import hertz
 #: In a scene of at most FEW asperities Newton's method under a load includes all of them, because a
 #: bound on the approach, from which some are known to be open, takes more time.
 FEW = 128
+
+#: An open summit is beside a contact disc up to this multiple of the disc's radius from its centre.
+#: At this distance a point force gives displacements that are 5 % too small, at the rim 15 %.
+BESIDE = 1.5
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
@@ -101,7 +105,7 @@ class Contact(Cached, Table, Plottable):
 
     @cached_property
     def covered(self) -> int:
-        """Number of open summits under the contact disc of another asperity.
+        """Number of open summits under or beside a contact disc, up to 1.5 radii from its centre.
 
         There a point force does not represent the pressure.
         """
@@ -117,10 +121,6 @@ class Contact(Cached, Table, Plottable):
         from convexrough.plausibility import warnings_of  # a higher layer
 
         return tuple(warnings_of(self))
-
-    def _rows(self) -> Iterator[tuple[str, str]]:
-        yield from super()._rows()
-        yield from (("warning", each[:LINE]) for each in self.warnings)
 
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
@@ -384,7 +384,8 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
 
 
 def covered(scene: Scene, radii: Array) -> int:
-    """The number of open summits under contact discs with these radii (n,) [length]."""
+    """The number of open summits under or beside contact discs with these radii (n,) [length]."""
+    radii = BESIDE * radii
     discs, summits = np.flatnonzero(radii), np.flatnonzero(radii == 0)
     nearest = 0.0 if scene.lattice is None else scene.lattice.spacing
     if len(discs) == 0 or len(summits) == 0 or float(radii.max()) < 0.99 * nearest:

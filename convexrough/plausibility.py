@@ -157,7 +157,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
     if normal["covered"]:
         yield (
-            f"open summits under a contact disc: {normal['covered']}; a point force does "
+            f"open summits under or beside a contact disc: {normal['covered']}; a point force does "
             "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:

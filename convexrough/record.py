@@ -69,6 +69,12 @@ class Record:
         scene = getattr(getattr(self, "contact", self), "scene", None)
         if units := str(getattr(scene, "units", "")):
             yield "units", units
+        yield from (("warning", in_text(each)) for each in self.warnings)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt the result, each a sentence: those of its `contact`, if it has one."""
+        return getattr(getattr(self, "contact", None), "warnings", ())
 
     def _headline(self) -> str:
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]

@@ -222,10 +222,6 @@ class Surface(Record, Plottable):
                 f"in row {row}, column {column}; make them nan and use fill=True, or --fill"
             )
 
-    def _rows(self) -> Iterator[tuple[str, str]]:
-        yield from super()._rows()
-        yield from (("warning", each) for each in self.warnings)
-
     def detrend(self, kind: Trend = "plane") -> Surface:
         """The surface minus its best-fitting plane, sphere or paraboloid; `removed` describes it.
 
