@@ -75,12 +75,13 @@ def test_errors_of_a_claim_are_not_short_by_a_rounding() -> None:
                 assert abs(arb(float(load)) - true) <= arb(float(error))
 
 
-@pytest.mark.parametrize("load", [0.003, 0.03])
-def test_an_open_summit_under_its_neighbours_disc_is_told_of(load: float) -> None:
-    """1.5 micrometres apart, and 20 nm lower: the disc reaches farther than the summit."""
-    asperities = cr.Asperities([[0.0, 0.0], [1.5e-6, 0.0]], 2e-4, [0.0, -2e-8])
-    contact = cr.press(cr.Scene(0.01, asperities, STEEL, geometry="summit"), load=load)
+@pytest.mark.parametrize(("load", "apart"), [(0.003, 1.5e-6), (0.03, 1.5e-6), (0.003, 2.2e-6)])
+def test_an_open_summit_under_or_beside_a_disc_is_told_of(load: float, apart: float) -> None:
+    """The summit is 20 nm lower, under its neighbour's disc or at 1.3 of its radius."""
+    asperities = cr.Asperities([[0.0, 0.0], [apart, 0.0]], 2e-4, [0.0, -2e-8])
+    contact = cr.press(cr.Scene(0.01, asperities, STEEL, 0.3, geometry="summit"), load=load)
     assert contact.status.tolist() == ["contact", "open"]
-    assert contact.contact_radii[0] > 1.5e-6
+    assert contact.contact_radii[0] > apart / 1.5
     assert any("disc" in line for line in contact.warnings)
     assert "disc" in repr(contact)
+    assert "disc" in repr(cr.shear(contact, force=0.1 * load))
