@@ -1,5 +1,7 @@
 """Friction states: against 80 digits, and against their own equations."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed, with_friction
@@ -95,3 +97,18 @@ def test_nothing_loaded() -> None:
     assert (state.forces == 0).all()
     assert (state.status == "open").all()
     assert cr.shear(contact, displacement=0.0).force == 0.0
+
+
+@pytest.mark.parametrize("solver", [cr.solvers.Conic(newton_step=False), "bristles"])
+def test_friction_of_a_contact_that_another_solver_pressed(solver: Any) -> None:
+    """Its levels are pressed by the same solver, so that Newton's method is cross-checked."""
+    contact = pressed("paper")
+    other = cr.press(contact.scene, approach=contact.approach, solver=solver)
+    force = 0.3 * FRICTION * contact.load
+    first, second = cr.shear(contact, force=force), cr.shear(other, force=force)
+    assert (first.status == second.status).all()
+    errors = first.certificate.force_errors + second.certificate.force_errors
+    assert (np.abs(first.forces - second.forces) <= errors).all()
+    losses = [cr.cycle(each, maximum=force) for each in (contact, other)]
+    assert abs(losses[0].loss - losses[1].loss) <= losses[0].loss_error + losses[1].loss_error
+    assert losses[1].order == "proved"
