@@ -355,7 +355,7 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
         forces=frozen(np.array(forces)),
         displacements=displacements,
         displacement_errors=displacement_errors,
-        approaches=frozen(rows.approach.value * levels.units.length),
+        approaches=frozen(rows.approach.value * levels.units.length + 0.0),
         losses=losses,
         loss_errors=loss_errors,
         asperity_forces=asperity_forces,
