@@ -119,9 +119,9 @@ class Grid(FileTable):
 
     def blame(self, mistakes: list[str], seed: int | None) -> list[str]:
         """The mistakes in a scene with this seed; those in random values name the seed."""
-        drawn = tuple("[{}] {}:".format(*key.split(".", 1)) for key in self.draw)
-        said = f", drawn with seed {seed}"
-        return [each + said if each.startswith(drawn) else each for each in mistakes]
+        random = tuple("[{}] {}:".format(*key.split(".", 1)) for key in self.draw)
+        said = f", for seed {seed} of [sweep.draw]"
+        return [each + said if each.startswith(random) else each for each in mistakes]
 
     @property
     def axes(self) -> dict[str, list[Any]]:
