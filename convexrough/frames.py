@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 #: By name: the names of an array's dimensions, and the array. The first has the rows of a frame.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
-#: The names of the components of a vector.
-DIRECTION = {"direction": ["x", "y"]}
+#: The names of the components of a vector, and of the sides of a point of a path.
+NAMED = {"direction": ["x", "y"], "side": ["below", "above"]}
 
 
 def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFrame:
@@ -45,8 +45,7 @@ def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
     """A data set with writable copies of all arrays."""
     arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
     known = {"x", "y", "asperity"} & set(arrays)
-    vectors = any("direction" in along for along, _ in arrays.values())
-    dataset: xarray.Dataset = needed("xarray").Dataset(
-        arrays, DIRECTION if vectors else {}, attributes
-    )
+    used = {dimension for along, _ in arrays.values() for dimension in along}
+    named = {dimension: names for dimension, names in NAMED.items() if dimension in used}
+    dataset: xarray.Dataset = needed("xarray").Dataset(arrays, named, attributes)
     return dataset.set_coords(sorted(known))

@@ -19,7 +19,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle, cycle
-from convexrough.record import Along, Table
+from convexrough.record import Along, Table, in_text
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.rows import CYCLE, MATRICES, TOTALS, PressedRows, in_rows
 from convexrough.scene.scene import Scene
@@ -63,9 +63,15 @@ class Contacts(Table):
     def __len__(self) -> int:
         return len(self.scenes)
 
+    def _headline(self) -> str:
+        m, n = self.status.shape
+        return f"Contacts: {in_text(self.status)}; {m:,} scenes of {n:,} asperities"
+
     def __getitem__(self, k: int) -> Contact:
-        """The contact of scene k."""
-        k = range(len(self))[index(k)]
+        """The contact of scene k. Raises IndexError if there is none."""
+        if not -len(self) <= index(k) < len(self):
+            raise IndexError(f"scene {k} of {len(self):,}: the first is 0")
+        k = index(k) % len(self)
         known: dict[int, Contact] = self.__dict__.setdefault("_known", {})
         if k not in known:
             name = "load" if self.by_load else "approach"

@@ -127,6 +127,8 @@ class Table(Record):
         arrays = {}
         for along, names in self._along.items():
             for name in names:
+                if getattr(self, name) is None:  # as forces, of which only some gradients have any
+                    continue
                 one = singular(name)
                 column = f"asperity_{one}" if one != name and one in taken else one
                 arrays[column] = along, getattr(self, name)

@@ -63,7 +63,8 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
             new.text("scene.toml", file.text)
             if page is not None:
                 new.text("slider.html", page)
-        evidence = proved(partial(prove_results, results)) if proof else None
+        prove = partial(prove_results, results, partial(say_aside, "warning"))
+        evidence = proved(prove) if proof else None
         if evidence is not None:
             evidence.save(new.path / "proof.json")
     status = output.say_results(results, written(new))

@@ -364,7 +364,7 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
         forces=forces_at(walk.points, forces.tolist(), contact.scene),
         displacements=displacements,
         displacement_errors=displacement_errors,
-        approaches=frozen(rows.approach.value * levels.units.length),
+        approaches=frozen(rows.approach.value * levels.units.length + 0.0),
         losses=losses,
         loss_errors=loss_errors,
         asperity_forces=asperity_forces,

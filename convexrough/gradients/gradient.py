@@ -224,8 +224,12 @@ class Gradient(Table, Plottable):
     """
 
     _along: ClassVar[Along] = {
-        ("asperity",): ("heights", "height_errors", "tip_radii", "tip_radius_errors")
+        ("asperity",): ("heights", "height_errors", "tip_radii", "tip_radius_errors"),
+        ("asperity", "direction"): ("positions", "position_errors"),
+        ("point",): ("forces", "force_errors", "loads", "load_errors"),
+        ("point", "side"): ("force_sides", "load_sides"),
     }
+    _shown = ("positions", "position_errors")
 
     contact: Contact
     holding: Holding

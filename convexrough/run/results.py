@@ -14,7 +14,7 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
-from convexrough.errors import FileError, file_errors
+from convexrough.errors import FileError, ProofError, file_errors
 from convexrough.friction.shear import shear
 from convexrough.progress import LOGGER
 from convexrough.run.scene_file import SceneFile
@@ -43,6 +43,9 @@ MOST_CSV_ROWS = 100_000
 
 #: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
+
+#: A folder that has both is that of a sweep.
+SWEEP_MANIFEST, SWEEP_PARTS = "manifest.json", "parts"
 
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
@@ -75,18 +78,32 @@ def warnings(results: Iterable[Result]) -> Iterator[str]:
         yield from result.cautions()
 
 
-def prove_results(results: Sequence[Result]) -> Proof:
+def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Proof:
     """The proof of the contact and of its states under shear.
 
-    The shear forces are those of the results, and the amplitudes of cycles, except 0 and forces of
-    at least `BELOW_LIMIT` f P.
+    warn : called for each state that is left out, with the reason
 
-    Raises InputError for scenes too large for exact arithmetic, ProofError if a proof fails.
+    The shear forces are those of the results, and the amplitudes of cycles, except 0 and forces of
+    at least `BELOW_LIMIT` f P. States that are not proved are left out.
+
+    Raises InputError for scenes too large for exact arithmetic, ProofError if the contact is not
+    proved.
     """
     contact = results[0].contact
     most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
     forces = sorted({force for result in results for force in result.proved_forces()})
-    return contact.proof(sheared=[shear(contact, force=it) for it in forces if 0 < it < most])
+    states = [shear(contact, force=it) for it in forces if 0 < it < most]
+    with suppress(ProofError):
+        return contact.proof(sheared=states)
+    contact.proof()  # raises if it is the contact that is not proved
+    good = []
+    for state in states:
+        try:
+            contact.proof(sheared=[state])
+            good.append(state)
+        except ProofError as error:
+            warn(f"proof.json leaves out the shear force {state.force:.6g}: {error}")
+    return contact.proof(sheared=good)
 
 
 class Writer:
@@ -174,7 +191,8 @@ def results_folder(
     formats, dpi : as for `Writer`;  command : the command that writes, an entry of `files.json`
     said  : entries of `files.json` in addition to the names of the files written
 
-    Raises FileError, before the block runs, if `folder` cannot be written or replaced.
+    Raises FileError, before the block runs, if `folder` cannot be written or replaced, or if it has
+    a damaged `files.json`.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
     parents = [each for each in folder.parents if not each.exists()]
@@ -190,8 +208,7 @@ def results_folder(
         if folder.is_dir() and any(folder.iterdir()) and not force:
             advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")
-        if (earlier := _manifest(folder).get("command", command)) != command:
-            raise FileError(f"{folder}: holds results of `{earlier}`; name another folder")
+        refuse_others(folder, command)
         new.mkdir()
         try:
             yield Writer(folder, new, formats, dpi)
@@ -214,22 +231,36 @@ def _moved(new: Path, folder: Path) -> None:
         os.replace(path, folder / path.name)
 
 
+def refuse_others(folder: Path, command: str) -> None:
+    """Raise FileError if the folder has results of another command, or a damaged `files.json`."""
+    if (earlier := _manifest(folder).get("command", command)) != command:
+        raise FileError(f"{folder}: holds results of `{earlier}`; name another folder")
+
+
 def remove_earlier(folder: Path) -> None:
     """Remove `files.json` from the folder, and then the files that it lists."""
-    files = _manifest(folder).get("files")
-    for name in [MANIFEST, *map(str, files)] if isinstance(files, list) else []:
+    files = _manifest(folder).get("files", [])
+    for name in [MANIFEST, *map(str, files)]:
         path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
         if path.is_file() or path.is_symlink():
             path.unlink()
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
-    """The contents of `files.json` in the folder; empty if there is none."""
-    try:
-        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+    """The contents of `files.json` in the folder; only the command for a sweep; {} without both.
+
+    Raises FileError if `files.json` is damaged, because then the earlier files are unknown.
+    """
+    path = folder / MANIFEST
+    if not path.exists():
+        sweep = (folder / SWEEP_MANIFEST).exists() and (folder / SWEEP_PARTS).is_dir()
+        return {"command": "sweep"} if sweep else {}
+    with file_errors(path, "be read"), suppress(ValueError):
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(found, dict) and isinstance(found.get("files"), list):
+            return found
+    expected = "the list of the files of an earlier run"
+    raise FileError(f"{path}: damaged, expected {expected}; remove it or name another folder")
 
 
 def origin(source: SceneFile) -> Summary:

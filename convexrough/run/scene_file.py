@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from convexrough.run.study import LatticeTable, Study
 
 #: Names of columns with results, which are ignored in a table of asperities.
-RESULTS = ("load", "contact_radius", "gap", "load_error", "force", "pressure", "area", "contact")
+RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
+           "area", "contact")  # fmt: skip
 
 #: Relative rounding error up to which a last row counts as the means or sums of a table.
 ROUNDED = 1e-3

@@ -183,7 +183,8 @@ class Result(Table, Plottable):
     def doubts(self) -> Iterator[str]:
         """The reasons why this result is not certified, one line for each."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
-            yield f"not certified: {unsure} statuses in {self.name} undecided"
+            many = "status" if unsure == 1 else "statuses"
+            yield f"not certified: {unsure} {many} in {self.name} undecided"
         if not self.orders <= {"proved", "proved for one step"}:
             needs = f"which the proof of [{self.name}] needs"
             yield f"not proved: that indentations increase with the load, {needs}"

@@ -84,7 +84,7 @@ class Tables:
         if last.get("values") != values:
             study, mistakes = validate(with_values(self.tables, values, seed))
             if study is None:
-                raise SceneFileError(str(self.path), mistakes)
+                raise SceneFileError(str(self.path), self.grid.blame(mistakes, seed))
             last.update(values=values, study=study)
         known: Study = last["study"]
         if seed is None or not isinstance(known.asperities, LatticeTable):
@@ -170,11 +170,10 @@ def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)
-        values = [found[column.number, column.row] for column in columns]
+        # nan if this scene does not have a number that the first scene has
+        values = [found.get((column.number, column.row), np.nan) for column in columns]
     except FAILURES as error:
         return _failed(error, columns)
-    except KeyError as error:  # a swept list may be shorter than that of the first scene
-        return "failed", f"the results have no {error}", [np.nan] * len(columns)
     said = "; ".join(filter(None, (unsure, warned)))
     return ("undecided" if unsure else "certified"), said, values
 

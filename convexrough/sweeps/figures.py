@@ -35,7 +35,7 @@ def draw_quantiles(
 
     columns : the columns `measured` and `over`, `status`, and the `others`
     others  : other swept keys that are not random; each combination of their values has bands of
-        its own if there are at most four
+        its own if there are at most four; otherwise the legend names them and their number
     """
     if axes is None:
         axes = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained").subplots()
@@ -53,6 +53,7 @@ def draw_quantiles(
 
 
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
+    usual = "median, 25 to 75 %, 5 to 95 %"
     if others:
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)
@@ -65,7 +66,9 @@ def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Colum
                 )
                 yield name, {key: column[some] for key, column in columns.items()}
             return
-    yield "median, 25 to 75 %, 5 to 95 %", columns
+        every = ", ".join(key.partition(".")[2] for key in others)
+        usual += f"\nall {every}: {len(different)} combinations"
+    yield usual, columns
 
 
 def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, str]) -> None:

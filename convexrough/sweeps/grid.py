@@ -29,7 +29,14 @@ Law = Literal["uniform", "normal", "lognormal"]
 
 
 def _different(values: Any) -> bool:
-    return bool(values) and len({repr(value) for value in values}) == len(values)
+    return bool(values) and len({*map(_hashable, values)}) == len(values)
+
+
+def _hashable(value: Any) -> Any:
+    """A stand-in for a value of a file, with equal ones for equal values, such as 1 and 1.0."""
+    if isinstance(value, (list, tuple)):
+        return tuple(map(_hashable, value))
+    return value if type(value) in (int, float) else repr(value)
 
 
 def _are_seeds(seeds: int | list[int]) -> bool:
@@ -109,6 +116,12 @@ class Grid(FileTable):
             yield "together", f"found {sorted(lengths)} values, expected as many for every key"
         if keys.get("draw") and "seeds" not in keys:
             yield "seeds", "missing, needed with [sweep.draw]"
+
+    def blame(self, mistakes: list[str], seed: int | None) -> list[str]:
+        """The mistakes in a scene with this seed; those in random values name the seed."""
+        random = tuple("[{}] {}:".format(*key.split(".", 1)) for key in self.draw)
+        said = f", for seed {seed} of [sweep.draw]"
+        return [each + said if each.startswith(random) else each for each in mistakes]
 
     @property
     def axes(self) -> dict[str, list[Any]]:

@@ -131,7 +131,7 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
             for i, value in enumerate(values[1:], 1):
                 _, wrong = validate(with_values(tables, {**first, key: value}, seed))
                 mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
-    return study, mistakes
+    return study, grid.blame(mistakes, seed)
 
 
 def plan_of_scenes(
@@ -182,7 +182,8 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     for model, key, values in models:
         checks.sequence(model.name, values, "a list of fractions of f P")
         if len(values):
-            table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)
+            given = checks.array(model.name, values).tolist()
+            table, wrong = validate_table(model.name, {key: given}, model)
             mistakes += wrong
             if table is not None:
                 found[model.name] = table
@@ -294,6 +295,12 @@ def sweep(
     >>> print(table.read()["contact"])
     [37. 37. 43.]
     """
+    if resume and overwrite:
+        expected = "one of them: continue the sweep in the folder, or remove it"
+        raise InputError("resume, overwrite", found="both", expected=expected)
+    if out is None and (resume or overwrite):
+        expected = "the folder of an earlier sweep, as resume and overwrite need one"
+        raise InputError("out", found="none", expected=expected)
     given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
     if isinstance(what, (str, os.PathLike, Mapping)):
         for name, value in given.items():

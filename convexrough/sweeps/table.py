@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from convexrough import checks, frames
+from convexrough.arrays import Array
 from convexrough.atomic import to_json, write_text
 from convexrough.errors import FileError, InputError, file_errors, needed
 from convexrough.record import Record, in_text
-from convexrough.run.results import remove_earlier
+from convexrough.run.results import SWEEP_MANIFEST, SWEEP_PARTS, refuse_others, remove_earlier
 from convexrough.sweeps.batch import Columns, different
 
 if TYPE_CHECKING:
@@ -30,7 +31,10 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-MANIFEST, PARTS = "manifest.json", "parts"
+MANIFEST, PARTS = SWEEP_MANIFEST, SWEEP_PARTS
+
+#: What to do, in messages: the arguments in Python, and the options of the command.
+RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
 
 #: The quantiles that are computed by default.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -87,9 +91,10 @@ class Folder:
                 page_checksum_verification=True,
             )
         except (OSError, pyarrow.ArrowException) as error:
-            raise FileError(f"{path}: damaged ({error}); --resume computes it again") from error
+            why = " ".join(str(error).split())
+            raise FileError(f"{path}: damaged ({why}); {RESUME} computes it again") from error
         if not np.array_equal(found["scene"].to_numpy(), part):
-            raise FileError(f"{path}: has rows of other scenes; --resume computes it again")
+            raise FileError(f"{path}: has rows of other scenes; {RESUME} computes it again")
         arrays = {name: found[name].to_numpy() for name in wanted}
         return {  # pyarrow returns text as objects
             name: values.astype(np.str_) if values.dtype == object else values
@@ -107,7 +112,7 @@ class Folder:
         if there and not resume:
             raise FileError(
                 f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
-                "--resume computes the rest, --force overwrites them, --out takes another folder"
+                f"{RESUME} computes the rest, {OVERWRITE} replaces them, {OUT} names another folder"
             )
         todo, damaged = [], 0
         for part in wanted:
@@ -132,10 +137,10 @@ class Folder:
 
 def open_folder(path: Path) -> Folder:
     """The folder of an existing sweep. Raises FileError if there is none."""
-    if not (path / MANIFEST).exists():
-        raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
     try:
         with file_errors(path / MANIFEST, "be read"):
+            if not (path / MANIFEST).exists():
+                raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
         if not isinstance(manifest, dict) or manifest.get("schema") != 2:
             raise ValueError("not a sweep of this version")
@@ -155,36 +160,35 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     installed.
     """
     arrow()
-    if overwrite and (path / MANIFEST).exists():
-        earlier = open_folder(path)
-        with file_errors(path, "hold results"):
+    with file_errors(path, "hold results"):
+        if overwrite and (path / MANIFEST).exists():
+            earlier = open_folder(path)
+            refuse_others(path, "sweep")
+            remove_earlier(path)  # of `sweep --summary`
             for part in earlier.parts():
                 earlier.file(part.start).unlink(missing_ok=True)
-            remove_earlier(path)  # of `sweep --summary`
-        write_text(path / MANIFEST, to_json(manifest) + "\n")
-    if not (path / MANIFEST).exists():
-        with file_errors(path, "hold results"):
+            write_text(path / MANIFEST, to_json(manifest) + "\n")
+        if not (path / MANIFEST).exists():
             path.mkdir(parents=True, exist_ok=True)
             # Meanwhile another process may write the manifest of this sweep or of another sweep.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
-        if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
-            raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
-        if not (path / MANIFEST).exists():
-            if orphans:  # the manifest, which is written before all parts, was removed
-                raise FileError(
-                    f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they are: "
-                    f"restore it or remove {path / PARTS}; --out takes another folder"
-                )
-            with file_errors(path, "hold results"):
+            if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
+                raise FileError(f"{path}: holds {strangers[0]}, but no sweep; {OUT} names another")
+            if not (path / MANIFEST).exists():
+                if orphans:  # the manifest, which is written before all parts, was removed
+                    raise FileError(
+                        f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they "
+                        f"are: restore it or remove {path / PARTS}; {OUT} names another folder"
+                    )
                 (path / PARTS).mkdir(exist_ok=True)
-            write_text(path / MANIFEST, to_json(manifest) + "\n")
+                write_text(path / MANIFEST, to_json(manifest) + "\n")
     folder = open_folder(path)
     there = folder.manifest
     if there["sweep"] != manifest["sweep"]:
         raise FileError(
             f"{path}: holds another sweep, {_named(there)}; this is {_named(manifest)}; "
-            f"--force overwrites it, --out takes another folder"
+            f"{OVERWRITE} replaces it, {OUT} names another folder"
         )
     if other := different(there["versions"]):
         raise FileError(f"{path}: was begun with {other}; rows could differ")
@@ -278,9 +282,9 @@ class SweepTable(Record):
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Yield some columns, by default all, one part at a time; for large tables."""
-        self._refuse_unknown(names or ())
+        names = self._chosen(names, self.columns)
         if self.in_memory is not None:
-            yield {name: self.in_memory[name] for name in names or self.columns}
+            yield {name: self.in_memory[name] for name in names}
             return
         assert self.folder is not None  # else the table is in memory
         for part in self._parts():
@@ -291,7 +295,7 @@ class SweepTable(Record):
 
         Raises InputError for unknown names, or if the arrays do not fit in memory.
         """
-        wanted = self.columns if names is None else list(names)
+        wanted = self._chosen(names, self.columns)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
         blocks = list(self.blocks(wanted))
         if not blocks:
@@ -322,10 +326,9 @@ class SweepTable(Record):
         has no rows or is not in a folder.
         """
         frames_of_dask = needed("dask.dataframe", "dask")
-        self._refuse_unknown(columns or ())
+        names = self._chosen(columns, self.columns)
         if self.folder is None or not len(self):
             raise InputError("table", found="no parts", expected="rows in a folder")
-        names = self.columns if columns is None else list(columns)
         frame = partial(_frame, self.folder, names)
         meta = frame(self._parts()[0]).iloc[:0]
         found: dask.dataframe.DataFrame = frames_of_dask.from_map(frame, self._parts(), meta=meta)
@@ -350,6 +353,7 @@ class SweepTable(Record):
             raise InputError("table", found="nothing to draw", expected=expected)
         measured = self.measured[0] if measured is None else measured
         over = self.swept[0] if over is None else over
+        self._chosen([measured], self.measured)
         others = [key for key in self.points if key != over]
         columns = self.read([over, *others, "status", measured])
         axes = draw_quantiles(columns, measured, over, others, axes)
@@ -364,10 +368,14 @@ class SweepTable(Record):
         measured : names of measured numbers, by default all;  at : quantiles, from 0 to 1
 
         The columns are those of `points`, `quantity` (the name of the number), `scenes` (number of
-        computed scenes), `failed` (number of failed scenes), and the quantiles (nan if all scenes
-        failed).
+        computed scenes), `failed` (number of failed scenes), and the quantiles of the values that
+        are not nan (nan if there are none).
+
+        Raises InputError for unknown names, and for quantiles that are not from 0 to 1.
         """
-        names = self.measured if measured is None else list(measured)
+        checks.sequence("at", at, "a list of quantiles, from 0 to 1")
+        at = [checks.between(f"at[{i}]", it, 0, 1) for i, it in enumerate(at)]
+        names = self._chosen(measured, self.measured)
         about = self.read([*self.points, "scene", "status"])
         ends = np.flatnonzero(np.diff(about["scene"] // int(self.manifest["each"]))) + 1
         points = np.split(np.arange(len(about["scene"])), ends) if len(about["scene"]) else []
@@ -377,7 +385,7 @@ class SweepTable(Record):
             values = self.read([name])[name]
             for place, point in enumerate(points):
                 known = values[point][good[point] & ~np.isnan(values[point])]
-                found = np.quantile(known, at) if len(known) else np.full(len(at), np.nan)
+                found = _quantiles(known, at) if len(known) else np.full(len(at), np.nan)
                 keys = (about[key][point[0]] for key in self.points)
                 failed = np.count_nonzero(~good[point])
                 rows.append((place, *keys, name, len(point), failed, *found))
@@ -395,11 +403,14 @@ class SweepTable(Record):
         assert self.folder is not None  # else the table is in memory
         return self.folder.parts()
 
-    def _refuse_unknown(self, names: Iterable[str]) -> None:
+    def _chosen(self, names: Sequence[str] | None, known: list[str]) -> list[str]:
+        """The given names, by default all known ones. Raises InputError for unknown names."""
+        checks.sequence("columns", names := known if names is None else names, "a list of names")
         for name in names:
-            if name not in self.columns:
-                expected = f"a column of the table: {checks.nearest(name, self.columns)}"
+            if name not in known:
+                expected = f"a column of the table: {checks.nearest(str(name), known)}"
                 raise InputError("column", found=repr(name), expected=expected)
+        return list(names)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "rows", f"{len(self):,} of {self.scenes:,} scenes"
@@ -408,6 +419,15 @@ class SweepTable(Record):
         yield "measured", in_text(", ".join(self.measured))
         yield "source", in_text(self.manifest["source"])
         yield "folder", in_text("none" if self.folder is None else self.folder.path)
+
+
+def _quantiles(values: Array, at: Sequence[float]) -> Array:
+    """Quantiles as by `np.quantile`, but also of values of which some are infinite."""
+    with np.errstate(invalid="ignore"):
+        inner = np.quantile(values, at)
+        low, high = (np.quantile(values, at, method=end) for end in ("lower", "higher"))
+        outer = np.where(low == high, low, low + high)  # of which one is infinite or both
+    return np.where(np.isfinite(inner), inner, outer)
 
 
 def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:

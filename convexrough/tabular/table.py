@@ -385,9 +385,9 @@ def _places(
             choice = f": --column {name}={alike[0]}" if how.scalable else ""
             found = " and ".join(map(repr, alike))
             mistakes.append(f"columns: found {found}, expected one of them{choice}")
-        for known in (names, bared, lowered):
-            if count := known.count(called):
-                places[name] = known.index(called)
+        for known, it in ((names, called), (bared, called), (lowered, called.lower())):
+            if count := known.count(it):
+                places[name] = known.index(it)
                 if count > 1:
                     mistakes.append(f"columns: found {called!r} twice, expected once")
                 break

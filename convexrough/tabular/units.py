@@ -37,6 +37,7 @@ class Unit(NamedTuple):
 KINDS = {(1, 0): "length", (2, 0): "area", (0, 1): "force", (-2, 1): "pressure"}
 
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "": 0, "c": -2, "m": -3, "µ": -6, "n": -9, "p": -12}
+PSI = Fraction("4.4482216152605") / Fraction("0.0254") ** 2  # lbf / in^2
 _ONE = Unit(Fraction(1), 0, 0)
 
 #: Units by name: those with prefixes, then the others.
@@ -49,7 +50,7 @@ UNITS = {
     for name, size, powers in (
         *(("Å", "1e-10", (1, 0)), ("in", "0.0254", (1, 0)), ("dyn", "1e-5", (0, 1))),
         *(("kgf", "9.80665", (0, 1)), ("lbf", "4.4482216152605", (0, 1))),
-        *(("bar", "1e5", (-2, 1)), ("psi", "6894.757293168361", (-2, 1))),
+        *(("bar", "1e5", (-2, 1)), ("psi", PSI, (-2, 1))),
     )
 }
 

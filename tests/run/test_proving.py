@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, lines, scene_text
+from scene_files import FRICTION, HEXAGONAL, lines, scene_text
 
 import convexrough as cr
 
@@ -60,6 +60,17 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     assert wrong.status == 3
     assert "warning: proof.json is not written: nothing is proved" in wrong.err
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
+
+
+def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Path) -> None:
+    height = 1e-5 ** (2 / 3) / 0.4 - 0.25 + 2.8 / (3 * np.pi)
+    columns = {"x": [0, 0.5 / 2.8], "y": [0, 0], "height": [0, height], "tip_radius": [1, 1e-3]}
+    (tmp_path / "a.csv").write_text(lines(columns))
+    shear = FRICTION + "[shear]\nfractions = [0.9999, 0.999999]\n"
+    file = 'pattern = "file"\npath = "a.csv"\ngeometry = "summit"\n'
+    ran = run(scene_text(file, "approach = 0.25", shear, radius="1e6"), "--proof")
+    assert ran.err.count("warning: proof.json leaves out the shear force 0.0833") == 1
+    assert len(json.loads(Path("a-results/proof.json").read_text())["sheared"]) == 1
 
 
 def test_a_scene_too_large_to_prove_is_refused(run: Any) -> None:

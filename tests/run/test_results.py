@@ -39,9 +39,12 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
 def test_a_manifest_removes_nothing_outside_its_folder(run: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("precious")
     (tmp_path / "out").mkdir()
-    for files in (["../mine.txt"], [str(tmp_path / "mine.txt")], [1], 1):
+    for files in (["../mine.txt"], [str(tmp_path / "mine.txt")], [1]):
         (tmp_path / "out/files.json").write_text(json.dumps({"files": files}))
         assert run(scene_text(), "--out", "out", "--force").status == 0
+    for damaged in ('{"files": 1}', "[]", '{"files": ["a'):
+        (tmp_path / "out/files.json").write_text(damaged)
+        assert run(scene_text(), "--out", "out", "--force").refuses("files.json: damaged")
     assert (tmp_path / "mine.txt").read_text() == "precious"
 
 

@@ -102,6 +102,7 @@ WRONG = [
     ),
     (sweeping(over={"sweep.seeds": [1, 2]}), "over.sweep.seeds: expected a key of a"),
     (sweeping(over={"normal.load": [1e-7, 1e-7]}), "values, none of them twice"),
+    (sweeping(over={"sphere.radius": [1, 1.0]}), "values, none of them twice"),
     (
         sweeping(over={"material.sphere.poisson_ratio": [0.2]}, together={"material.sphere": [1]}),
         "over.material.sphere.poisson_ratio: swept twice, in [sweep.together] material.sphere too",

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL
+from scene_files import scene_text
+from scenes import MATERIAL, paper
 from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
@@ -120,6 +121,57 @@ def test_a_scene_that_fails_has_a_row_that_says_why() -> None:
     assert not np.isnan(contact[::2]).any()
 
 
+ELLIPSE = {"load": 3e-7, "load_amplitude": 5e-8, "force_amplitude": 4e-8, "chords": 6}
+HELD = {"gradient.holding": ["load", "approach"]}
+GROSS = "no gradient of the loss exists for this scene: [gradient] fraction: found 1, a force of"
+
+
+@pytest.mark.parametrize(
+    ("measure", "values", "fraction", "said"),
+    [
+        ("closest_change", {"asperities.geometry": ["summit", "closest"]}, 0.5, ""),
+        ("gradient.by.sphere_radius", {"sphere.radius": [1.0, [1.0, 2.0]]}, 0.5, ""),
+        ("gradient.by.load", HELD, 0.5, ""),
+        ("gradient.by.friction", HELD, 1.0, GROSS),
+        ("phase_losses.loss", {"steady.phases": [[0.0, 1.0], [0.5]]}, 0.5, ""),
+    ],
+)
+def test_a_missing_number_is_nan(measure: str, values: Any, fraction: float, said: str) -> None:
+    contents = sweeping(measure=["contact", measure], over=values)
+    contents["gradient"] = {"of": "loss", "fraction": fraction}
+    table = swept(contents | {"steady": {"ellipse": ELLIPSE}})
+    status, message, last = numbers(table, "status", "message", table.measured[-1])
+    assert status == ["certified", "undecided" if said else "certified"]
+    assert said in message[1]
+    assert np.isnan(last).tolist() == [False, True]
+    assert not np.isnan(table.read(["contact"])["contact"]).any()
+    assert not said or table.quantiles([measure])["0.05"][0] == -np.inf
+
+
+def test_a_figure_says_what_a_band_pools() -> None:
+    over = {"sphere.radius": [0.9, 1.0], "normal.load": [1e-7, 2e-7, 3e-7]}
+    table = swept(sweeping(over=over | {"friction.coefficient": [0.4, 0.5]}))
+    legend = table.plot("contact", "sphere.radius").get_legend()
+    assert "all load, coefficient: 6 combinations" in legend.get_texts()[0].get_text()
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda table: table.quantiles(at=[1.5]), r"at\[0\]: found 1.5, expected a number from 0"),
+        (lambda table: table.quantiles(at="a"), "at: found 'a', expected a list of quantiles"),
+        (lambda table: table.read("load"), "columns: found 'load', expected a list of names"),
+        (lambda _: swept([paper()], load=1e-7, cycle=[(0.5, 0.1)], measure=["loss"]), "cycle: "),
+        (lambda _: swept(SMALL, resume=True), "out: found none, expected the folder of"),
+        (lambda _: swept(SMALL, out="b", resume=True, overwrite=True), "overwrite: found both"),
+        (lambda _: cr.open_sweep("x" * 300), "cannot be read: File name too long"),
+    ],
+)
+def test_what_is_refused(whole: cr.SweepTable, call: Any, said: str) -> None:
+    with pytest.raises((cr.InputError, cr.FileError), match=said):
+        call(whole)
+
+
 def test_what_is_not_proved_is_said() -> None:
     graze = sweeping(over={"normal.approach": [0.0, 5e-5]})
     graze["normal"] = {}
@@ -162,7 +214,7 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     said = str(caught.value)
     assert "holds another sweep, 16 scenes of sweep by version" in said
     assert "this is 20 scenes of sweep" in said
-    with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; --resume"):
+    with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; resume=True"):
         swept(SMALL, out=folder)
     assert sorted(path.name for path in (folder / "parts").iterdir()) == before
     other = tables(sweep={"seeds": 1})
@@ -204,8 +256,10 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
 @pytest.mark.usefixtures("no_processes")
 def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
+    (tmp_path / "s.toml").write_text(scene_text())
     status, out, err = command("sweep", "a.toml", "--workers", "1")
     assert (status, err) == (0, "")
+    assert command("run", "s.toml", "--out", "a-sweep", "--force").refuses("results of `sweep`")
     assert "scenes      16\nrows        16\n  certified 16\n" in out
     status, out, err = command("sweep", "a.toml", "--workers", "1", "--resume", "--json")
     assert '"computed": 0' in out

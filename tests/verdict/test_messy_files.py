@@ -15,6 +15,7 @@ from scipy.io import savemat
 
 import convexrough as cr
 from convexrough.errors import TableError
+from convexrough.run.study import UnitsTable
 from convexrough.verdict.claims import Manner, read_loads
 
 COUNT = 12
@@ -518,6 +519,7 @@ def test_units_of_summits_convert_when_asked(case: Case) -> None:
         (UM, "", "µm, and a scene without units, expected [units]"),
         (XY | {"id": np.roll(np.arange(COUNT), 1)}, METRES, "column id: found "),
         (followed_by(np.mean), METRES, "row 14: found the means of the other rows, expected an"),
+        (XY | {"mean_pressure": HEIGHTS, "rise": HEIGHTS}, METRES, "columns: found rise, but no"),
         (followed_by(np.sum), METRES, "row 14: found the sums of the other rows, expected an"),
     ],
 )
@@ -529,12 +531,18 @@ def test_wrong_columns_of_summits(case: Case, columns: Columns, units: str, said
     assert ("convert = true" in str(refused.value)) == ("the scene's unit;" in said)
 
 
-@pytest.mark.parametrize("named", ["", 'height = "z"', 'z = "height"'])
+@pytest.mark.parametrize("named", ["", 'height = "z"', 'height = "Z"', 'z = "height"'])
 def test_summits_by_other_names(case: Case, named: str) -> None:
     path = case.folder / "scene.toml"
     path.write_text(path.read_text().replace("path =", f"columns = {{ {named} }}\npath ="))
     heights = case.read(XY | {"z": HEIGHTS}).scene.asperities.heights
     np.testing.assert_array_equal(heights, HEIGHTS)
+
+
+@pytest.mark.parametrize("units", ["m N Pa", "mm N MPa", "µm mN GPa", "µm µN MPa", "in lbf psi"])
+def test_a_pressure_implies_the_unit_of_force(units: str) -> None:
+    length, force, pressure = units.split()
+    assert UnitsTable(length=length, pressure=pressure).names.force == force
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,8 @@ class GradientResult(Single):
 
     def doubts(self) -> Iterator[str]:
         if not self.found:
-            yield f"no gradient of the {self.stage.of} exists for this scene"
+            why = self.none_because
+            yield f"no gradient of the {self.stage.of} exists for this scene: {why}"
         for each in self.found:
             if not np.isfinite([each.value_error, each.height_errors.max()]).all():
                 yield f"not proved: the gradient of the {self.stage.of}, whose errors have no bound"
