@@ -66,7 +66,7 @@ def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Pa
     height = 1e-5 ** (2 / 3) / 0.4 - 0.25 + 2.8 / (3 * np.pi)
     columns = {"x": [0, 0.5 / 2.8], "y": [0, 0], "height": [0, height], "tip_radius": [1, 1e-3]}
     (tmp_path / "a.csv").write_text(lines(columns))
-    shear = FRICTION + "[shear]\nfractions = [0.9999, 0.999999]\n"
+    shear = FRICTION + "[shear]\nfractions = [0.3, 0.9999]\n"
     file = 'pattern = "file"\npath = "a.csv"\ngeometry = "summit"\n'
     ran = run(scene_text(file, "approach = 0.25", shear, radius="1e6"), "--proof")
     assert ran.err.count("warning: proof.json leaves out the shear force 0.0833") == 1
