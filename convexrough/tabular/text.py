@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,12 +47,12 @@ COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 #: `_GROUPED`: a number whose digits are certainly in groups of three, as 1,234,567.
-#: `_PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
+#: `PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
 )
-_PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
@@ -355,34 +355,16 @@ def _are_holes(cells: Sequence[str]) -> bool:
 
 
 def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:
-    """Raise FileError for numbers with thousands separators.
-
-    Numbers such as 3,134 could have three decimals. They are refused if a column contains at least
-    ten of them, also whole numbers below 1000, and at most one cell of another form.
-    """
-    columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
+    """Raise FileError for numbers that certainly have thousands separators."""
     for number, line in lines:
         separator = next((each for each in ";\t" if each in line), style.separator)
         if separator == "," and '"' not in line:
             continue  # a comma separates
         row = _row(number, line, Style(separator, "."))
-        for place, cell in enumerate(line.split() if separator == " " else row.cells):
+        for cell in line.split() if separator == " " else row.cells:
             if _GROUPED.fullmatch(cell):
-                _refuse_grouped(path, number, cell)
-            if cell:
-                columns[place].append((number, cell))
-    for column in columns.values():
-        perhaps = [each for each in column if _PERHAPS_GROUPED.fullmatch(each[1])]
-        whole = [each for each in column if re.fullmatch(r"[+-]?\d{1,3}", each[1])]
-        if whole and len(perhaps) >= 10 and len(perhaps) + len(whole) >= len(column) - 1:
-            _refuse_grouped(path, *perhaps[0], f", and {whole[0][1]} in row {whole[0][0]}")
-
-
-def _refuse_grouped(path: Path, row: int, cell: str, more: str = "") -> NoReturn:
-    expected = "numbers without thousands separators" + (
-        ", or with the same number of decimals" if more else ""
-    )
-    raise FileError(f"{path}: row {row}: found {cell}{more}, expected {expected}")
+                expected = "numbers without thousands separators"
+                raise FileError(f"{path}: row {number}: found {cell}, expected {expected}")
 
 
 def _row(number: int, text: str, style: Style) -> TextRow:

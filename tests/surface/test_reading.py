@@ -144,6 +144,18 @@ ONE = {"pixel": 1.0}
 THOUSANDS = "1,003;1,021;997;1,040\n" * 10 + "1,011;990;1,007;1,002\n" * 10
 
 
+#: Heights of which only the largest exceed 999, with a point between its groups of digits.
+FEW_THOUSANDS = "827;12;9;640\n" * 4 + "827;1.013;9;640\n"
+
+
+def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
+    """Not without a whole number of three digits; 999 and more can mark holes."""
+    for cells in ("1.125 2 3", "1.125 -999 12.250", "1.125 -9999 120", "1.125 120 0.125"):
+        heights = np.outer([1, 1, 1], np.float64(cells.split()))
+        surface = raw(tmp_path / "a.txt", f"{cells} 7\n" * 3, pixel=1.0, fill=True)
+        assert_array_equal(surface.heights[:, 0], heights[:, 0])
+
+
 def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
     for mark in ("#N/A", "---", "***", "nan", ""):
         for separator in (",", ";", "\t", " ")[: 4 if mark else 3]:
@@ -226,8 +238,12 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
             ONE,
             "column 1: found numbers 1, 2, 3, ...",
         ),
-        (THOUSANDS, ONE, "row 1: found 1,021, and 990 in row 11, expected .* thousands"),
-        (THOUSANDS.replace(",", "."), ONE, "found 1.021, and 990 in row 11"),
+        (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
+        (THOUSANDS.replace(",", "."), ONE, "found 1.003, and 990 in row 11"),
+        (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
+        (FEW_THOUSANDS.replace(".", ","), ONE, "row 5: found 1,013, and 827 in row 1"),
+        (FEW_THOUSANDS.replace(";", '";"').replace(".", ","), ONE, "1,013, and 827 in row 1"),
+        ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
         (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
         (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
         (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
