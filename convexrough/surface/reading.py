@@ -23,8 +23,8 @@ from convexrough.surface.detrend import Trend
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
-from convexrough.tabular.table import COLUMNS, Reading, matrix, read_table
-from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, read_text_table
+from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
+from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, bare, read_text_table
 from convexrough.tabular.units import one_unit, parsed
 
 #: Suffixes of text files.
@@ -315,9 +315,15 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 
 
 def _from_list(path: Path, cells: TextTable) -> HeightGrid:
-    """The map from columns x, y and height, in any order; missing points of the grid are holes."""
+    """The map from columns x, y and height, in any order; missing points of the grid are holes.
+
+    Other columns could be a mask or a factor. They are an error, except an index.
+    """
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
                        holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
+    if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:
+        expected = "x, y, height and at most an index: delete other columns; nan marks holes"
+        raise InputError("columns", found=", ".join(others), expected=expected)
     x, y, z = (table.columns[name] for name in ("x", "y", "height"))
     units = [table.units.get(name, "") for name in ("x", "y", "height")]
     if units[0] != units[1]:
@@ -325,6 +331,14 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
         raise InputError("units", found=found, expected="one along x and y")
     heights, pixel = _on_grid(x, y, z)
     return HeightGrid(heights, pixel, units[0], units[2])
+
+
+def _is_label(name: str, cells: NDArray[Any]) -> bool:
+    """True for an index, and for the same text in every row, which cannot change heights."""
+    count = len(np.unique(cells))
+    if bare(name).lower() in INDEX:
+        return count == len(cells)
+    return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)
 
 
 def _arrays(path: Path) -> HeightGrid:

@@ -96,6 +96,8 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
+    more = "".join(f"{i},run 7,{line}\n" for i, line in enumerate(matrix(rows, ",").splitlines()))
+    assert_allclose(raw(tmp_path / "a.csv", f"id,note,x,y,z\n{more}").heights, HEIGHTS)
 
 
 def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
@@ -219,6 +221,14 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
+        *(
+            (
+                f"x,y,z,{name}\n0,0,1,1\n1,0,2,{it}\n0,1,3,1\n1,1,4,1\n",
+                {},
+                f"columns: found {name}, e",
+            )
+            for name, it in (("valid", 0), ("gain", 1), ("id", 0), ("ok", "False"))
+        ),
         ("", {}, "empty"),
         ("x,y,z\n", {}, "rows: found none below the header"),
         ("1 2 3 4\n", ONE, "shape"),
