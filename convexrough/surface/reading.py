@@ -80,6 +80,7 @@ class HeightGrid(NamedTuple):
     unit, height_unit : units of the pixel and of the heights; "" if not stated
     unclear : the first comment that states a length or a unit of length, but not in words that
         `read` knows; "" if there is none
+    sheet : the name of the sheet of a workbook, in quotes; else ""
     """
 
     heights: Array
@@ -87,6 +88,7 @@ class HeightGrid(NamedTuple):
     unit: str = ""
     height_unit: str = ""
     unclear: str = ""
+    sheet: str = ""
 
 
 def read(
@@ -144,7 +146,8 @@ def read(
             heights = np.where(holes, heights[~holes][0], heights)
         size = _pixel(grid.pixel, pixel)
         name = length.name if length else ""
-        surface = Surface(heights, size, name, filled_pixels=holes, source=str(path))
+        source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
+        surface = Surface(heights, size, name, filled_pixels=holes, source=source)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
@@ -222,8 +225,10 @@ def _text(path: Path) -> HeightGrid:
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
     """
-    table = read_text_table(path, ("x", "y", "height", *COLUMNS["height"].also), _COMMENT)
-    return _map(path, table)._replace(unclear=next(filter(_unclear, table.comments), ""))
+    known = ("x", "y", "height", *COLUMNS["height"].also)
+    table = read_text_table(path, known, _COMMENT, is_map=True)
+    unclear = next(filter(_unclear, table.comments), "")
+    return _map(path, table)._replace(unclear=unclear, sheet=table.style.sheet)
 
 
 def _unclear(comment: str) -> bool:

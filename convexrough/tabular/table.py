@@ -271,7 +271,7 @@ def _thousands(
     if not source.decimal:
         return  # numbers, not text
     for cells, values in zip(columns, numbers, strict=True):
-        parts = np.flatnonzero(np.floor(values) < values)
+        parts = np.flatnonzero(np.floor(values) < values).tolist()
         if not all(PERHAPS_GROUPED.fullmatch(cells[i]) for i in parts):
             return  # as soon as one cell has another form
     if not any(source.decimal in "\n".join(cells) for cells in columns):

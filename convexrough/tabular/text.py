@@ -10,10 +10,11 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -168,18 +169,22 @@ def read_text_table(
     known: Sequence[str] = (),
     comment: re.Pattern[str] = COMMENT,
     required: Sequence[str] = (),
+    *,
+    is_map: bool = False,
 ) -> TextTable:
     """The cells of a text file or workbook. Raises FileError if it is empty or of another kind.
 
     known : names of columns, in lower case; the line with most of them is the header
     required : those of them without which a sheet of a workbook is not read if another has them
+    is_map : True if only one sheet of a workbook may hold a map of heights, which is read
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
     title, separator, sheet = "", "", ""
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
-        separator, (sheet, numbered) = "\t", _sheet_lines(path, known, required)
+        separator = "\t"
+        sheet, numbered, comments = _sheet_lines(path, known, required, is_map)
     for number, line in numbered:
         text = line.strip("\r\n")
         inner = text.strip()
@@ -283,12 +288,13 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _sheet_lines(
-    path: Path, known: Sequence[str], required: Sequence[str]
-) -> tuple[str, Iterator[tuple[int, str]]]:
+    path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
+) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
     """The name and the numbered rows of the first sheet with most of the columns `required`.
 
     Without any, it is the first with a column of `known`, or the first. Tabs separate cells. The
-    name is in quotes, and followed by the names of other sheets that would do as well.
+    name is in quotes, and followed by the names of other sheets that would do as well. For a map
+    it is the only sheet that holds one; the rows of the others are returned as comments.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -298,6 +304,17 @@ def _sheet_lines(
                           for row in page.iter_rows(values_only=True)])
             for page in book.worksheets
         ]  # fmt: skip
+
+    aside: list[str] = []
+    if is_map and len(pages) > 1:
+        maps = [page for page in pages if _holds_map(page[1])]
+        if len(maps) != 1:
+            named = " and ".join(f'"{name}"' for name, _ in maps or pages)
+            found = f"maps in the sheets {named}" if maps else f"no map in the sheets {named}"
+            expected = "one sheet with three or more rows of numbers; delete other such sheets"
+            raise FileError(f"{path}: found {found}, expected {expected}")
+        aside = [" ".join(row) for page in pages if page is not maps[0] for row in page[1]]
+        pages = maps
 
     def there(page: list[list[str]]) -> tuple[int, bool]:
         names = {bare(cell).lower() for row in page[:SAMPLE] for cell in row}
@@ -311,7 +328,17 @@ def _sheet_lines(
     others = [f'"{pages[i][0]}"' for i in also]
     (first, rows) = pages[best]
     name = f'"{first}"' + (f", not {' or '.join(others)}" if others else "")
-    return name, enumerate(map("\t".join, rows), 1)
+    return name, enumerate(map("\t".join, rows), 1), aside
+
+
+def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
+    """True if at least three rows hold at least three numbers each; True and False count, too."""
+    style = Style("\t", ".")
+
+    def numbers(row: Sequence[str]) -> int:
+        return sum(cell in ("True", "False") or style.number(cell) is not None for cell in row)
+
+    return len([*islice((row for row in rows if numbers(row) >= 3), 3)]) == 3
 
 
 def _plain(cell: Any) -> str:

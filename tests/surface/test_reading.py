@@ -138,6 +138,25 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
 
+INFORMATION = [["Operator", "Lens"], ["Dana", 50], [3.0, "x"]]
+
+
+def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
+    path, both = tmp_path / "a.xlsx", 'in the sheets "Sheet" and "Sheet1", expected one sheet'
+    points = [["x", "y", "z"], *np.column_stack([X.ravel(), Y.ravel(), HEIGHTS.ravel()]).tolist()]
+    for sheet in (HEIGHTS.tolist(), points):
+        for sheets, name in (([INFORMATION, sheet], "Sheet1"), ([sheet, INFORMATION], "Sheet")):
+            surface = raw(path, sheets, pixel=1.0)
+            assert_allclose(surface.heights, HEIGHTS)
+            assert surface.source == f'{path}, sheet "{name}"'
+        with pytest.raises(cr.FileError, match=f"found maps {both}"):
+            raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
+        with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
+            raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+    with pytest.raises(cr.FileError, match=f"found no map {both}"):
+        raw(path, [INFORMATION, INFORMATION], pixel=1.0)
+
+
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
 ONE = {"pixel": 1.0}
 
