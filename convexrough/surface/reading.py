@@ -25,7 +25,7 @@ from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
 from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
 from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, bare, read_text_table
-from convexrough.tabular.units import one_unit, parsed
+from convexrough.tabular.units import in_text, one_unit, parsed
 
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
@@ -60,13 +60,7 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
-#: A unit of length anywhere in a comment ("um" is also a German word), and words that announce a
-#: scale.
-_UNIT = re.compile(
-    r"(?<![^\W\d])(?:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)(?!\w)"
-    r"|(?:[\d(\[,:=]|\bin)\s*um(?!\w)|纳米|微米|毫米",
-    re.I,
-)
+#: Words that announce a scale.
 _SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
 
 #: Largest accepted distance of a coordinate from the grid, in pixels.
@@ -240,7 +234,9 @@ def _unclear(comment: str) -> bool:
     unit = parsed(length[2] if length else value.strip())
     if marked and unit and unit.kind == "length":
         return True
-    return bool(_UNIT.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment)))
+    if any(not (unit := parsed(each)) or unit.kind == "length" for each in in_text(comment)):
+        return True
+    return bool(re.search(r"\d", comment) and _SCALE.search(comment))
 
 
 def _map(path: Path, table: TextTable) -> HeightGrid:

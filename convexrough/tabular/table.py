@@ -20,7 +20,7 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
 from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, TextTable, bare, read_text_table, unit
-from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
+from convexrough.tabular.units import NAMELESS, Unit, UnitNames, in_text, known_unit, parsed
 
 
 class Column(NamedTuple):
@@ -154,6 +154,7 @@ class _Source(NamedTuple):
     number: Callable[[Any], float | None]
     numbers: Callable[[Sequence[Any]], Array | None]
     mistakes: list[str]
+    comments: Sequence[str] = ()
 
 
 def read_table(
@@ -221,6 +222,8 @@ def read_table(
     units = {name: said for name, place in places.items() if (said := unit(names[place]))}
     factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
     mistakes += wrong
+    without = [name for name in places if name not in (*units, *how.scales)]
+    mistakes += _units_in(source.comments if table is None else (), without, how)
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -333,6 +336,23 @@ def _factors(
     return factors, mistakes
 
 
+def _units_in(comments: Sequence[str], names: Sequence[str], how: Reading) -> Iterator[str]:
+    """A mistake for each comment that names another unit than the scene's.
+
+    names : columns that have no unit in the header, so that the comment may be about them
+    """
+    kinds = {COLUMNS[name].kind for name in names}
+    for comment in comments:
+        for said in in_text(comment):
+            found = parsed(said)
+            kind = found.kind if found else "length"
+            scene = how.units.unit(kind)
+            if kind in kinds and not (found and scene and found.size == scene.size):
+                expected = f"units in the header, as NAME [{said}], or no such comment"
+                yield f"comments: found {_cut(comment)!r}, expected {expected}"
+                break
+
+
 def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     cells = source.columns[place]
     numbers = source.numbers(cells)
@@ -382,6 +402,7 @@ def _text_source(table: TextTable) -> _Source:
         number=style.number,
         numbers=style.numbers,
         mistakes=mistakes,
+        comments=table.comments,
     )
 
 

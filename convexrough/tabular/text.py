@@ -181,6 +181,7 @@ def read_text_table(
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
     title, separator, sheet = "", "", ""
+    units: list[str] = []
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
         separator = "\t"
@@ -192,9 +193,14 @@ def read_text_table(
             separator = inner[-1]
         elif comment.match(inner):
             comments.append(inner)
-            title = title if lines else inner.lstrip("#%")
+            said = inner.lstrip("#% ")
+            if not units and _are_units(cells := re.split(r"\s*[,;\s]\s*", said)):
+                units = cells
+            else:
+                title = title if lines else said
         elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
-            text = text if '"' in text else _BEHIND.split(text, maxsplit=1)[0]
+            text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
+            comments += behind if not lines else ()
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
         raise FileError(f"{path}: empty")
@@ -207,7 +213,11 @@ def read_text_table(
     rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
         raise FileError(f"{path}: empty")
-    header, rows = _headed(rows, title, style, known)
+    above, (header, rows) = rows, _headed(rows, title, style, known)
+    if header:
+        comments += [row.text for row in above if row.number < header.number]
+        if len(units) == len(header.cells) and not any(map(unit, header.cells)):
+            header = header._replace(cells=_with_units(header.cells, units))
     if header is None and len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
@@ -235,13 +245,26 @@ def _headed(
     header, line, rows = headers[place], rows[place], rows[place + 1 :]
     if style.separator == " ":
         header, rows = _listed(header, line, rows, style)
-    below = [cell.strip("[]() ") for cell in rows[0].cells] if rows else []
-    units = [each in ("", "-") or parsed(each) is not None for each in below]
-    if any(below) and all(units) and len(below) <= len(header):
-        header[: len(below)] = [f"{name} [{each}]" if each not in ("", "-") else name
-                                for name, each in zip(header, below, strict=False)]  # fmt: skip
-        rows = rows[1:]
+    below = rows[0].cells if rows else []
+    if _are_units(below) and len(below) <= len(header):
+        header, rows = _with_units(header, below), rows[1:]
     return line._replace(cells=header), rows
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """True for a line of units, possibly in brackets; a dash or nothing where there is none."""
+    bared = [cell.strip("[]() ") for cell in cells]
+    return any(bared) and all(cell in ("", "-") or parsed(cell) is not None for cell in bared)
+
+
+def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
+    """The names of columns, each followed by its unit in brackets."""
+    bared = [cell.strip("[]() ") for cell in units]
+    named = [
+        name if each in ("", "-") else f"{name} [{each}]"
+        for name, each in zip(names, bared, strict=False)
+    ]
+    return [*named, *names[len(named) :]]
 
 
 def _listed(
