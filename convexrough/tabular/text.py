@@ -34,7 +34,8 @@ LONGEST_NUMBER, LONGEST_NAME = 400, 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: The separator and the decimal mark are chosen from at most this many lines.
+#: The separator and the decimal mark are chosen from at most this many first lines, and as many of
+#: the others that contain a mark.
 SAMPLE = 200
 
 #: Cells that mean an unknown number, in lower case.
@@ -205,7 +206,9 @@ def read_text_table(
     if not lines:
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
-    style = _sniffed([text for _, text in lines[:SAMPLE]], styles)
+    marked = (text for _, text in islice(lines, SAMPLE, None) if "," in text or "." in text)
+    sample = [text for _, text in lines[:SAMPLE]]
+    style = _sniffed([*sample, *islice(marked, SAMPLE)], styles)
     _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
     read = (_row(number, text, style) for number, text in lines)
     every = list(read)

@@ -111,6 +111,14 @@ def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
     assert_array_equal(spaced.heights, HEIGHTS)
 
 
+@pytest.mark.parametrize(("separator", "mark"), [(";", ","), (";", "."), ("\t", ","), (" ", ",")])
+def test_decimals_after_many_whole_numbers(tmp_path: Path, separator: str, mark: str) -> None:
+    cells = np.full((400, 4), "0", dtype=object)
+    cells[350:] = f"-0{mark}25"
+    surface = raw(tmp_path / "a.txt", "\n".join(map(separator.join, cells)), pixel=1.0)
+    assert_array_equal(surface.heights[348:352, 0], [0, 0, -0.25, -0.25])
+
+
 @pytest.mark.parametrize("form", ["vectors", "matrices", "matrices along x"])
 def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
     x, y = (2 * X[0], 3 * Y[:, 0]) if form == "vectors" else (2 * X, 3 * Y)
