@@ -396,6 +396,14 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pixels of two sizes": (
         lambda case: {name: each[fine_and_coarse()] for name, each in case.pixels().items()}, "",
         "expected a column 'area', or x and y on a regular grid: x, y pixels of several sizes"),
+    "pixels of two widths": (
+        lambda case: {name: each[~np.tile((np.arange(121) < 60) & (np.arange(121) % 2 > 0), 121)]
+                      for name, each in case.pixels().items()}, "",
+        "x and y on a regular grid: x, y without ", "points between points under pressure"),
+    "pixels without every third row": (
+        lambda case: {name: each[np.repeat(np.arange(121) % 3 > 0, 121)]
+                      for name, each in case.pixels().items()}, "",
+        "x and y on a regular grid: x, y without ", "points between points under pressure"),
     "another name, not said": (lambda case: case.table("x y Fz"), "",
                                "expected a column 'load'; --column load=Fz names another"),
     "pixels under another name": (
