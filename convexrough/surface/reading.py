@@ -247,7 +247,7 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
         if min(heights.shape) > 2:
             for place, lines in (("row", heights), ("column", heights.T)):
                 if _even(lines[0, 1:]) and not _even(lines[1, 1:]):
-                    raise _not_heights(f"{place} 1", lines[0, 1:])
+                    raise _not_heights(f"{place} 1", lines[0][~np.isnan(lines[0])])
                 off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
                 if (np.abs(off) < 0.01 * spread).all():
                     found = f"the means of the {'columns' if place == 'row' else 'rows'}"
@@ -257,9 +257,9 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
     if names and all(table.style.number(name.replace(",", ".")) is not None for name in names):
         expected = "decimal points, not commas in quotes"
         raise InputError("row 1", found=names[0], expected=expected)
-    first = [table.style.number(name) for name in names[1:]] if width > 3 else []
-    if len(first) > 2 and None not in first:
-        raise _not_heights("row 1", first)
+    first = [table.style.number(name) for name in names] if width > 3 else []
+    if len(first) > 3 and None not in first[1:]:
+        raise _not_heights("row 1", [each for each in first if each is not None])
     if table.header and len(names) < 3 < width:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
         found = repr(table.header.text[:60])
