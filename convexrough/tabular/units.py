@@ -63,7 +63,7 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
     r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
-    r"|(?:[\d(\[,:=]|\b[Ii]n)\s*((?i:um)|[mN])(?![\w/])|(纳米|微米|毫米)"
+    r"|(?:[\d(\[,:=]|\b[Ii]n)\s*((?i:um)|[mN])(?![\w/]|\s*=)|(纳米|微米|毫米)"
 )
 
 

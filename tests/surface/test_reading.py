@@ -310,7 +310,7 @@ def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
 
 
 def test_other_comments_are_ignored(tmp_path: Path) -> None:
-    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 2 Hz, 20 °C\n"
+    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 20 °C, m = 5\n"
     assert raw(tmp_path / "map.txt", said + matrix(), pixel=1.0).pixel == (1.0, 1.0)
 
 
