@@ -34,9 +34,9 @@ LONGEST_NUMBER, LONGEST_NAME = 400, 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: The separator and the decimal mark are chosen from at most this many first lines, and as many of
-#: the others that contain a mark.
-SAMPLE = 200
+#: The separator and the decimal mark are chosen from at most SAMPLE first lines and LATER others
+#: that contain a mark.
+SAMPLE, LATER = 200, 20
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
@@ -208,7 +208,7 @@ def read_text_table(
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
     marked = (text for _, text in islice(lines, SAMPLE, None) if "," in text or "." in text)
     sample = [text for _, text in lines[:SAMPLE]]
-    style = _sniffed([*sample, *islice(marked, SAMPLE)], styles)
+    style = _sniffed([*sample, *islice(marked, LATER)], styles)
     _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
     read = (_row(number, text, style) for number, text in lines)
     every = list(read)
