@@ -26,12 +26,12 @@ SUSPICIOUS = 1e-3
 #: The prefix of a wrong unit of force, by the power of ten by which it makes forces too large.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
-#: `_moved` treats points as equal if nearer than SAME_PLACE times the size of the array. It accepts
-#: a symmetry that leaves at most CORRECTED times the error.
+#: `_moved` treats points as equal if nearer than SAME_PLACE times the size of the array. `hints`
+#: does not explain an error of at most CORRECTED times the largest force.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: `hints` reports a common factor of the forces if dividing by it leaves at most this part of the
-#: error.
+#: `hints` reports a common factor of the forces or a symmetry of the array if the correction by it
+#: leaves at most this part of the error.
 REMAINING = 0.1
 
 
@@ -171,10 +171,8 @@ class Claim(ABC):
             ("the other sign of x and y", -points),
         ):
             distances, partners = map(np.asarray, tree.query(moved))
-            left = np.abs(values[partners] - true).max()
-            if distances.max() <= SAME_PLACE * size and (
-                left <= CORRECTED * np.abs(values - true).max()
-            ):
+            left, apart = (np.abs(each - true).max() for each in (values[partners], values))
+            if distances.max() <= SAME_PLACE * size and left <= min(WITHIN, REMAINING * apart):
                 return said
         return ""
 

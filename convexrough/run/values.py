@@ -87,9 +87,8 @@ _TwoLengths = Annotated[
 Radius = Annotated[
     Annotated[_Length, Tag("(number)")] | Annotated[_TwoLengths, Tag("(list)")], NUMBER_OR_LIST
 ]
-_Pair = Annotated[
-    list[Finite], expected("a pair [x, y] of finite numbers", lambda value: len(value) == 2)
-]
+NUMBER_OR_PAIR = 'a finite number, or with kind = "vector" a pair [x, y] of finite numbers'
+_Pair = Annotated[list[Finite], expected(NUMBER_OR_PAIR, lambda value: len(value) == 2)]
 Force = Annotated[
     Annotated[Finite, Tag("(number)")] | Annotated[_Pair, Tag("(list)")], NUMBER_OR_LIST
 ]
@@ -155,7 +154,8 @@ def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
 def _again(error: ErrorDetails) -> InitErrorDetails:
     """The same mistake, in the form that pydantic needs to raise several mistakes at once."""
     kind = error["type"] if error["type"] in ("told", "missing") else "expected"
-    expects = "a table" if error["type"] == "model_type" else error["msg"]
+    expects = error["msg"].removeprefix("Input should be ")
+    expects = "a table" if error["type"] == "model_type" else expects
     again = PydanticCustomError(kind, "{said}", {"said": expects})
     return InitErrorDetails(type=again, loc=error["loc"], input=error["input"])
 

@@ -23,9 +23,9 @@ from convexrough.surface.detrend import Trend
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
-from convexrough.tabular.table import COLUMNS, Reading, matrix, read_table
-from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, read_text_table
-from convexrough.tabular.units import one_unit, parsed
+from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
+from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, bare, read_text_table
+from convexrough.tabular.units import in_text, one_unit, parsed
 
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
@@ -61,13 +61,7 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
-#: _UNIT: a unit of length anywhere in a comment ("um" is also a German word, so it needs a number
-#: or mark before it). _SCALE: words that announce a scale.
-_UNIT = re.compile(
-    r"(?<![^\W\d])(?:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)(?!\w)"
-    r"|(?:[\d(\[,:=]|\bin)\s*um(?!\w)|纳米|微米|毫米",
-    re.I,
-)
+#: Words that announce a scale.
 _SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
 
 #: Largest accepted distance of a coordinate from the grid, in pixels.
@@ -80,8 +74,9 @@ class HeightGrid(NamedTuple):
     heights : nan where the file states no height; marks such as -9999 are unchanged
     pixel : size of a pixel along x and y; None if not stated
     unit, height_unit : units of the pixel and of the heights; "" if not stated
-    unclear : the first comment that seems to state a scale in words that `read` does not know; ""
-        if there is none
+    unclear : the first comment that states a length or a unit of length, but not in words that
+        `read` knows; "" if there is none
+    sheet : the name of the sheet of a workbook, in quotes; else ""
     """
 
     heights: Array
@@ -89,6 +84,7 @@ class HeightGrid(NamedTuple):
     unit: str = ""
     height_unit: str = ""
     unclear: str = ""
+    sheet: str = ""
 
 
 def read(
@@ -147,7 +143,8 @@ def read(
             heights = np.where(holes, heights[~holes][0], heights)
         size = _pixel(grid.pixel, pixel)
         name = length.name if length else ""
-        surface = Surface(heights, size, name, filled_pixels=holes, source=str(path))
+        source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
+        surface = Surface(heights, size, name, filled_pixels=holes, source=source)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
@@ -228,8 +225,10 @@ def _text(path: Path) -> HeightGrid:
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
     """
-    table = read_text_table(path, ("x", "y", "height", *COLUMNS["height"].also), _COMMENT)
-    return _map(path, table)._replace(unclear=next(filter(_unclear, table.comments), ""))
+    known = ("x", "y", "height", *COLUMNS["height"].also)
+    table = read_text_table(path, known, _COMMENT, is_map=True)
+    unclear = next(filter(_unclear, table.comments), "")
+    return _map(path, table)._replace(unclear=unclear, sheet=table.style.sheet)
 
 
 def _unclear(comment: str) -> bool:
@@ -241,7 +240,9 @@ def _unclear(comment: str) -> bool:
     unit = parsed(length[2] if length else value.strip())
     if marked and unit and unit.kind == "length":
         return True
-    return bool(_UNIT.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment)))
+    if any(not (unit := parsed(each)) or unit.kind == "length" for each in in_text(comment)):
+        return True
+    return bool(re.search(r"\d", comment) and _SCALE.search(comment))
 
 
 def _map(path: Path, table: TextTable) -> HeightGrid:
@@ -252,7 +253,7 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
         if min(heights.shape) > 2:
             for place, lines in (("row", heights), ("column", heights.T)):
                 if _even(lines[0, 1:]) and not _even(lines[1, 1:]):
-                    raise _not_heights(f"{place} 1", lines[0, 1:])
+                    raise _not_heights(f"{place} 1", lines[0][~np.isnan(lines[0])])
                 off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
                 if (np.abs(off) < 0.01 * spread).all():
                     found = f"the means of the {'columns' if place == 'row' else 'rows'}"
@@ -262,9 +263,9 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
     if names and all(table.style.number(name.replace(",", ".")) is not None for name in names):
         expected = "decimal points, not commas in quotes"
         raise InputError("row 1", found=names[0], expected=expected)
-    first = [table.style.number(name) for name in names[1:]] if width > 3 else []
-    if len(first) > 2 and None not in first:
-        raise _not_heights("row 1", first)
+    first = [table.style.number(name) for name in names] if width > 3 else []
+    if len(first) > 3 and None not in first[1:]:
+        raise _not_heights("row 1", [each for each in first if each is not None])
     if table.header and len(names) < 3 < width:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
         found = repr(table.header.text[:60])
@@ -321,9 +322,15 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 
 
 def _from_list(path: Path, cells: TextTable) -> HeightGrid:
-    """The map from columns x, y and height, in any order; missing points of the grid are holes."""
+    """The map from columns x, y and height, in any order; missing points of the grid are holes.
+
+    Other columns could be a mask or a factor. They are an error, except an index.
+    """
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
                        holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
+    if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:
+        expected = "x, y, height and at most an index: delete other columns; nan marks holes"
+        raise InputError("columns", found=", ".join(others), expected=expected)
     x, y, z = (table.columns[name] for name in ("x", "y", "height"))
     units = [table.units.get(name, "") for name in ("x", "y", "height")]
     if units[0] != units[1]:
@@ -331,6 +338,14 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
         raise InputError("units", found=found, expected="one along x and y")
     heights, pixel = _on_grid(x, y, z)
     return HeightGrid(heights, pixel, units[0], units[2])
+
+
+def _is_label(name: str, cells: NDArray[Any]) -> bool:
+    """True for an index, and for the same text in every row, which cannot change heights."""
+    count = len(np.unique(cells))
+    if bare(name).lower() in INDEX:
+        return count == len(cells)
+    return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)
 
 
 def _arrays(path: Path) -> HeightGrid:

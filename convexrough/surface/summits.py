@@ -142,7 +142,8 @@ class Summits(Table, Asperities, Plottable):
     @property
     def elliptic_loads(self) -> Array:
         """(n,) load of the elliptic tip over the load of its sphere at the same indentation."""
-        return frozen(ellipse.load_ratio(self.largest_curvatures / self.smallest_curvatures))
+        ratios = ellipse.load_ratio(self.largest_curvatures / self.smallest_curvatures)
+        return frozen(np.maximum(ratios, 1.0))  # exactly 1 for a sphere, in spite of rounding
 
     @property
     def statistics(self) -> Statistics:
@@ -222,7 +223,8 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
     product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
     larger = np.where(whole, middle + half, 1.0)
-    curvatures = np.stack((larger, product / larger), axis=1)  # avoids cancellation
+    smaller = np.minimum(product / larger, larger)  # avoids cancellation
+    curvatures = np.stack((larger, smaller), axis=1)
     summits = z0 + (gu * top[0] + gv * top[1]) / 2
     x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2

@@ -216,7 +216,7 @@ class Surface(Record, Plottable):
                 "heights and of the pixel"
             )
         if len(places := holes.spikes(self._measured)):
-            row, column = places[0]
+            row, column = places[0] + 1
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "
                 f"in row {row}, column {column}; make them nan and use fill=True, or --fill"
@@ -363,7 +363,7 @@ def _checked(heights: ArrayLike) -> Array:
         raise InputError("heights", found=found, expected="none: `read` can fill them")
     if not (good := np.abs(grid) <= checks.LARGEST).all():
         row, column = np.argwhere(~good)[0]
-        found = f"{grid[row, column]} in row {row}, column {column}"
+        found = f"{grid[row, column]} in row {row + 1}, column {column + 1}"
         raise InputError("heights", found=found, expected="finite numbers")
     if np.ptp(grid) <= ROUNDING * float(np.abs(grid).max()):
         raise InputError("heights", found=f"{grid[0, 0]:g} everywhere", expected="a rough surface")

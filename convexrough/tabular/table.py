@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,8 +19,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import HOLES, TextTable, bare, read_text_table, unit
-from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
+from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, TextTable, bare, read_text_table, unit
+from convexrough.tabular.units import NAMELESS, Unit, UnitNames, in_text, known_unit, parsed
 
 
 class Column(NamedTuple):
@@ -62,6 +63,12 @@ MOST_SHOWN = 60
 
 #: Similarity above which the name of an unread column may be a misspelling of a missing one.
 LOOKS_LIKE = 0.75
+
+#: If at least this many cells are such as 1.013, whole numbers below 100 beside them also show that
+#: the mark separates thousands.
+SURELY_GROUPED = 10
+
+_WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
 
 #: Relative difference up to which two factors count as equal.
 SAME = 1e-9
@@ -143,9 +150,11 @@ class _Source(NamedTuple):
     rows: list[str]
     lines: list[str]
     style: str
+    decimal: str
     number: Callable[[Any], float | None]
     numbers: Callable[[Sequence[Any]], Array | None]
     mistakes: list[str]
+    comments: Sequence[str] = ()
 
 
 def read_table(
@@ -213,6 +222,8 @@ def read_table(
     units = {name: said for name, place in places.items() if (said := unit(names[place]))}
     factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
     mistakes += wrong
+    without = [name for name in places if name not in (*units, *how.scales)]
+    mistakes += _units_in(source.comments if table is None else (), without, how)
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -220,6 +231,7 @@ def read_table(
             read[name] = np.array([str(cell) for cell in cells])
         else:
             numbers = _numbers(name, cells, source, mistakes, name in holes)
+            mistakes += _thousands([cells], [numbers], source)
             read[name] = numbers * factors.get(name, 1.0)
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
@@ -245,9 +257,38 @@ def matrix(path: Path, table: TextTable) -> Array:
     columns = [
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
+    mistakes += _thousands(source.columns, columns, source)
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
     return np.column_stack(columns)
+
+
+def _thousands(
+    columns: Sequence[Sequence[Any]], numbers: Sequence[Array], source: _Source
+) -> Iterator[str]:
+    """A mistake if cells such as 1.013 beside 827 seem to have thousands separators.
+
+    They seem to if every cell is such a cell or a whole number, and if at least one whole number
+    has three digits or `SURELY_GROUPED` cells are of this form. But 999 often marks a hole.
+    """
+    if not source.decimal:
+        return  # numbers, not text
+    for cells, values in zip(columns, numbers, strict=True):
+        parts = np.flatnonzero(np.floor(values) < values).tolist()
+        if not all(PERHAPS_GROUPED.fullmatch(cells[i]) for i in parts):
+            return  # as soon as one cell has another form
+    if not any(source.decimal in "\n".join(cells) for cells in columns):
+        return
+    every = [each for cells in columns for each in zip(cells, source.rows, strict=True)]
+    grouped = [each for each in every if PERHAPS_GROUPED.fullmatch(each[0])]
+    whole = [each for each in every if _WHOLE.fullmatch(each[0])]
+    if len(grouped) + len(whole) < sum(cell.lower() not in HOLES for cell, _ in every):
+        return
+    sign = _WHOLE if len(grouped) >= SURELY_GROUPED else _HUNDREDS
+    if grouped and (shown := next((each for each in whole if sign.fullmatch(each[0])), None)):
+        found = f"found {grouped[0][0]}, and {shown[0]} in {shown[1]}"
+        expected = "numbers without thousands separators, or with the same number of decimals"
+        yield f"{grouped[0][1]}: {found}, expected {expected}"
 
 
 def _factors(
@@ -295,6 +336,23 @@ def _factors(
     return factors, mistakes
 
 
+def _units_in(comments: Sequence[str], names: Sequence[str], how: Reading) -> Iterator[str]:
+    """A mistake for each comment that names another unit than the scene's.
+
+    names : columns that have no unit in the header, so that the comment may be about them
+    """
+    kinds = {COLUMNS[name].kind for name in names}
+    for comment in comments:
+        for said in in_text(comment):
+            found = parsed(said)
+            kind = found.kind if found else "length"
+            scene = how.units.unit(kind)
+            if kind in kinds and not (found and scene and found.size == scene.size):
+                expected = f"units in the header, as NAME [{said}], or no such comment"
+                yield f"comments: found {_cut(comment)!r}, expected {expected}"
+                break
+
+
 def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     cells = source.columns[place]
     numbers = source.numbers(cells)
@@ -311,6 +369,7 @@ def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
             rows=[f"entry {i}" for i in range(count)],
             lines=[""] * count,
             style="",
+            decimal="",
             number=_as_number,
             numbers=_as_numbers,
             mistakes=[],
@@ -339,9 +398,11 @@ def _text_source(table: TextTable) -> _Source:
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],
         style=str(style) if style.sheet or width > 1 or style.decimal == "," else "",
+        decimal=style.decimal,
         number=style.number,
         numbers=style.numbers,
         mistakes=mistakes,
+        comments=table.comments,
     )
 
 
@@ -456,6 +517,8 @@ def _numbers(
             if number is None:
                 comma = source.number(str(cell).replace(",", ".", 1)) is not None
                 expected = "a decimal point, not a comma" if comma else "a finite number"
+                if PERHAPS_GROUPED.fullmatch(str(cell)):
+                    expected += ", and no thousands separators"
                 raise InputError(place, found=_cut(repr(cell)), expected=expected)
             numbers[i] = check(place, number)
         except InputError as error:

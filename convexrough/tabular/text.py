@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
+from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,8 +34,9 @@ LONGEST_NUMBER, LONGEST_NAME = 400, 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: The separator and the decimal mark are chosen from at most this many lines.
-SAMPLE = 200
+#: The separator and the decimal mark are chosen from at most SAMPLE first lines and LATER others
+#: that contain a mark.
+SAMPLE, LATER = 200, 20
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
@@ -47,12 +49,12 @@ COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 #: `_GROUPED`: a number whose digits are certainly in groups of three, as 1,234,567.
-#: `_PERHAPS_GROUPED`: a number such as 3,134, in which the mark can also be a decimal mark.
+#: `PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
 )
-_PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
@@ -168,18 +170,23 @@ def read_text_table(
     known: Sequence[str] = (),
     comment: re.Pattern[str] = COMMENT,
     required: Sequence[str] = (),
+    *,
+    is_map: bool = False,
 ) -> TextTable:
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
-    known : names of columns, in lower case; the line with most of these names is the header
-    required : the names in `known` that decide which sheet of a workbook is read: the one with most
+    known : names of columns, in lower case; the line with most of them is the header
+    required : those of them without which a sheet of a workbook is not read if another has them
+    is_map : True if only one sheet of a workbook may hold a map of heights, which is read
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
     title, separator, sheet = "", "", ""
+    units: list[str] = []
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
-        separator, (sheet, numbered) = "\t", _sheet_lines(path, known, required)
+        separator = "\t"
+        sheet, numbered, comments = _sheet_lines(path, known, required, is_map)
     for number, line in numbered:
         text = line.strip("\r\n")
         inner = text.strip()
@@ -187,14 +194,21 @@ def read_text_table(
             separator = inner[-1]
         elif comment.match(inner):
             comments.append(inner)
-            title = title if lines else inner.lstrip("#%")
+            said = inner.lstrip("#% ")
+            if not units and _are_units(cells := re.split(r"\s*[,;\s]\s*", said)):
+                units = cells
+            else:
+                title = title if lines else said
         elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
-            text = text if '"' in text else _BEHIND.split(text, maxsplit=1)[0]
+            text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
+            comments += behind if not lines else ()
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
-    style = _sniffed([text for _, text in lines[:SAMPLE]], styles)
+    marked = (text for _, text in islice(lines, SAMPLE, None) if "," in text or "." in text)
+    sample = [text for _, text in lines[:SAMPLE]]
+    style = _sniffed([*sample, *islice(marked, LATER)], styles)
     _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
     read = (_row(number, text, style) for number, text in lines)
     every = list(read)
@@ -202,7 +216,11 @@ def read_text_table(
     rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
         raise FileError(f"{path}: empty")
-    header, rows = _headed(rows, title, style, known)
+    above, (header, rows) = rows, _headed(rows, title, style, known)
+    if header:
+        comments += [row.text for row in above if row.number < header.number]
+        if len(units) == len(header.cells) and not any(map(unit, header.cells)):
+            header = header._replace(cells=_with_units(header.cells, units))
     if header is None and len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
@@ -230,13 +248,26 @@ def _headed(
     header, line, rows = headers[place], rows[place], rows[place + 1 :]
     if style.separator == " ":
         header, rows = _listed(header, line, rows, style)
-    below = [cell.strip("[]() ") for cell in rows[0].cells] if rows else []
-    units = [each in ("", "-") or parsed(each) is not None for each in below]
-    if any(below) and all(units) and len(below) <= len(header):
-        header[: len(below)] = [f"{name} [{each}]" if each not in ("", "-") else name
-                                for name, each in zip(header, below, strict=False)]  # fmt: skip
-        rows = rows[1:]
+    below = rows[0].cells if rows else []
+    if _are_units(below) and len(below) <= len(header):
+        header, rows = _with_units(header, below), rows[1:]
     return line._replace(cells=header), rows
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """True for a line of units, possibly in brackets; a dash or nothing where there is none."""
+    bared = [cell.strip("[]() ") for cell in cells]
+    return any(bared) and all(cell in ("", "-") or parsed(cell) is not None for cell in bared)
+
+
+def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
+    """The names of columns, each followed by its unit in brackets."""
+    bared = [cell.strip("[]() ") for cell in units]
+    named = [
+        name if each in ("", "-") else f"{name} [{each}]"
+        for name, each in zip(names, bared, strict=False)
+    ]
+    return [*named, *names[len(named) :]]
 
 
 def _listed(
@@ -283,12 +314,13 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _sheet_lines(
-    path: Path, known: Sequence[str], required: Sequence[str]
-) -> tuple[str, Iterator[tuple[int, str]]]:
-    """The name and the numbered rows of the sheet that has most of the columns `required`.
+    path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
+) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
+    """The name and the numbered rows of the first sheet with most of the columns `required`.
 
-    Of equal sheets, those with a column of `known` are preferred, then the first. Tabs separate
-    cells. The name is in quotes, and followed by the names of other sheets that are as suitable.
+    Without any, it is the first with a column of `known`, or the first. Tabs separate cells. The
+    name is in quotes, and followed by the names of other sheets that would do as well. For a map
+    it is the only sheet that holds one; the rows of the others are returned as comments.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -298,6 +330,17 @@ def _sheet_lines(
                           for row in page.iter_rows(values_only=True)])
             for page in book.worksheets
         ]  # fmt: skip
+
+    aside: list[str] = []
+    if is_map and len(pages) > 1:
+        maps = [page for page in pages if _holds_map(page[1])]
+        if len(maps) != 1:
+            named = " and ".join(f'"{name}"' for name, _ in maps or pages)
+            found = f"maps in the sheets {named}" if maps else f"no map in the sheets {named}"
+            expected = "one sheet with three or more rows of numbers; delete other such sheets"
+            raise FileError(f"{path}: found {found}, expected {expected}")
+        aside = [" ".join(row) for page in pages if page is not maps[0] for row in page[1]]
+        pages = maps
 
     def there(page: list[list[str]]) -> tuple[int, bool]:
         names = {bare(cell).lower() for row in page[:SAMPLE] for cell in row}
@@ -311,7 +354,17 @@ def _sheet_lines(
     others = [f'"{pages[i][0]}"' for i in also]
     (first, rows) = pages[best]
     name = f'"{first}"' + (f", not {' or '.join(others)}" if others else "")
-    return name, enumerate(map("\t".join, rows), 1)
+    return name, enumerate(map("\t".join, rows), 1), aside
+
+
+def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
+    """True if at least three rows hold at least three numbers each; True and False count, too."""
+    style = Style("\t", ".")
+
+    def numbers(row: Sequence[str]) -> int:
+        return sum(cell in ("True", "False") or style.number(cell) is not None for cell in row)
+
+    return len([*islice((row for row in rows if numbers(row) >= 3), 3)]) == 3
 
 
 def _plain(cell: Any) -> str:
@@ -355,35 +408,16 @@ def _are_holes(cells: Sequence[str]) -> bool:
 
 
 def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:
-    """Raise FileError for numbers with thousands separators.
-
-    Numbers such as 3,134 could have three decimals. They are refused if a column contains at least
-    ten such numbers and at least one whole number below 1000, but at most one cell of any other
-    form.
-    """
-    columns: dict[int, list[tuple[int, str]]] = defaultdict(list)
+    """Raise FileError for numbers that certainly have thousands separators."""
     for number, line in lines:
         separator = next((each for each in ";\t" if each in line), style.separator)
         if separator == "," and '"' not in line:
             continue  # a comma separates
         row = _row(number, line, Style(separator, "."))
-        for place, cell in enumerate(line.split() if separator == " " else row.cells):
+        for cell in line.split() if separator == " " else row.cells:
             if _GROUPED.fullmatch(cell):
-                _refuse_grouped(path, number, cell)
-            if cell:
-                columns[place].append((number, cell))
-    for column in columns.values():
-        perhaps = [each for each in column if _PERHAPS_GROUPED.fullmatch(each[1])]
-        whole = [each for each in column if re.fullmatch(r"[+-]?\d{1,3}", each[1])]
-        if whole and len(perhaps) >= 10 and len(perhaps) + len(whole) >= len(column) - 1:
-            _refuse_grouped(path, *perhaps[0], f", and {whole[0][1]} in row {whole[0][0]}")
-
-
-def _refuse_grouped(path: Path, row: int, cell: str, more: str = "") -> NoReturn:
-    expected = "numbers without thousands separators" + (
-        ", or with the same number of decimals" if more else ""
-    )
-    raise FileError(f"{path}: row {row}: found {cell}{more}, expected {expected}")
+                expected = "numbers without thousands separators"
+                raise FileError(f"{path}: row {number}: found {cell}, expected {expected}")
 
 
 def _row(number: int, text: str, style: Style) -> TextRow:

@@ -59,6 +59,19 @@ _ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
+#: A unit of length or force in a sentence. Short names count only after a digit, a mark or "in", as
+#: "um" is also a German word.
+_IN_TEXT = re.compile(
+    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
+    r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
+    r"|(?:[\d(\[,:=]|\b[Ii]n)\s*((?i:um)|[mN])(?![\w/]|\s*=)|(纳米|微米|毫米)"
+)
+
+
+def in_text(text: str) -> list[str]:
+    """The units of length and force that a sentence seems to name."""
+    return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
+
 
 def parsed(name: str) -> Unit | None:
     """The unit with a name such as µm, N/mm² or kPa; None if unknown."""

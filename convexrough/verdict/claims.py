@@ -45,6 +45,10 @@ CLAIMS = {
 #: Difference of heights or tip radii, divided by the largest, that may be due to rounding.
 ROUNDED = 1e-2
 
+#: A grid line lacks points if it misses more than GAPS times as many as it has under pressure. A
+#: grid lacks points if such lines miss more than FEW_GAPS times as many as it has.
+GAPS, FEW_GAPS = 0.5, 0.05
+
 #: Largest number of unknown words of a column in a note.
 MOST = 3
 
@@ -291,6 +295,7 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
     try:
         (i, dx), (j, dy) = (steps(name, columns[name]) for name in ("x", "y"))
         _check_one_size(i, j, count)
+        _check_whole(i, j, columns["pressure"] != 0)
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
         mistake = f"columns: found pressure without areas, expected {expected}"
@@ -310,6 +315,28 @@ def _check_one_size(i: Indices, j: Indices, count: int) -> None:
     alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
     if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
         raise InputError("x, y", found="pixels of several sizes", expected="one size")
+
+
+def _check_whole(i: Indices, j: Indices, loaded: NDArray[np.bool_]) -> None:
+    """Raise InputError if a grid lacks points under pressure, as a coarser mesh does.
+
+    A missing point with pressure on both sides can be a gap between two contacts. So only grid
+    lines count that have more than half as many such points as points under pressure.
+    """
+    if not np.ptp((i + j) % 2):  # a hexagonal or diagonal grid: lines along its diagonals
+        i, j = (i + j) // 2, (i - j - (i - j).min()) // 2
+    missing = 0
+    for line, place in ((i, j), (j, i)):
+        width = int(place.max()) + 1
+        points = line * width + place
+        under = points[loaded]
+        between = under[np.isin(under + 2 * width, under)] + width
+        absent = np.bincount(between[~np.isin(between, points)] // width, minlength=line.max() + 1)
+        present = np.bincount(line[loaded], minlength=line.max() + 1)
+        missing += int(absent[absent > GAPS * present].sum())
+    if missing > FEW_GAPS * np.count_nonzero(loaded):
+        found = f"without {missing:,} points between points under pressure"
+        raise InputError("x, y", found=found, expected="all points")
 
 
 def _explained(table: ReadTable) -> Iterator[str]:

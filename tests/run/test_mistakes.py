@@ -84,7 +84,12 @@ MISTAKES = [
     (stage('[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"'),
      "[shakedown] kind: found 'x', expected \"exact\", \"elastic\" or \"vector\""),
     (stage("[shakedown]\nloads = 1\nforce_amplitudes = [[1, 0]]"),
-     "[shakedown] force_amplitudes[0]: found [1.0, 0.0], expected a number with this kind"),
+     "[shakedown] force_amplitudes[0]: found [1.0, 0.0], expected a finite number, or with kind"),
+    *((stage(f"[shakedown]\nloads = 1\nforces = {it}\nforce_amplitudes = [1, -1]"),
+       f"[shakedown] forces: found {it}, expected a finite number, or with kind = \"vector\"")
+      for it in ("[0.2]", "[0.2, 0.1]")),
+    (stage("[shakedown]\nloads = 1\nforce_amplitudes = 1.0"),
+     "[shakedown] force_amplitudes: found 1.0, expected a valid list"),
     (stage(f"{VECTOR}[[1, 0]]\nforces = 0.1"),
      "[shakedown] forces: found 0.1, expected a pair [x, y]"),
     (stage('[gradient]\nof = "los"'),

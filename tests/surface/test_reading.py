@@ -86,7 +86,8 @@ def test_what_gwyddion_writes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "header", ["x [mm], y [mm], z [µm]\n", "X/mm,Y/mm,Z/µm\n", "x,y,height\n", ""]
+    "header",
+    ["x [mm], y [mm], z [µm]\n", "X/mm,Y/mm,Z/µm\n", "# x,y,z\n# mm,mm,µm\n", "x,y,height\n", ""],
 )
 def test_lists(tmp_path: Path, header: str) -> None:
     rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
@@ -96,6 +97,8 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
+    more = "".join(f"{i},run 7,{line}\n" for i, line in enumerate(matrix(rows, ",").splitlines()))
+    assert_allclose(raw(tmp_path / "a.csv", f"id,note,x,y,z\n{more}").heights, HEIGHTS)
 
 
 def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
@@ -106,6 +109,14 @@ def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
     assert_allclose(surface.pixel, 0.65e-3, rtol=5e-3)
     spaced = raw(tmp_path / "a.txt", "# a\n\n" + matrix(ending="\n\n") + "# end\n\n", pixel=1.0)
     assert_array_equal(spaced.heights, HEIGHTS)
+
+
+@pytest.mark.parametrize(("separator", "mark"), [(";", ","), (";", "."), ("\t", ","), (" ", ",")])
+def test_decimals_after_many_whole_numbers(tmp_path: Path, separator: str, mark: str) -> None:
+    cells = np.full((400, 4), "0", dtype=object)
+    cells[350:] = f"-0{mark}25"
+    surface = raw(tmp_path / "a.txt", "\n".join(map(separator.join, cells)), pixel=1.0)
+    assert_array_equal(surface.heights[348:352, 0], [0, 0, -0.25, -0.25])
 
 
 @pytest.mark.parametrize("form", ["vectors", "matrices", "matrices along x"])
@@ -136,12 +147,43 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
 
+INFORMATION = [["Operator", "Lens"], ["Dana", 50], [3.0, "x"]]
+
+
+def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
+    path, both = tmp_path / "a.xlsx", 'in the sheets "Sheet" and "Sheet1", expected one sheet'
+    points = [["x", "y", "z"], *np.column_stack([X.ravel(), Y.ravel(), HEIGHTS.ravel()]).tolist()]
+    for sheet in (HEIGHTS.tolist(), points):
+        for sheets, name in (([INFORMATION, sheet], "Sheet1"), ([sheet, INFORMATION], "Sheet")):
+            surface = raw(path, sheets, pixel=1.0)
+            assert_allclose(surface.heights, HEIGHTS)
+            assert surface.source == f'{path}, sheet "{name}"'
+        with pytest.raises(cr.FileError, match=f"found maps {both}"):
+            raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
+        with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
+            raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+    with pytest.raises(cr.FileError, match=f"found no map {both}"):
+        raw(path, [INFORMATION, INFORMATION], pixel=1.0)
+
+
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
 ONE = {"pixel": 1.0}
 
 
 #: Heights of about 1000, with a comma between groups of three digits.
 THOUSANDS = "1,003;1,021;997;1,040\n" * 10 + "1,011;990;1,007;1,002\n" * 10
+
+
+#: Heights of which only the largest exceed 999, with a point between its groups of digits.
+FEW_THOUSANDS = "827;12;9;640\n" * 4 + "827;1.013;9;640\n"
+
+
+def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
+    """Not without a whole number of three digits; 999 and more can mark holes."""
+    for cells in ("1.125 2 3", "1.125 -999 12.250", "1.125 -9999 120", "1.125 120 0.125"):
+        heights = np.outer([1, 1, 1], np.float64(cells.split()))
+        surface = raw(tmp_path / "a.txt", f"{cells} 7\n" * 3, pixel=1.0, fill=True)
+        assert_array_equal(surface.heights[:, 0], heights[:, 0])
 
 
 def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
@@ -205,16 +247,25 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
         ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
         ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
+        ("Heights in nm\nx,y,z\n1,1,1\n2,2,2\n", {}, "comments: found Heights in nm, expected "),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
+        *(
+            (
+                f"x,y,z,{name}\n0,0,1,1\n1,0,2,{it}\n0,1,3,1\n1,1,4,1\n",
+                {},
+                f"columns: found {name}, e",
+            )
+            for name, it in (("valid", 0), ("gain", 1), ("id", 0), ("ok", "False"))
+        ),
         ("", {}, "empty"),
         ("x,y,z\n", {}, "rows: found none below the header"),
         ("1 2 3 4\n", ONE, "shape"),
-        ("0 1 2 3 4 5 6 7 8\n" + matrix(), ONE, "row 1: found numbers 1, 2, 3, ..."),
+        ("0 1 2 3 4 5 6 7 8\n" + matrix(), ONE, "row 1: found numbers 0, 1, 2, ..."),
         (
             "0 .2 .4 .6 .8 1 1.2 1.4 1.6\n" + matrix(),
             {"pixel": 0.2},
-            "row 1: found numbers 0.2, 0.4, 0.6, ..., expected heights alone: leave coordinates",
+            "row 1: found numbers 0, 0.2, 0.4, ..., expected heights alone: leave coordinates",
         ),
         (
             "y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n",
@@ -224,10 +275,13 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
         (
             "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
             ONE,
-            "column 1: found numbers 1, 2, 3, ...",
+            "column 1: found numbers 0, 1, 2, ...",
         ),
-        (THOUSANDS, ONE, "row 1: found 1,021, and 990 in row 11, expected .* thousands"),
-        (THOUSANDS.replace(",", "."), ONE, "found 1.021, and 990 in row 11"),
+        (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
+        (THOUSANDS.replace(",", "."), ONE, "found 1.003, and 990 in row 11"),
+        (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
+        (FEW_THOUSANDS.replace(".", ","), ONE, "row 5: found 1,013, and 827 in row 1"),
+        ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
         (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
         (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
         (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
@@ -256,7 +310,7 @@ def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
 
 
 def test_other_comments_are_ignored(tmp_path: Path) -> None:
-    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 2 Hz, 20 °C\n"
+    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 20 °C, m = 5\n"
     assert raw(tmp_path / "map.txt", said + matrix(), pixel=1.0).pixel == (1.0, 1.0)
 
 

@@ -67,3 +67,14 @@ def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     assert_allclose(curvature, exact.mean_curvature, rtol=0.04)
     assert_allclose(height, exact.mean_height, rtol=0.02)
     assert_allclose(spread, exact.height_std, rtol=0.03)
+
+
+def test_round_tops_are_round_in_spite_of_rounding() -> None:
+    """Many of these had curvatures in the wrong order, and a nan for their eccentricity."""
+    x = np.arange(-3.0, 4.0)
+    scales = np.random.default_rng(1).uniform(0.5, 2.0, 100)
+    caps = np.hstack([-scale * (x**2 + x[:, None] ** 2) / 100 for scale in scales])
+    summits = cr.surface.Surface(caps, 1.0).summits(0.0)
+    assert len(summits) == 100
+    assert (summits.eccentricities < 1e-6).all()
+    assert (summits.elliptic_loads >= 1).all()

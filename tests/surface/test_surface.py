@@ -61,7 +61,7 @@ def test_another_unit_is_the_same_surface() -> None:
     [
         (np.full((5, 5), 2.0), "found 2 everywhere, expected a rough surface"),
         (np.where(np.eye(5) > 0, np.nan, NOISE[:5, :5]), r"5 holes \(nan\) in 25 pixels"),
-        (np.where(np.eye(5) > 0, np.inf, NOISE[:5, :5]), "inf in row 0, column 0"),
+        (np.where(np.eye(5) > 0, np.inf, NOISE[:5, :5]), "inf in row 1, column 1"),
         (NOISE[0], r"shape \(60,\), expected rows and columns"),
         ([["a", "b"], ["c", "d"]], "expected numbers"),
         (NOISE * 1j, "expected numbers"),
@@ -175,7 +175,7 @@ def test_spikes_and_drop_outs_are_named() -> None:
     grooved[90, 0] = 80.0
     (said,) = cr.surface.Surface(grooved, 10.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
-    assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said
+    assert "in row 8, column 10; make them nan and use fill=True, or --fill" in said
 
 
 def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:

@@ -199,6 +199,11 @@ READ: dict[str, tuple[Any, ...]] = {
         lambda case: case.table("X1 X2 load"), "a.csv", "--column x=X1 --column X2=y"),
     "units below the header": (
         lambda case: lines(case.table()).replace("load\n", "load\nm,m,N\n", 1),),
+    "the scene's units in a comment": (
+        lambda case: "# lengths in m, loads in N, E = 210 GPa\n" + lines(case.table()),),
+    "another unit in a comment, scaled": (
+        lambda case: "# load in mN\n" + lines(case.table(load=1e3 * case.loads[case.order])),
+        "a.csv", "--scale load=0.001"),
     "titles above the header": (
         lambda case: "Project: plate\nDate;1 May 2026\n\n" + german(case.table()),),
     "pixels of a map": (Case.pixels, "a.csv", "--within 1e-9"),
@@ -250,6 +255,20 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "load in kN": (headed("x y load\xa0/\xa0kN"), "", "load: found kN, expected N", "load=1000"),
     "load in pounds": (headed("x y load\xa0[lbf]"), "", "found lbf, expected N", "load=4.448221"),
     "load in mm": (headed("x y load\xa0[mm]"), "", "found mm, a unit of length", "of force"),
+    "units in a comment below the names": (
+        lambda case: lines(case.table()).replace("load\n", "load\n# m,m,mN\n", 1), "",
+        "column load: found mN, expected N"),
+    "names and units in comments": (
+        lambda case: "# x,y,load\n# [m], [m], [mN]\n" + lines(case.table(), header=False), "",
+        "column load: found mN, expected N"),
+    "a unit in a comment": (
+        lambda case: "# loads in mN\n" + lines(case.table()), "",
+        "comments: found '# loads in mN', expected units in the header, as NAME [mN], or no such"),
+    "a unit in a title": (lambda case: "Places (um)\n" + lines(case.table()), "",
+                          "comments: found 'Places (um)', expected units in the header"),
+    "a unit behind the names": (
+        lambda case: lines(case.table()).replace("load\n", "load # kN\n", 1), "",
+        "comments: found ' kN', expected units in the header"),
     "no unit": (headed("x y load\xa0[Newtn]"), "", "load: found 'Newtn'", "--scale load=1"),
     "x and y differ": (headed("x\xa0[m] y\xa0[mm] load"), "",
                        "column y: found mm, expected m", "y=0.001", "convert = true"),
@@ -378,6 +397,14 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pixels of two sizes": (
         lambda case: {name: each[fine_and_coarse()] for name, each in case.pixels().items()}, "",
         "expected a column 'area', or x and y on a regular grid: x, y pixels of several sizes"),
+    "pixels of two widths": (
+        lambda case: {name: each[~np.tile((np.arange(121) < 60) & (np.arange(121) % 2 > 0), 121)]
+                      for name, each in case.pixels().items()}, "",
+        "x and y on a regular grid: x, y without ", "points between points under pressure"),
+    "pixels without every third row": (
+        lambda case: {name: each[np.repeat(np.arange(121) % 3 > 0, 121)]
+                      for name, each in case.pixels().items()}, "",
+        "x and y on a regular grid: x, y without ", "points between points under pressure"),
     "another name, not said": (lambda case: case.table("x y Fz"), "",
                                "expected a column 'load'; --column load=Fz names another"),
     "pixels under another name": (

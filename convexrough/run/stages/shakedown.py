@@ -11,7 +11,7 @@ from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.run.stage import Columns, Single, Stage, Summary
-from convexrough.run.values import Finite, Force, Mistake, Positive, expected
+from convexrough.run.values import NUMBER_OR_PAIR, Finite, Force, Mistake, Positive, expected
 
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
 
@@ -37,7 +37,7 @@ class ShakedownStage(Stage):
             found = f"found {len(self.load_amplitudes)} values"
             yield "load_amplitudes", f"{found}, expected {len(self.force_amplitudes)}"
         pairs = self.kind == "vector"
-        expected = 'a pair [x, y] with kind = "vector"' if pairs else "a number with this kind"
+        expected = 'a pair [x, y] with kind = "vector"' if pairs else NUMBER_OR_PAIR
         if isinstance(self.forces, list) != pairs and self.forces != 0.0:
             yield "forces", f"found {self.forces}, expected {expected}"
         for i, force in enumerate(self.force_amplitudes):
