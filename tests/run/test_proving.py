@@ -63,13 +63,18 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
 
 
 def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Path) -> None:
-    height = 1e-5 ** (2 / 3) / 0.4 - 0.25 + 2.8 / (3 * np.pi)
-    columns = {"x": [0, 0.5 / 2.8], "y": [0, 0], "height": [0, height], "tip_radius": [1, 1e-3]}
+    """A small asperity is shaded by two large ones near it, so that order fails farther down."""
+    columns = {
+        "x": [0.00104, 0.00122, 0.00108],
+        "y": [0.00137, -0.00115, 0.00116],
+        "height": [-4.6e-9, 7e-10, -3.4e-9],
+        "tip_radius": [0.00109, 0.0186, 0.0149],
+    }
     (tmp_path / "a.csv").write_text(lines(columns))
-    shear = FRICTION + "[shear]\nfractions = [0.3, 0.9999]\n"
+    shear = FRICTION + "[shear]\nfractions = [0.05, 0.6]\n"
     file = 'pattern = "file"\npath = "a.csv"\ngeometry = "summit"\n'
-    ran = run(scene_text(file, "approach = 0.25", shear, radius="1e6"), "--proof")
-    assert ran.err.count("warning: proof.json leaves out the shear force 0.0833") == 1
+    ran = run(scene_text(file, "approach = 2.2e-5", shear, radius="2.0"), "--proof")
+    assert ran.err.count("warning: proof.json leaves out the shear force") == 1
     assert len(json.loads(Path("a-results/proof.json").read_text())["sheared"]) == 1
 
 
