@@ -95,6 +95,8 @@ def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
         return
     dense = dense_answer(name)
     prescribed: Any = {control: {"approach": approach, "load": dense.load}[control]}
+    if control == "load":  # the load of `dense` is rounded
+        dense = cr.press(pressed, **prescribed, influence="dense")
     contact = cr.press(pressed, **prescribed, influence=kind)
     assert ALL_ITERATED < contact.candidates < 3500
     assert_solved(contact, kind)
