@@ -51,7 +51,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
         0, and if the asperities are too few for an array (`is_array`)
     rim_touching : share of the asperities at the rim that touch; the rim consists of the farthest
         asperity in each of 16 sectors
-    axis_outside : True if the axis of the sphere is not between asperities of the array
+    axis_outside : True for an array whose asperities do not surround the axis of the sphere
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
         None

@@ -1,4 +1,4 @@
-"""Commands about solvers (compare, export, gallery, bench), and paper, a published example."""
+"""The commands about solvers (compare, export, gallery, bench), and the published example (paper)."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def compare(
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
-    If SCS and QOCO are installed, they solve the cone program, too. With --solver, only the named
-    solvers are compared with Newton's method.
+    SCS and QOCO take part if they are installed; like Clarabel, they solve a cone program. With
+    --solver, only the named solvers are compared with Newton's method.
 
     Exit status, by the first case that applies: 2 if the input is wrong; 3 if a certified result
     contradicts another result that is proved to be the only solution; 4 if a solver failed; 3 if no

@@ -108,7 +108,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Form to remove before finding summits.")  # fmt: skip
 @click.option("--fill", is_flag=True, help="Fill holes in the map and report them.")
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Fit each tip to a square of N by N pixels.")  # fmt: skip
+              help="Fit a paraboloid to N by N pixels about each maximum; N is odd.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
               help="Remove hills whose prominence is below the fraction PART of the "
                    "height range Sz.")  # fmt: skip

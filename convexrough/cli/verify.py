@@ -120,9 +120,9 @@ def verify(
 
     Exit status: 0 if it is proved that exactly the claimed asperities touch (with --shear also that
     exactly the claimed ones slide), and that no error exceeds the limit set with --within; 2 if the
-    input is wrong; 3 if a claim is wrong or not proved, or if --proof finds no proof; 4 if the
-    shear problem could not be solved. With --explain nothing is checked, and the status is 0 if the
-    files can be read.
+    input is wrong; 3 if a claim is wrong or not proved, if an error exceeds this limit, or if
+    --proof finds no proof; 4 if the shear problem could not be solved. With --explain nothing is
+    checked, and the status is 0 if the files can be read.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The levels of a contact, which are its normal solutions at given loads, and units of friction.
+"""The levels of a contact (normal solutions at given loads), and the units of friction results.
 
 Levels are in the scaled units of the normal problem (`normal.problem`). The unit of shear forces is
 f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
@@ -147,7 +147,7 @@ class FrictionLevels:
         return self.indentations(self.at(load)).value * self.units.length
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) the indentations n_i of a level, only to float64 where asperities cannot touch."""
+        """(N,) the indentations n_i of a level; those of asperities that cannot touch in float64."""
         known: Ball = of_rows(self.to_scene, level.indentation)
         others = self._others
         if len(others) == 0:
@@ -205,9 +205,10 @@ def forces_at(points: Sequence[Point], forces: Iterable[float], scene: Scene) ->
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
-    Order means that no indentation falls as the load rises. The result is "proved", "proved for one
-    step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse the
-    proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
+    Order means that, as the load rises, every asperity that is open at the load of `contact` stays
+    open, and the indentation of every other asperity never falls. The result is "proved", "proved
+    for one step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse
+    the proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
     takes some milliseconds per asperity. Other functions make this search for at most 1,000
     asperities, and only if at most 10,000 touch.
 

@@ -1,7 +1,7 @@
 """The normal solutions of one scene at many total loads, solved one by one or together.
 
-Many problems are solved together as the rows of a stack. Then only the cheapest proof is tried, and
-the caller solves rows that it does not prove one by one.
+Many problems are solved together as the rows of a stack. Then only the cheapest proof is tried; the
+caller solves, one by one, the rows for which it fails.
 """
 
 from __future__ import annotations
@@ -137,8 +137,8 @@ def _key(load: Ball) -> tuple[float, float, float]:
 def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
     """The solutions of all rows, and (m,) True where a row is proved; other rows have no meaning.
 
-    Two more conditions hold in such a row: the residual is near its rounding error, and the status
-    of every asperity is proved.
+    A row counts as proved only if, in addition, its residual is near its rounding error and the
+    status of every asperity is proved.
 
     box : one box for all rows; default: a box for each row, by `widest`
     """

@@ -1,4 +1,4 @@
-"""A priori bounds on the approach and the contact radius under a total load."""
+"""An a priori upper bound on the approach under a total load, and which asperities could touch."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def approach_bound(
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
-    It is (2) of docs/theory/certificate.md with q = weights / sum(weights), and nearly the lambda
-    for which this bound is least. In the code, c is A q and alpha is q k.
+    It is (2) of docs/theory/certificate.md with q = weights / sum(weights). Its lambda is close to
+    the one that makes this bound least. In the code, c is A q and alpha is q k.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) upper bounds on A times weights
@@ -133,9 +133,9 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 def smooth_loads(scene: Scene, load: float) -> Array:
     """(n,) [force] estimated loads with the total `load`.
 
-    From each offset the displacement by a smooth sphere under this load is subtracted. To all these
-    differences one number is added, so that the loads that Hertz's law gives at these indentations
-    have the total `load`.
+    From each offset the displacement by a smooth sphere under this load is subtracted. One number
+    is added to all these differences. Hertz's law gives the load at each sum, taken as an
+    indentation. The number is chosen so that the loads have the total `load`.
     """
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)

@@ -1,8 +1,8 @@
 """Tables in text files, with any separator, decimal commas, comments, titles and encodings.
 
-Common readers either support neither decimal commas nor D exponents (csv.Sniffer, numpy.loadtxt) or
-stop at the first mistake without showing the line (pandas, polars). So this module chooses the
-separator and the decimal mark, and the standard library splits lines.
+Some common readers (csv.Sniffer, numpy.loadtxt) support no decimal commas and no D exponents;
+others (pandas, polars) stop at the first mistake without showing the line. So this module chooses
+the separator and the decimal mark, and the standard library splits lines.
 """
 
 from __future__ import annotations
@@ -176,8 +176,10 @@ def read_text_table(
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
     known : names of columns, in lower case; the line with most of them is the header
-    required : those of them without which a sheet of a workbook is not read if another has them
-    is_map : True if only one sheet of a workbook may hold a map of heights, which is read
+    required : names of columns; of a workbook, the sheet with most of them is read. Among equal
+        sheets it is the first that has a column of `known`, or else the first
+    is_map : True for a map of heights; of several sheets of a workbook, exactly one must hold a
+        map, and this sheet is read
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
