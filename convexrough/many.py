@@ -36,7 +36,7 @@ class Contacts(Table):
     load_errors, approach_errors : (m,) bounds on their errors
     asperity_loads, asperity_load_errors : (m, n) [force] loads, and bounds on their errors
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
-    alone    : (k,) indices of the scenes that were pressed one by one
+    alone    : (j,) indices of the j scenes that were pressed one by one
 
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()

@@ -1,4 +1,4 @@
-"""The commands about solvers (compare, export, gallery, bench), and the published example (paper)."""
+"""The commands about solvers (compare, export, gallery, bench), and paper: a published example."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ class FrictionLevels:
         return self.indentations(self.at(load)).value * self.units.length
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) the indentations n_i of a level; those of asperities that cannot touch in float64."""
+        """(N,) the indentations n_i of a level; in float64 if an asperity cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
         others = self._others
         if len(others) == 0:

@@ -2,11 +2,12 @@
 
 `history` does so at constant P. With the coefficient of friction f, the points of a path are the
 pairs P, T = Q / f. The memory curve stores the friction state (docs/theory/paths.md). It is a
-polygonal line: for each load s up to P, the shear force carried by the layers of the contact up to
-s, divided by f. A level is a total load, or the normal solution at this load. Forces and
+polygonal line. Its height at a load s is the shear force, divided by f, that the layers of the
+contact up to s carry; the layer at s is the contact force and area that are added as the load grows
+from s to s + ds. A level is a total load, or the normal solution at this load. Forces and
 displacements are sums over the vertices of the memory curve. The slip front is the level down to
-which slip has reached. The loss of a segment is a sum over pieces; on each piece the front falls
-through one layer of the curve (`curve.Piece`).
+which slip has reached. The loss along a straight segment of the path is a sum over pieces; on each
+piece the front falls through one straight part of the memory curve (`curve.Piece`).
 
 Order holds if no indentation falls as the load rises. If order fails, the memory curve does not
 apply. Then `general_step` computes the states step by step (docs/theory/without-order.md), without
@@ -150,8 +151,8 @@ class LoadPath(Table, Plottable):
     approaches     : (m,) [length] approach D0; at the load 0, the approach of the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] of each asperity: drift, plus deflection by its own
-        force
+    asperity_displacements : (m, n) [length] sum of the drift of each asperity (next field) and its
+        own deflection, the tangential displacement that its own shear force causes
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
@@ -215,7 +216,7 @@ class LoadPath(Table, Plottable):
 
     @property
     def slips(self) -> Array:
-        """(m, n) [length] gross slip of each asperity that touches; 0 for open asperities."""
+        """(m, n) [length] slip of each asperity as a whole: its drift while it touches, else 0."""
         return frozen(np.where(self.asperity_loads > 0, self.drifts, 0.0))
 
     def gradient(
@@ -260,8 +261,9 @@ def load_path(
     influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
     general_steps : number of general steps per segment. General steps also apply if an indentation
         falls as the load rises, that is, if order fails (docs/theory/without-order.md), but their
-        results are not proved. With None, the states come from the memory curve; if order fails in
-        a proved contact, they come from 16, 32 or 64 general steps per segment
+        results are not proved. With None, the states come from the memory curve; if order fails and
+        the normal solution of the contact is proved, they come from 16, 32 or 64 general steps per
+        segment
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem is not solved.

@@ -97,7 +97,8 @@ class PhaseLosses(Table, Plottable):
         the chords
     smooth  : (c,) [force length] losses of the shape without roughness; nan if no solution of the
         smooth contact is known
-    levels  : (c,) [force] L*, as in `Cycle.level`
+    levels  : (c,) [force] the load L* up to which the memory curve is the same at every moment from
+        the second cycle on, as in `Cycle.level`
     sliding : (c,) number of asperities that, on this ellipse, slide as a whole or lose contact in
         the steady cycle
     order   : the weakest `Cycle.order` of all cycles

@@ -1,12 +1,11 @@
-"""Friction states as weighted sums of normal solutions.
+"""Friction states as weighted sums of solutions under normal load.
 
 The weights are the changes of slope of the memory curve, which stores the state
 (docs/theory/paths.md). Equation (1) of that page gives the shear forces Q_i of the asperities and
-the displacement X of the bodies. Replace the loads P_i in the sum for Q_i by the indentations n_i,
-and multiply by the factor of X. The result is the own deflection of asperity i, which its own force
-causes, plus its drift. The drift is the displacement of the asperity relative to the opposite
-surface. Where an asperity is open, n_i is minus its gap. Equation (1) of docs/theory/states.md is
-the special case of first loading.
+the displacement X of the bodies. With the indentations n_i in place of the approach D0, the sum for
+X gives the own deflection of asperity i, which its own force causes, plus its drift. The drift is
+the displacement of the asperity relative to the opposite surface. Where an asperity is open, n_i is
+minus its gap. Equation (1) of docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations
@@ -30,7 +29,8 @@ from convexrough.normal.level import Level
 class States(NamedTuple):
     """m states of N asperities in the scene's units.
 
-    Error bounds (the radii of the balls) are infinite without a proof.
+    Each array is a `Ball`: values, and radii that bound their errors. Without a proof the radii are
+    infinite.
 
     displacements : (m,) X, of the two bodies relative to each other
     forces        : (m, N) Q_i, shear forces of the asperities
@@ -109,7 +109,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) the status of each asperity, from what is proved at the curve's load and slip front."""
+    """(N,) the status of each asperity, from what is proved at the curve's load and at its front."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)

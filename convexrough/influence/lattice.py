@@ -2,7 +2,7 @@
 
 The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij and A_ii = 0,
 where r_ij is the distance between contact points. The smallest box of sites that holds the
-asperities is padded with zeros, so far that periodic images do not contribute. The padded box is at
+asperities is padded with enough zeros that periodic images do not contribute. The padded box is at
 most about twice as large in each direction. docs/theory/operators-lattice.md explains the method,
 its rounding errors and the products with more digits ("sharp" products).
 """
@@ -389,8 +389,9 @@ def _largest_sum(field: Array, i: int, j: int) -> float:
 def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     """(N,), (N,) [length] x and y deviations of points from their sites, and their error bound.
 
-    A deviation is x - o - i b1 - j b2 with the origin o and the basis b1, b2 of the lattice. It is
-    computed in double-double arithmetic and rounded at the end.
+    The deviation of a point p from its site (i, j) is p - o - i b1 - j b2, with the origin o and
+    the basis b1, b2 of the lattice. It is computed in double-double arithmetic and rounded at the
+    end.
     """
     assert layout.lattice is not None
     assert layout.sites is not None

@@ -78,8 +78,7 @@ class Scene(Record):
 
     @cached_property
     def curved(self) -> list[tuple[float, slice]]:
-        """For each finite radius [length], the radius and the slice of the axes (0: x, 1: y) with
-        it."""
+        """[length] each finite radius, with the slice of the axes (0: x, 1: y) that have it."""
         return base.curved(self.sphere_radius)
 
     @property
@@ -127,7 +126,8 @@ class Scene(Record):
     def contact_tails(self) -> Array | None:
         """(n, 2) [length] exact contact points minus `contact_points`; None if all are 0.
 
-        The error of each number is at most 2^-96 times the absolute value of this coordinate.
+        The error of each number is at most 2^-96 times the absolute value of the same coordinate of
+        the contact point.
         """
         points = self.asperities.positions
         if self.contact_points is points:
@@ -142,7 +142,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points if it is that of the summits, scaled; else None."""
+        """The lattice of the contact points if it is that of the summits, scaled or not; else None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice

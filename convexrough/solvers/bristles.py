@@ -1,9 +1,9 @@
 """The contact as one quadratic program for OSQP: each Hertz contact becomes a row of springs.
 
 In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
-minimum of a quadratic program. Independent springs, the bristles, lie on |x| <= b. On each half
-they have the stiffness 2 E* per length, and the bristle at x first touches at the indentation
-x^2 / R_i:
+minimum of a quadratic program. Independent springs, the bristles, lie on |x| <= b. They have the
+stiffness E* per length; the bristles at x and -x count as one, with the stiffness 2 E* per length.
+They first touch at the indentation x^2 / R_i:
 
     (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
 
@@ -18,7 +18,7 @@ h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
 At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise the error of
-P is at most 0.375 B_i b / (b_i m^2), where b is the contact radius.
+P is at most 0.375 B_i a / (b_i m^2), where a is the contact radius.
 
 Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator A
 and prescribed displacements D,
@@ -125,7 +125,7 @@ class BristleQP:
 class BristleProgram:
     """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row.
 
-    m       : number of bristles in each row
+    m       : number of cells in half a row, `BristleQP.bristles`
     solver  : name of the solver, for error messages
     box     : (n,) B;  cut : (n,) True where the box was cut to make the program convex
     hessian : (n, n) A + diag(h), positive definite

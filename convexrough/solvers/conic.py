@@ -160,7 +160,7 @@ class ConeSolver(ABC):
     @property
     @abstractmethod
     def formulation(self) -> str:
-        """The name of the solver without its Newton step."""
+        """The name of the solver, without the ending " + Newton step"."""
 
     @abstractmethod
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:

@@ -83,7 +83,8 @@ class Summits(Table, Asperities, Plottable):
     """Asperities that are the summits of a map, in descending order of the heights of their maxima.
 
     positions, heights : [length] (n, 2) positions and (n,) heights of tops of fitted paraboloids
-    tip_radii   : (n,) [length] 1 / sqrt(k1 k2)
+    tip_radii   : (n,) [length] 1 / sqrt(k1 k2), with the principal curvatures k1 and k2 of the
+        paraboloid
     prominences : (n,) [length] height of the maximum above the highest pass to a taller one
     largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2
     deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
@@ -141,7 +142,7 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def elliptic_loads(self) -> Array:
-        """(n,) load of the elliptic tip over the load of its sphere at the same indentation."""
+        """(n,) load of the elliptic tip divided by that of the sphere, at the same indentation."""
         ratios = ellipse.load_ratio(self.largest_curvatures / self.smallest_curvatures)
         return frozen(np.maximum(ratios, 1.0))  # exactly 1 for a sphere, in spite of rounding
 

@@ -114,7 +114,7 @@ class Placing:
         return found
 
     def nearest(self, values: Array) -> Indices:
-        """(m,) the asperity nearest to each node or pixel; `mistakes` names loaded far ones."""
+        """(m,) the asperity nearest to each node or pixel, even if it is far (see `mistakes`)."""
         assert self.points is not None
         places, loaded = self.scene.contact_points, values != 0
         distances, owners = _nearest(places, self.points)
