@@ -109,7 +109,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) the status of each asperity, from what is proved at the curve's load and at its front."""
+    """(N,) the status of each asperity, from what is proved at the curve's load and its front."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)
