@@ -142,7 +142,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points if it is that of the summits or scaled; otherwise None."""
+        """The lattice of the contact points if it is that of the summits, or scaled; else None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
