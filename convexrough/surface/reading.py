@@ -10,6 +10,7 @@ import math
 import os
 import re
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 from warnings import catch_warnings
@@ -63,6 +64,9 @@ _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 #: Words that announce a scale.
 _SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
+
+#: A table of at most this many columns is not a map if two of them are coordinates of a grid.
+MOST_COLUMNS = 6
 
 #: Largest accepted distance of a coordinate from the grid, in pixels.
 OFF_GRID = 0.05
@@ -250,6 +254,11 @@ def _map(path: Path, table: TextTable) -> HeightGrid:
     if table.header is None and width != 3:
         _refuse_gaps([row.number for row in table.rows])
         heights = matrix(path, table)
+        for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
+            sides = [len(np.unique(each)) for each in (one, other)]
+            if min(sides) > 2 and sides[0] * sides[1] == len(heights) > width:
+                found = f"{width} columns without a header, two of which are coordinates"
+                raise InputError("columns", found=found, expected="their names above them: x, y, z")
         if min(heights.shape) > 2:
             for place, lines in (("row", heights), ("column", heights.T)):
                 if _even(lines[0, 1:]) and not _even(lines[1, 1:]):

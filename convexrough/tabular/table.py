@@ -224,6 +224,10 @@ def read_table(
     mistakes += wrong
     without = [name for name in places if name not in (*units, *how.scales)]
     mistakes += _units_in(source.comments if table is None else (), without, how)
+    for i, name in enumerate(names):
+        if "unit" in name.lower() and i not in places.values():
+            texts = [*dict.fromkeys(map(str, source.columns[i]))]
+            mistakes += _units_in(texts, without, how, f"column {name}")
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -336,20 +340,22 @@ def _factors(
     return factors, mistakes
 
 
-def _units_in(comments: Sequence[str], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each comment that names another unit than the scene's.
+def _units_in(
+    texts: Sequence[str], names: Sequence[str], how: Reading, place: str = "comments"
+) -> Iterator[str]:
+    """A mistake for each text, at this place of a file, that names another unit than the scene's.
 
-    names : columns that have no unit in the header, so that the comment may be about them
+    names : columns that have no unit in the header, so that the text may be about them
     """
     kinds = {COLUMNS[name].kind for name in names}
-    for comment in comments:
-        for said in in_text(comment):
+    for text in texts:
+        for said in in_text(text):
             found = parsed(said)
             kind = found.kind if found else "length"
             scene = how.units.unit(kind)
             if kind in kinds and not (found and scene and found.size == scene.size):
-                expected = f"units in the header, as NAME [{said}], or no such comment"
-                yield f"comments: found {_cut(comment)!r}, expected {expected}"
+                expected = f"units in the header, as NAME [{said}], or no such {place.split()[0]}"
+                yield f"{place}: found {_cut(text)!r}, expected {expected}"
                 break
 
 

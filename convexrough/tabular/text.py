@@ -139,6 +139,10 @@ class TextRow(NamedTuple):
     wrong: str = ""
 
 
+#: Names of columns with the rows and columns of a matrix, which are no coordinates.
+PLACES = ("row", "col", "column", "i", "j", "zeile", "spalte")
+
+
 class TextTable(NamedTuple):
     """The header of a file (a row of names) or None; the other rows; the style; the comments."""
 
@@ -237,10 +241,12 @@ def _headed(
         return sum(bare(name).lower() in known for name in names)
 
     if _numeric(rows[0].cells, style):
-        named = _header(title, style)
         width = len(rows[0].cells)
-        found = len(named) == width and (wanted(named) >= 2 or 2 * wanted(named) >= width)
-        return (TextRow(0, title, named) if found else None), rows
+        for named in (_header(title, style), re.split(r"\s*[,;\s]\s*", title.strip())):
+            count = wanted(named) + sum(name.lower() in PLACES for name in named)
+            if len(named) == width and (count >= 2 or 2 * count >= width):
+                return TextRow(0, title, named), rows
+        return None, rows
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
     width = len(rows[first].cells) if first < len(rows) else 0

@@ -216,6 +216,13 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
             "rms slope .* check height_unit, µm, and unit",
         ),
         (matrix(), {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
+        ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
+        ("# row col z\n0,0,1\n1,0,2\n", ONE, "columns: found row, col, z, expected a column"),
+        (
+            "".join(f"{i},{j},{i % 7 + j % 3},5\n" for i in range(9) for j in range(7)),
+            ONE,
+            "columns: found 4 columns without a header, two of which are coordinates",
+        ),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
         (matrix(), ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),

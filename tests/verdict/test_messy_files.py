@@ -263,7 +263,11 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         "column load: found mN, expected N"),
     "a unit in a comment": (
         lambda case: "# loads in mN\n" + lines(case.table()), "",
-        "comments: found '# loads in mN', expected units in the header, as NAME [mN], or no such"),
+        "comments: found '# loads in mN', expected units in the header, as NAME [mN], or no "),
+    "a unit in a column": (
+        lambda case: "".join(f"{line},{'unit' if k == 0 else 'kN'}\n"
+                             for k, line in enumerate(lines(case.table()).splitlines())), "",
+        "column unit: found 'kN', expected units in the header, as NAME [kN], or no such column"),
     "a unit in a title": (lambda case: "Places (um)\n" + lines(case.table()), "",
                           "comments: found 'Places (um)', expected units in the header"),
     "a unit behind the names": (
