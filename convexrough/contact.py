@@ -135,10 +135,12 @@ class Contact(Cached, Table, Plottable):
         from convexrough.proof import NearState, prove, refuse_many  # a higher layer
 
         refuse_many(self.scene)
-        given = sheared if isinstance(sheared, Iterable) else [sheared]
+        given = [*sheared] if isinstance(sheared, Iterable) else [sheared]
         for k, state in enumerate(given):
-            if getattr(state, "contact", self) is not self or not hasattr(state, "force"):
-                found = "a state of another contact" if hasattr(state, "contact") else repr(state)
+            other = getattr(state, "contact", self) is not self
+            if other or not isinstance(getattr(state, "force", None), int | float):
+                kind = f"a {type(state).__name__}" if hasattr(state, "contact") else repr(state)
+                found = "a state of another contact" if other else kind
                 expected = "a shear state of this contact, a result of `shear`"
                 raise InputError(f"sheared[{k}]", found=found[:60], expected=expected)
         by_load, n = self.prescribed_load is not None, len(self.scene)

@@ -115,14 +115,16 @@ class Contacts(Table):
                 alone[places] = False
                 for name, values in found.items():
                     fields[name][places] = values[good]
+        upper, lower = upper.copy(), lower.copy()
         for k in np.flatnonzero(alone).tolist():
             one = cycle(self[k], maximum=float(upper[k]), minimum=float(lower[k]))
+            upper[k], lower[k] = one.maximum, one.minimum
             known = one.loss, one.loss_error, one.displacement_amplitude, one.displacement_error
             for name, value in zip(CYCLE, known, strict=True):
                 fields[name][k] = value
             fields["order"][k], fields["status"][k] = one.order, one.status
         fields = {name: frozen(values) for name, values in fields.items()}
-        return Cycles(contacts=self, maximum=upper, minimum=lower, **fields)
+        return Cycles(contacts=self, maximum=frozen(upper), minimum=frozen(lower), **fields)
 
     @property
     def _together(self) -> list[PressedRows]:

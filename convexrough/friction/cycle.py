@@ -193,6 +193,12 @@ class Cycle(Table, Plottable):
         return _Closed.around(levels, MemoryCurve.pressed(self.start), points)
 
     @property
+    def _ends(self) -> tuple[Fraction, Fraction]:
+        """The largest and the smallest T = Q / f."""
+        heights = [T for _, T in self._walk.points]
+        return max(heights), min(heights)
+
+    @property
     def force_amplitude(self) -> float:
         """[force] half the range of the shear force."""
         return (self.maximum - self.minimum) / 2.0
@@ -537,7 +543,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     """The loop through the forces maximum - 2 way, as Q falls, and minimum + 2 way, as Q rises."""
     contact = cycle.contact
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    top, bottom = levels.height(cycle.maximum), levels.height(cycle.minimum)
+    top, bottom = cycle._ends
     LOGGER.info(f"computing {len(way) + 1} levels of a loop")
     drops = [*(min(2 * Fraction(each) / f, top - bottom) for each in way.tolist()), top - bottom]
     heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]

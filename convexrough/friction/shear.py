@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -109,6 +110,11 @@ class ShearState(Table, Plottable):
     def status(self) -> NDArray[np.str_]:
         """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
         return self.certificate.status
+
+    @cached_property
+    def _height(self) -> Fraction:
+        """T = Q / f. `shear` sets it exactly, as a prescribed displacement determines it."""
+        return self.contact.cached(FrictionLevels).height(self.force)
 
     @property
     def order(self) -> Order:
@@ -222,7 +228,7 @@ def shear(
         force_error=float(total.error) + unknown if force is None else 0.0,
         displacement_error=float(moved.error) + unknown if displacement is None else unknown,
     )
-    return ShearState(
+    state = ShearState(
         contact=contact,
         force=float(total.value) if force is None else force,
         displacement=float(moved.value) if displacement is None else displacement,
@@ -232,6 +238,8 @@ def shear(
         stick_radii=frozen(radii),
         certificate=certificate,
     )
+    state.__dict__["_height"] = walk.points[0][1]
+    return state
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:

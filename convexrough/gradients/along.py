@@ -42,6 +42,9 @@ ROUNDED = Fraction(1, 2**46)
 #: They count as equal if they differ by at most the part AGREES.
 PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 
+#: A difference of one-sided derivatives counts if it exceeds this part of the largest derivative.
+NEGLIGIBLE = 2.0**-40
+
 #: The weights of V, D0 and S at one level in a weighted sum.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
@@ -187,9 +190,10 @@ class Along:
         for mine, base, there, factor in zip(self.sums, *both, factors, strict=True):
             slopes = _slopes(base, there, unit, by)
             for level, (V, D, S) in (_near(slopes, mine, 4 * off) if off else slopes).items():
-                if level == 0 and S:
+                unloaded = level <= NEAR * unit
+                if unloaded and S:
                     return NONE
-                here = self.known.at(level)
+                here = self.known.at(Fraction(0) if unloaded else level)
                 each = Ball.exact(V) * here.energy + Ball.exact(D) / force * here.approach
                 if S:
                     each = each + Ball.exact(S) / (force * force) * here.tangent.approach
@@ -210,13 +214,22 @@ class Along:
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]
-        off = PAST * max(self.loads)
-        for k, each in enumerate(directions if self.nearly_tied else ()):
-            past = [self._one_side(*each, sign, factor, off) for sign in (-1, 1)]
-            below, above = (float(side.value) for side in past)
-            if abs(above - below) > AGREES * max(abs(below), abs(above)):
-                found[k], sides[k] = NONE, past
-        return Ball.stacked(found), np.array([[float(s.value) for s in both] for both in sides])
+        values = np.array([[float(s.value) for s in both] for both in sides])
+        if self.nearly_tied:
+            off = PAST * max(self.loads)
+            past = np.array([[float(self._one_side(*each, sign, factor, off).value)
+                              for sign in (-1, 1)] for each in directions])  # fmt: skip
+            past = np.where(np.isnan(past), values, past)  # where a side does not exist
+            below, above = past.T
+            size = np.fmax.reduce(np.abs(past), axis=None, initial=0.0)
+            tied = np.abs(above - below) > AGREES * np.fmax(np.abs(below), np.abs(above)) + (
+                NEGLIGIBLE * size
+            )
+            for k in np.flatnonzero([float(each.error) > AGREES * size for each in found] | tied):
+                near, fine, values[k] = past[k].mean(), found[k], past[k]
+                known = Ball.around(near, float(fine.error) + abs(float(fine.value) - near))
+                found[k] = NONE if tied[k] else known
+        return Ball.stacked(found), values
 
 
 def _one(below: Ball, above: Ball) -> Ball:

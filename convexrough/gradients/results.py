@@ -51,15 +51,13 @@ def with_friction(result: ShearState | Cycle | LoadPath) -> FrictionLevels:
     return result.contact.cached(FrictionLevels)
 
 
-def level_below(
-    known: FrictionLevels, what: str, force: float | Fraction, holding: Holding
-) -> Level:
-    """The level at the load L = P - |Q| / f, for the shear force Q = `force`."""
-    height = abs(known.height(force))
-    if height == known.load and holding == "approach":
+def level_below(known: FrictionLevels, what: str, height: Fraction, holding: Holding) -> Level:
+    """The level at the load L = P - |T|, for the shear force Q = f T with T = `height`."""
+    if abs(height) == known.load and holding == "approach":
         expected = "a force below f P: at constant approach f P may fall below the force"
-        raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)
-    return known.at(known.load - height)
+        force = float(abs(height) * Fraction(checks.friction(known.scene.friction)))
+        raise InputError(what, found=f"{force}: gross sliding", expected=expected)
+    return known.at(known.load - abs(height))
 
 
 def by_load(units: Units) -> Moves:
@@ -124,7 +122,7 @@ def state_gradient(
     holding = control_held(contact, holding)
     X, on_forces, on_slips = _checked(contact, weights)
     sign = -1.0 if state.force < 0 else 1.0
-    top, low = known.top, level_below(known, "force", state.force, holding)
+    top, low = known.top, level_below(known, "force", state._height, holding)
     which, travel = top.problem.candidates, known.travel_unit
     weight = travel * (sign * X)
     # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
@@ -222,8 +220,8 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         along = Along.of(known, Fraction(0), first + again, cycle.loads, cycle.forces)
         return _gradient(contact, along, holding, paths=True, order=cycle.order)
-    amplitude = (Fraction(cycle.maximum) - Fraction(cycle.minimum)) / 2
-    top, low = known.top, level_below(known, "maximum", amplitude, holding)
+    highest, lowest = cycle._ends
+    top, low = known.top, level_below(known, "maximum", (highest - lowest) / 2, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
     weight = known.loss_unit * 8.0
     along_T = weight * T * -0.5

@@ -339,3 +339,42 @@ def test_the_checker_agrees_below_gross_sliding() -> None:
             low, high = map(float.fromhex, claims[name])
             assert value - error <= high
             assert value + error >= low
+
+
+def test_bounds_belong_to_the_force_of_a_prescribed_displacement() -> None:
+    """Close to gross sliding the force is f P, rounded, and its rounding is not in the bounds."""
+    contact = cr.press(cr.Scene(1.0, PAPER.asperities, MATERIAL, 0.3), load=3.3e-7)
+    farthest = cr.shear(contact, force=0.3 * contact.load).displacement
+    for part in (1e-10, 1e-6, 0.5):
+        state = cr.shear(contact, displacement=farthest * (1 - part))
+        gradient = state.gradient(displacement=1.0)
+        assert abs(gradient.value - state.displacement) <= gradient.value_error
+        cycle = cr.cycle(contact, displacement=farthest * (1 - part))
+        loss = cycle.gradient(holding="load")
+        assert abs(loss.value - cycle.loss) <= loss.value_error + cycle.loss_error
+        assert cycle.loop().displacements.max() == pytest.approx(state.displacement, rel=1e-14)
+    many = cr.press_many([contact.scene] * 2, load=3.3e-7).cycles(
+        0.3 * 3.3e-7 * (1 - 14 * 2.0**-53)
+    )
+    assert (many.maximum == [many[0].maximum, many[1].maximum]).all()
+
+
+@pytest.mark.parametrize("off", [0.0, -5e-15, 5e-15, -2.3e-16])
+def test_sides_of_a_tie_where_one_side_does_not_exist(off: float) -> None:
+    scene, unit = cr.Scene(1.0, PAPER.asperities, MATERIAL, 0.5), 2.0**-22
+    loads, forces = unit * np.array([0.25, 0.5 + off, 0.5]), 0.5 * unit * np.array([0.25, 0, 0.25])
+    gradient = cr.load_path(scene, loads=loads, forces=forces).gradient()
+    assert gradient.force_sides[0] == pytest.approx([-2.79425751e-8, np.nan], rel=1e-6, nan_ok=True)
+    assert gradient.load_sides[0] == pytest.approx([np.nan, 9.7508208e-8], rel=1e-6, nan_ok=True)
+
+
+def test_derivatives_by_loads_that_differ_by_rounding() -> None:
+    scene, P = cr.Scene(1.0, PAPER.asperities, MATERIAL, 0.5), 3.3e-7
+    forces = 0.5 * P * np.array([0.1, 0.05, 0.1, 0.2])
+    first, second = (
+        cr.load_path(scene, loads=P * np.array([0.5, each, 0.3, 0.9]), forces=forces).gradient()
+        for each in (0.1 + 0.2, 0.3)
+    )
+    np.testing.assert_allclose(first.loads, second.loads, rtol=0, atol=1e-16)
+    ended = cr.load_path(scene, loads=[P, 0], forces=[0.05 * P, 0]).gradient()
+    assert ended.forces[0] == 0
