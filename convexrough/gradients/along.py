@@ -228,7 +228,7 @@ class Along:
             for k in np.flatnonzero([float(each.error) > AGREES * size for each in found] | tied):
                 near, fine, values[k] = past[k].mean(), found[k], past[k]
                 known = Ball.around(near, float(fine.error) + abs(float(fine.value) - near))
-                found[k] = NONE if tied[k] else known
+                found[k] = NONE if tied[k] or np.isnan(fine.value) else known
         return Ball.stacked(found), values
 
 

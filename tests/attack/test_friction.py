@@ -364,6 +364,7 @@ def test_sides_of_a_tie_where_one_side_does_not_exist(off: float) -> None:
     scene, unit = cr.Scene(1.0, PAPER.asperities, MATERIAL, 0.5), 2.0**-22
     loads, forces = unit * np.array([0.25, 0.5 + off, 0.5]), 0.5 * unit * np.array([0.25, 0, 0.25])
     gradient = cr.load_path(scene, loads=loads, forces=forces).gradient()
+    assert np.isnan([gradient.forces[0], gradient.loads[0]]).all()
     assert gradient.force_sides[0] == pytest.approx([-2.79425751e-8, np.nan], rel=1e-6, nan_ok=True)
     assert gradient.load_sides[0] == pytest.approx([np.nan, 9.7508208e-8], rel=1e-6, nan_ok=True)
 
