@@ -40,6 +40,9 @@ SMALL = 128
 #: allocator reuses them without returning them to the system.
 PIECE = 2**13
 
+#: Number of rows that are computed together at least: with fewer, calls take longer than numbers.
+ROWS = 32
+
 #: Limit on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
 LARGEST = 2.0**300
 
@@ -85,7 +88,7 @@ class SlicedMatrix:
                     slices[k][some][columns] = each
                     sizes[k, block, some] = np.abs(each).sum(axis=1)
 
-        threads.each(cut, threads.chunks(m, max(1, PIECE // n)), threads.worthwhile(m * n))
+        threads.each(cut, threads.chunks(m, max(ROWS, PIECE // n)), threads.worthwhile(m * n))
         sizes *= UP
         most = (np.maximum(sizes[0], sizes[1] * 2.0**SECOND) / _unit(largest)).max(axis=1)
         bits = np.minimum(53 - np.frexp(most)[1], MOST_BITS).tolist()
