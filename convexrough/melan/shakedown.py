@@ -130,8 +130,9 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor by which a closed path may be scaled so that sliding dies out (see above).
+    """The largest factor by which a closed path may be scaled so that sliding dies out.
 
+    Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
     loads, forces : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"

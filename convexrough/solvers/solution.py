@@ -57,10 +57,17 @@ class Solver(Protocol):
     """
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name in results and messages."""
+        ...
 
     def solve(
         self,
         problem: NormalProblem,
         start: Array | None = None,
-    ) -> Solution: ...
+    ) -> Solution:
+        """The solution of `problem`, in its scaled units (docs/how-to/solvers.md).
+
+        start : (n,) initial loads of the asperities of `problem`, not negative; None: no estimate
+        """
+        ...
