@@ -30,7 +30,7 @@ from convexrough.normal.refine import refined_loads
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
-from convexrough.roundoff import ROUNDOFF
+from convexrough.roundoff import AT_THE_END, ROUNDOFF
 from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
@@ -147,7 +147,7 @@ class Contact(Cached, Table, Plottable):
         levels, states = self.cached(levels_of), []
         for k, state in enumerate(given):
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
-            if drop == 0 or drop >= (1 - 16 * Fraction(ROUNDOFF)) * Fraction(self.load):
+            if drop == 0 or drop >= (1 - AT_THE_END * Fraction(ROUNDOFF)) * Fraction(self.load):
                 found = f"the shear force {state.force:.17g}"
                 expected = "one between 0 and f P: there is no proof of rest or gross sliding"
                 raise InputError(f"sheared[{k}]", found=found, expected=expected)

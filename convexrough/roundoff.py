@@ -9,3 +9,6 @@ SAFETY = 1e-12
 
 #: Number of roundoffs allowed for computing k P^(2/3) in float64 and adding it to A P and D.
 SUM_ROUNDOFFS = 16
+
+#: A shear force within this number of roundoffs of f P counts as f P: gross sliding.
+AT_THE_END = 16

@@ -19,7 +19,6 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.friction.levels import AT_THE_END
 from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
 from convexrough.normal.boxes import Box
@@ -27,7 +26,7 @@ from convexrough.normal.level import Rows
 from convexrough.normal.levels import NUMBERS, solved
 from convexrough.normal.problem import Data, NormalProblem
 from convexrough.normal.stack import Stack
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
 #: Scenes with more asperities are solved one by one, because for them stacks save no time.

@@ -30,11 +30,8 @@ from convexrough.friction.curve import Point
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
-
-#: A shear force within this many roundoffs of f P counts as f P: gross sliding.
-AT_THE_END = 16
 
 
 class FrictionLevels:

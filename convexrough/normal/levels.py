@@ -64,10 +64,6 @@ class Levels:
         """The number of levels that `at` and `prepare` have computed."""
         return len(self._known)
 
-    def below(self, drop: Ball) -> Level:
-        """The level at the load of `top` minus `drop`, both in scaled units."""
-        return self.at(self.top.load - drop)
-
     def at(self, load: Ball) -> Level:
         """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
         key = _key(load)

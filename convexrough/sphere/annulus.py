@@ -17,12 +17,6 @@ import numpy as np
 from convexrough.arrays import Number
 
 
-def width_at(deflection: Number) -> Number:
-    """The width x at a deflection phi of either sign; 1 for |phi| >= 1."""
-    size = np.minimum(np.abs(deflection), 1.0)
-    return size / (1.0 + np.sqrt(1.0 - size))
-
-
 def width_under(force: Number) -> Number:
     """The width x under a force t of either sign; 1 for |t| >= 1."""
     size = np.minimum(np.abs(force), 1.0)

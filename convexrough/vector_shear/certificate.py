@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import Ball, quietly
 from convexrough.arrays import Array
 from convexrough.convex.theorem import distance
-from convexrough.friction.levels import AT_THE_END
-from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
+from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.vector_shear.problem import FrictionProblem, VectorState, along, slopes
 
 #: Number of radii r tried in step 2, and the ratio of each to the one before. Heuristics.
