@@ -1,8 +1,8 @@
 """Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
 
-docs/theory/certificate.md, "Which box", 2, gives the proof for an (n, n) matrix in float64. The
-proof needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u. This holds for all matrices that fit in
-memory. LAPACK need not report overflow or entries that are not finite. Such entries make the
+docs/theory/certificate.md, "Choice of the box", 2, gives the proof for an (n, n) matrix in float64.
+The proof needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u. This holds for all matrices that fit
+in memory. LAPACK need not report overflow or entries that are not finite. Such entries make the
 diagonal of the factor nan or infinite, so the diagonal is checked.
 """
 

@@ -3,9 +3,9 @@
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
 after any path of (P, T) is a polygonal line: the heights Th(s) at load levels 0 <= s <= P. It leads
 from (0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path
-changes this line by the rules in docs/theory/paths.md, "The rules". The slip front is the level
-above which the segment has changed the line. The rules do not depend on elasticity. All numbers are
-exact fractions, so no rule rounds.
+changes this line by the rules in docs/theory/paths.md, "Changes of the curve". The slip front is
+the level above which the segment has changed the line. The rules do not depend on elasticity. All
+numbers are exact fractions, so no rule rounds.
 """
 
 from __future__ import annotations

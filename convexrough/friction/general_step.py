@@ -8,7 +8,7 @@ normal solution at P is computed. Then Newton's method solves (1) of docs/theory
 "The general step", for eta_i and x: the displacements of the asperities and of the bodies in the
 step.
 
-For the curves of asperities, one formula replaces the section "The rules" of docs/theory/paths.md.
+For the curves of asperities, one formula replaces "Changes of the curve" in paths.md.
 During a straight step the slip front (the point down to which slip replaces the old curve) only
 moves down, and the part of a curve above the present indentation is dropped. So the new curve
 depends only on the old curve and on the end (s1, t1) of the step. Cut the old curve at the smaller

@@ -30,7 +30,7 @@ def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     """(n,) 1 / (pi E* s_i), where the shell radii s_i are adapted to contact radii a_i = `radii`.
 
     s_i = share a_i / c + (1 - share) d_i / 2, where c is the largest (a_i + a_j) / r_ij, and d_i
-    the distance to the nearest neighbour: docs/theory/certificate.md, "Which box", 3.
+    the distance to the nearest neighbour: docs/theory/certificate.md, "Choice of the box", 3.
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

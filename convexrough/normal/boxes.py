@@ -1,4 +1,4 @@
-"""Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
+"""Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Choice of the box".
 
 In crowded contacts a box may limit the loads of the touching asperities only, and assume all others
 open: docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). Symbols: h is
@@ -38,8 +38,8 @@ Scope = Literal["global", "local", "none"]
 FIT_FROM = 0.8
 
 #: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
-#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which
-#: box", 3).
+#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md,
+#: "Choice of the box", 3).
 FITTED = 0.9
 
 #: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.

@@ -4,7 +4,7 @@ docs/theory/exact-cones.md states the program (1) and proves that its solution s
 law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
 approach. If the load is prescribed, the approach is unknown, and an upper bound replaces it.
 
-The loads are limited to boxes 0 <= P_i <= B_i ("Which box" of that page). Let the number S_i be
+The loads are limited to boxes 0 <= P_i <= B_i ("Choice of the box" there). Let the number S_i be
 (3/2) sigma_i B_i^(1/3) / k_i, with Hertz's coefficients k_i. It must be at most 21/25 in the form
 of the program with four cones per asperity, and at most 1 in the form with five. Where S_i would be
 larger, B_i is reduced. A box is called cut if B_i is below the a priori bound, which is the load

@@ -19,8 +19,8 @@ which is convex, so a modelling language accepts it as it is.
 """
 
 # %%
-# The naive form
-# --------------
+# Units in which the solver fails
+# -------------------------------
 #
 # Write the program in units in which the sphere's radius and the modulus are 1. Then approaches
 # are about :math:`10^{-5}` and loads about :math:`10^{-9}`.
@@ -53,17 +53,17 @@ def solve(k: Array, M: Array, D: Array) -> tuple[str, Array]:
     return str(problem.status), np.array(P.value)
 
 
-status, naive = solve(k, M, D)
-print(status, naive)
+status, poor = solve(k, M, D)
+print(status, poor)
 
 # %%
 # The solver reports "optimal". Check the loads themselves: the displacements that they cause
 # should equal the prescribed ones.
 
 print("prescribed:      ", D[:2])
-print("what these cause:", (k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[:2])
+print("what these cause:", (k * np.maximum(poor, 0) ** (2 / 3) + M @ poor)[:2])
 assert status == "optimal"
-assert abs((k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[0] / D[0] - 1) > 1
+assert abs((k * np.maximum(poor, 0) ** (2 / 3) + M @ poor)[0] / D[0] - 1) > 1
 
 # %%
 # The solver stops when its residuals are below :math:`10^{-8}`. The exact loads are smaller than
@@ -93,9 +93,9 @@ def dual_bound(p: Array) -> float:
     return float(-p @ M @ p / 2 - 0.4 * (k**-1.5) @ room**2.5)
 
 
-naive = np.maximum(naive, 0.0)
-print(f"naive loads: energy {energy_of(naive):.3e}, dual bound {dual_bound(naive):.3e}")
-assert energy_of(naive) > 0 > dual_bound(naive)
+poor = np.maximum(poor, 0.0)
+print(f"poor loads: energy {energy_of(poor):.3e}, dual bound {dual_bound(poor):.3e}")
+assert energy_of(poor) > 0 > dual_bound(poor)
 
 # %%
 # Zero loads have the energy 0: the solver's "optimum" has more energy than no contact at all. In
@@ -118,11 +118,11 @@ assert 0 <= gap < 1e-6 * abs(energy_of(loads))
 # the minimum by no more than the gap differ from the exact loads by at most
 # :math:`\sqrt{2\, \text{gap} / \mu}`, where :math:`\mu` is the smallest eigenvalue of :math:`M`.
 # Because of the root, eight digits of the energy give only four digits of the loads. The picture
-# shows trial loads on the way from the naive loads to the accurate ones.
+# shows trial loads on the way from the poor loads to the accurate ones.
 
 mu = float(np.linalg.eigvalsh(M)[0])
-rest = np.logspace(0, -5, 60)  # 1: the naive loads; 0: the accurate ones
-trials = [loads + part * (naive - loads) for part in rest]
+rest = np.logspace(0, -5, 60)  # 1: the poor loads; 0: the accurate ones
+trials = [loads + part * (poor - loads) for part in rest]
 above, below = [energy_of(p) for p in trials], [dual_bound(p) for p in trials]
 unit = abs(energy_of(loads))
 
@@ -130,7 +130,7 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constraine
 left.semilogx(rest, np.array(above) / unit, "k-", label="energy $\\Phi(p)$")
 left.semilogx(rest, np.array(below) / unit, "k--", label="dual bound from the same loads")
 left.axhline(-1, color="0.6", lw=0.8)
-left.set(xlabel="part of the way back to the naive loads [1]", ylabel="energy / $|\\Phi^*|$ [1]")
+left.set(xlabel="part of the way back to the poor loads [1]", ylabel="energy / $|\\Phi^*|$ [1]")
 left.set_yscale("symlog")
 left.legend(loc="lower left")
 gaps = np.maximum(np.array(above) - np.array(below), 1e-16 * unit)
