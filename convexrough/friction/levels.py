@@ -199,18 +199,16 @@ def forces_at(points: Sequence[Point], forces: Iterable[float], scene: Scene) ->
     return frozen(np.array([float(f * T) if abs(T) == P else Q for (P, T), Q in both]))
 
 
-def prove_order(contact: Contact, *, most: int = 5000) -> Order:
+def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
     Order means that, as the load rises, every asperity that is open at the load of `contact` stays
     open, and the indentation of every other asperity never falls. The result is "proved", "proved
     for one step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse
-    the proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
-    takes some milliseconds per asperity. Other functions make this search for at most 1,000
-    asperities, and only if at most 10,000 touch.
+    the proof. Other functions try it only if at most 20,000 asperities touch, because it takes
+    longer than the other parts of their results.
 
-    most : largest number of asperities for which the search is made. It is made only if at most ten
-        times as many touch
+    most : largest number of touching asperities for which a proof is tried
 
     Raises InputError if the scene has no friction.
 

@@ -85,9 +85,10 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: If at most INVERTED asperities touch, an inverse gives the weights and costs no more than the
-#: levels. If at most TOUCHING * MOST touch, `sweeping` finds weights for at most MOST of them.
-INVERTED, MOST, TOUCHING = 800, 1000, 10
+#: If more than SWEPT asperities touch, `sweeping` finds weights. If at most INVERTED touch, and
+#: `sweeping` is not used or proves nothing, an inverse gives them. Unless a proof is asked for, it
+#: is tried only if at most MOST asperities touch.
+SWEPT, INVERTED, MOST = 400, 800, 20_000
 
 #: Largest number of intermediate levels of the bisection, with an inverse and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
@@ -106,7 +107,7 @@ def order_between(
 
     at    : function that returns the level at a load
     loads : the loads of the levels in use
-    most  : largest number of asperities for which `swept_rates` finds weights
+    most  : largest number of touching asperities for which a proof is tried
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -158,17 +159,18 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     if len(left) == 0:
         return True
     both = np.concatenate((support, np.setdiff1d(left, support)))
-    if not span.regular.all() or len(support) > max(INVERTED, TOUCHING * most):
+    if not span.regular.all() or len(support) > max(INVERTED, most):
         return False
-    if len(support) > INVERTED:
-        rates = swept_rates(influence, c, np.where(rising, 0.0, span.spare[0]), most)
-    elif len(both) > MOST_BOUNDED:
+    if len(support) > SWEPT:
+        swept = swept_rates(influence, c, rates, np.where(rising, 0.0, span.spare[0]))
+        if not span.unsettled(swept[None], rising).any():
+            return True
+    if len(support) > INVERTED or len(both) > MOST_BOUNDED:
         return False
-    else:
-        entries = influence.submatrix(both)[None, :, : len(support)]
-        better = span.at(support[None]).rates(entries, np.full((1, 1), influence.entry_error))[0]
-        rates[support] = -np.inf
-        rates[both] = np.maximum(rates[both], better)
+    entries = influence.submatrix(both)[None, :, : len(support)]
+    better = span.at(support[None]).rates(entries, np.full((1, 1), influence.entry_error))[0]
+    rates[support] = -np.inf
+    rates[both] = np.maximum(rates[both], better)
     return not span.unsettled(rates[None], rising).any()
 
 

@@ -14,90 +14,124 @@ of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
 of radius R_j = scale C~_j with scale = 1 / (pi E*). By (1), q_i times the potential of these
 charges is at least the potential of the unit charge, at all asperities k != i of the support.
 
-There are three ways to find weights:
+*Weights.* Of all weights with the sum 1 and certain moments equal to 0, those with the least
+electrostatic energy of the charges w_j and -1 at i are the solution of a small linear system;
+neighbours with a negative weight are left out, and the system is solved again. Let the complex
+number d_j be the vector from i to j, divided by the direction from the middle of the support to i.
+The moments are:
 
-- Where neighbours are all around i: weights of least energy whose first and second moments vanish:
-  sum w_j d_j = sum w_j d_j^2 = 0, where the complex number d_j is the vector from i to j.
-- At an edge of the contact: a barrier method. It minimises the sum of the weights under (1) with
-  q_i = 1, at near asperities and at some far ones. Then the weights are scaled to the sum 1.
-- Outside the contact: one neighbour alone, if the whole support is nearer to this neighbour than to
-  i.
+- all around i: sum w_j d_j and sum w_j d_j^2;
+- at an edge: the imaginary part of sum w_j d_j, along the edge, and
+  sum w_j (|d_j|^2 - 3 Re(d_j)^2), the term of second order of the potential towards the middle;
+- at a corner: the imaginary part of sum w_j d_j.
+
+For an asperity outside the contact one neighbour alone suffices, if the whole support is nearer to
+this neighbour than to i.
+
+*Far asperities.* Let k be at the distance r from i, farther than all j with w_j > 0. Let g_j be the
+angle between the directions from i to j and to k. With Legendre's polynomials P_l,
+1 / r_jk is the sum of |d_j|^l P_l(cos g_j) / r^(l + 1) over l >= 0. Here P_2(cos g) is
+(1 + 3 cos 2g) / 4, P_3(cos g) is (3 cos g + 5 cos 3g) / 8, and |P_l| <= 1. So
+
+    sum w_j / r_jk >= 1 / r + s / r^3,                                                           (2)
+    s = sum w |d|^2 / 4 - r |sum w d| - 3 |sum w d^2| / 4
+        - (3 |sum w |d|^2 d| + 5 |sum w d^3|) / (8 r) - sum w |d|^4 / (r (r - |d|)).
+
+If the moments all around i are 0, s is positive from some distance on. So (1) need be computed for
+near asperities only, and the proof takes time in proportion to the number of asperities.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import TINY
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
+Moments = Callable[[NDArray[np.complex128]], list[Array]]
+
+
+def around(d: NDArray[np.complex128]) -> list[Array]:
+    """The moments that are 0 where neighbours are all around an asperity."""
+    return [d.real, d.imag, (d * d).real, (d * d).imag]
+
+
+def edge(d: NDArray[np.complex128]) -> list[Array]:
+    """The moments that are 0 at an edge of the contact."""
+    return [d.imag, np.abs(d) ** 2 - 3.0 * d.real**2]
+
+
+def corner(d: NDArray[np.complex128]) -> list[Array]:
+    """The moment that is 0 at a corner of the contact."""
+    return [d.imag]
+
+
 # All numbers here are heuristics.
 
-#: NEIGHBOURS: number of neighbours for weights of least energy. MORE: number for each search for
-#: weights of least total. A search adds the constraint that the last result violated most.
-NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
+#: Numbers of neighbours and moments of the weights that are tried, until (1) is proved. A try also
+#: uses those asperities at which earlier weights violated (1) most. Tries with more than MORE
+#: neighbours are made for at most FEW asperities.
+TRIES: tuple[tuple[int, Moments], ...] = (
+    (12, around), (10, edge), (14, corner), (32, around), (32, edge),
+    *3 * ((60, around), (60, edge)),
+)  # fmt: skip
+MORE, FEW = 32, 300
 
-#: Weights of least total are constrained at the NEAR nearest asperities, and at one asperity in
-#: each of SECTORS sectors of RINGS rings. CENTRED is a factor in the estimate of how far the total
-#: is above the least one.
-NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
+#: Number of neighbours of an asperity outside the contact of which one alone is tried.
+ALONE = 14
 
-#: Largest number of Newton steps for weights of least total, and the estimated excess of the total
-#: at which the steps end.
-STEPS, LEAST = 40, 1e-8
+#: Number of nearest asperities, per neighbour with a weight, for which (1) is computed where (2)
+#: proves it for all others.
+NEAR = 9
 
-#: Largest number of searches for weights of least energy; each drops the neighbours whose weights
-#: are negative.
-SEARCHES = 8
+#: Largest number of systems that are solved for weights; each leaves out the neighbours whose
+#: weights are negative.
+SEARCHES = 15
 
 #: DIRECTIONS: number of directions in which the extent of the support is computed. NUMBERS: about
 #: the number of float64 numbers that are in memory at once.
 DIRECTIONS, NUMBERS = 256, 2**20
 
 
-def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
+def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> Array:
     """(n,) lower bounds on the rates y(C) for all diagonal C with 0 <= C <= C~.
 
-    All bounds are -inf if a bound on the support is not positive, or if the support has fewer than
-    two asperities (then row sums of A C~ suffice for a proof).
+    All bounds are -inf if a bound on the support is not positive.
 
     c     : (n,) diagonal of C~, 0 where open
+    rates : (n,) lower bounds known before, from row sums of A C~
     spare : (n,) at an open asperity, a bound above -spare is not improved further
-    most  : largest number of asperities for which weights of least total are sought
     """
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
-    rates = np.full(len(c), -np.inf)
-    if len(support) < 2:
-        return rates
-    swept, least = _Swept(influence, support, influence.scale * c), np.where(c > 0, 0.0, -spare)
+    rates, least = rates.copy(), np.where(c > 0, 0.0, -spare)
+    swept = _Swept(influence, support, influence.scale * c)
+    others = others[~(rates[others] > least[others])]
     rates[others] = swept.outside(others)
-
-    def unsettled(which: Indices) -> NDArray[np.bool_]:
-        return ~(rates[which] > least[which])
-
     for group in (support, others):
-        left = group[unsettled(group)]
-        rates[left], worst = swept.rates(left, *swept.lightest(left))
-        looked = np.empty((len(left), 0), dtype=np.intp)
-        for count in MORE:
-            failed = unsettled(left)
-            left, looked = left[failed], np.column_stack((looked, worst))[failed]
-            if not 0 < len(left) <= most:
+        left = group[~(rates[group] > least[group])]
+        worst = np.empty((len(left), 0), dtype=np.intp)
+        for count, moments in TRIES:
+            if len(left) == 0 or (count > MORE and len(left) > FEW):
                 break
-            rates[left], worst = swept.rates(left, *swept.tightest(left, count, looked))
+            near = np.column_stack((swept.neighbours(left, count), worst))
+            weights = swept.weights(left, near, moments)
+            rates[left], failed = swept.rates(left, near, weights, moments is around)
+            todo = ~(rates[left] > least[left])
+            left, worst = left[todo], np.column_stack((worst, failed))[todo]
         if not (rates[support] > 0).all():
-            return np.full(len(c), -np.inf)
+            return np.full(len(rates), -np.inf)
     return rates
 
 
-def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
+def _in_parts(make: Callable[..., Array], cost: int, *rows: NDArray[Any]) -> Array:
     """make(*rows), computed in parts of about NUMBERS numbers; each row needs `cost` numbers."""
     some = max(1, NUMBERS // cost)
     parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
@@ -121,6 +155,11 @@ class _Swept:
         """(n,) the points as complex numbers, relative to the middle of all points."""
         x, y = self.influence.points.T
         return np.asarray((x - (x.min() + x.max()) / 2) + 1j * (y - (y.min() + y.max()) / 2))
+
+    @cached_property
+    def middle(self) -> np.complex128:
+        """The mean of the points on the support."""
+        return np.complex128(self.places[self.support].mean())
 
     @cached_property
     def extent(self) -> float:
@@ -159,120 +198,122 @@ class _Swept:
 
     def outside(self, which: Indices) -> Array:
         """(m,) lower bounds on rates by sweeping onto one neighbour; -inf where that fails."""
-        near, here = self.neighbours(which, NEIGHBOURS), self.places[which][:, None]
+        near, here = self.neighbours(which, ALONE), self.places[which][:, None]
         away, middle = self.places[near] - here, (self.places[near] + here) / 2
         nearer = self._least_along(away) - (away.conj() * middle).real
         clear = self.shells[near] < (1 - 2 * self.lost) * np.abs(away)
         found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
-    def lightest(self, which: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and their weights of least energy; 0 where none are found."""
-        near = self.neighbours(which, NEIGHBOURS)
-        return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
+    def weights(self, which: Indices, near: Indices, moments: Moments) -> Array:
+        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
+        cost = (near.shape[1] + 5) ** 2
+        return _in_parts(partial(self._weights, moments), cost, which, near)
 
-    def _lightest(self, which: Indices, near: Indices) -> Array:
-        (m, s), rows = near.shape, 5
-        away = self.places[near] - self.places[which][:, None]
+    def _weights(self, moments: Moments, which: Indices, near: Indices) -> Array:
+        (m, s), here = near.shape, self.places[which]
+        outwards = np.where(here == self.middle, 1.0, here - self.middle)
+        away = (self.places[near] - here[:, None]) / (outwards / np.abs(outwards))[:, None]
         least = np.abs(away).min(axis=1)[:, None]
-        powers = [(away / least) ** k for k in range(3)]
-        sums = np.stack([part for p in powers for part in (p.real, p.imag)], axis=1)
-        sums = np.delete(sums, 1, axis=1)  # the imaginary part of 1
+        sums = np.stack([np.ones((m, s)), *moments(away / least)], axis=1)
+        sums /= np.maximum(np.abs(sums).max(axis=2, keepdims=True), TINY)
+        rows = sums.shape[1]
         coupled = self.potentials(near[:, :, None], near[:, None, :]) * least[:, :, None]
         target = np.zeros((m, s + rows))
         target[:, :s], target[:, s] = least / np.abs(away), 1.0
-        kept, weights, todo = np.ones((m, s), dtype=bool), np.zeros((m, s)), np.arange(m)
+        first = (near[:, :, None] == near[:, None, :]).argmax(axis=2)
+        kept, weights, todo = first == np.arange(s), np.zeros((m, s)), np.arange(m)
         for _ in range(SEARCHES):
-            here = np.pad(kept[todo].astype(float), ((0, 0), (0, rows)), constant_values=1.0)
+            used = np.pad(kept[todo].astype(float), ((0, 0), (0, rows)), constant_values=1.0)
             system = np.zeros((len(todo), s + rows, s + rows))
             system[:, :s, :s], system[:, s:, :s] = coupled[todo], sums[todo]
             system[:, :s, s:] = sums[todo].mT
-            system *= here[:, :, None] * here[:, None, :]
-            dropped = 1.0 - here
-            dropped[:, s:] = -1e-13  # the system is then never singular
+            system *= used[:, :, None] * used[:, None, :]
+            dropped = 1.0 - used
+            dropped[:, s:] = -1e-13  # moments that depend on each other do no harm
             system[:, range(s + rows), range(s + rows)] += dropped
-            found = np.linalg.solve(system, (target[todo] * here)[:, :, None])[:, :s, 0]
+            try:
+                found = np.linalg.solve(system, (target[todo] * used)[:, :, None])[:, :s, 0]
+            except np.linalg.LinAlgError:  # of shells that overlap; these weights remain 0
+                break
             fits = (found >= 0).all(axis=1)
             weights[todo[fits]] = found[fits]
             kept[todo] &= found >= 0
             todo = todo[~fits]
+            if len(todo) == 0:
+                break
         off = np.abs((sums @ weights[:, :, None])[:, :, 0] - target[:, s:]).max(axis=1)
         weights[off > 1e-9] = 0.0
         return weights
 
-    def tightest(self, which: Indices, count: int, looked: Indices) -> tuple[Indices, Array]:
-        """(m, s) neighbours, and weights of least total by the barrier method."""
-        near = self.neighbours(which, count)
-        cost = max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support))
-        return near, _in_parts(self._tightest, cost, which, near, looked)
+    def rates(
+        self, which: Indices, near: Indices, weights: Array, balanced: bool
+    ) -> tuple[Array, Indices]:
+        """(m,) bounds 1 - q_i (-inf where all weights are 0), and the k that determine q_i.
 
-    def _tightest(self, which: Indices, near: Indices, looked: Indices) -> Array:
-        spread = self._spread(which, near[:, 0])
-        seen = np.concatenate((self.neighbours(which, NEAR), spread, looked), axis=1)
-        apart = np.abs(self.places[seen] - self.places[which][:, None])
-        ratios = self.potentials(near[:, :, None], seen[:, None, :]) * apart[:, None, :]
-        diagonal = np.arange(near.shape[1])
-        weights = np.repeat(2.0 / ratios.sum(axis=1).min(axis=1)[:, None], len(diagonal), axis=1)
-        todo, price = np.arange(len(which)), 1.0 / weights.sum(axis=1)
-        for _ in range(STEPS):
-            w, ratio = weights[todo], ratios[todo]
-            room = np.einsum("is,isk->ik", w, ratio) - 1.0
-            scaled = ratio / room[:, None]
-            downhill = scaled.sum(axis=2) + 1.0 / w - price[todo, None]
-            bending = scaled @ scaled.mT
-            bending[:, diagonal, diagonal] += 1.0 / w**2
-            try:
-                step = np.linalg.solve(bending, downhill[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:  # singular by rounding; `rates` verifies the weights
-                break
-            shrinks = np.maximum(
-                (-step / w).max(axis=1), (-np.einsum("is,isk->ik", step, scaled)).max(axis=1)
-            )
-            weights[todo] = w + step * np.minimum(1.0, 0.9 / np.maximum(shrinks, 1e-9))[:, None]
-            price[todo] *= 3.0
-            left = CENTRED * len(seen[0]) / price[todo]
-            todo = todo[(1.0 - weights[todo].sum(axis=1) < left) & (left > LEAST)]
-            if not len(todo):
-                break
-        return weights
+        balanced : True if the moments all around the asperities are 0
+        """
+        rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
+        known = np.flatnonzero(weights.any(axis=1))
+        mine, near = which[known], near[known]
+        weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
+        seen = self.neighbours(mine, NEAR * near.shape[1] if balanced else 1)
+        gains = self.gains(mine, near, weights, seen[:, -1]) if balanced else np.zeros(len(mine))
+        far, q = gains > 0, np.empty(len(known))
+        cost = near.shape[1] * seen.shape[1]
+        ratios = _in_parts(self._ratios, cost, mine[far], near[far], weights[far], seen[far])
+        least = ratios.argmin(axis=1)
+        q[far] = 1.0 / np.minimum(ratios[np.arange(len(least)), least], 1.0 + gains[far])
+        worst[known[far]] = seen[far][np.arange(len(least)), least]
+        q[~far], worst[known[~far]] = self._everywhere(mine[~far], near[~far], weights[~far])
+        rates[known] = 1.0 - (1.0 + self.lost) * q
+        return rates, worst
 
-    def _spread(self, which: Indices, nearest: Indices) -> Indices:
-        """(m, k) an asperity of the support in each sector of each ring; `nearest` if none is."""
-        away = self.places[self.support] - self.places[which][:, None]
-        itself = self.support == which[:, None]
-        apart = np.abs(np.where(itself, self.extent, away))
-        least = apart.min(axis=1, keepdims=True)
-        ring = np.log(apart / least) / np.log(self.extent / least)
-        sector = np.angle(away) % (2 * np.pi) / (2 * np.pi)
-        place = (ring.clip(0, 0.999) * RINGS).astype(int) * SECTORS
-        place += np.minimum((sector * SECTORS).astype(int), SECTORS - 1)
-        found = np.repeat(nearest[:, None], RINGS * SECTORS, axis=1)
-        row, column = np.nonzero(~itself)
-        found[row, place[row, column]] = self.support[column]
-        return np.asarray(found)
+    def gains(self, which: Indices, near: Indices, weights: Array, last: Indices) -> Array:
+        """(m,) g > 0 for which, by (2), q_i = 1 / (1 + g) satisfies (1) for all k at least as far
+        from i as the asperity `last`; 0 where (2) does not prove this.
+        """
+        d = self.places[near] - self.places[which][:, None]
+        apart = np.where(weights > 0, np.abs(d), 0.0)
+        r = np.abs(self.places[last] - self.places[which]) * (1 - self.lost)
 
-    def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) bounds 1 - q_i (-inf where all weights are 0), and the k that determine q_i."""
+        def total(values: NDArray[Any]) -> Array:
+            return np.asarray(np.abs((weights * values).sum(axis=1)))
+
+        square = total(apart**2)
+        first = (total(d) + self.lost * total(apart)) * self.extent
+        third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
+        with np.errstate(divide="ignore"):
+            rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
+        s = square / 4 - first - 3 / 4 * total(d**2) - (third + rest) / r
+        # s exceeds square / 32 by far more than it is wrong by rounding.
+        return np.asarray(np.where(s > square / 16, square / 32 / self.extent**2, 0.0))
+
+    def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
+        """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
+        swept = np.einsum("is,isk->ik", weights, self.potentials(near[:, :, None], seen[:, None]))
+        return np.asarray(swept * np.abs(self.places[seen] - self.places[which][:, None]))
+
+    def _everywhere(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
+        """(m,) the least q_i of (1) for the whole support, and the k that determine it."""
         from scipy.sparse import csr_array
 
-        total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
-        known = np.flatnonzero(total)
-        rows, mine = np.arange(len(known)), which[known]
-        charged, columns = np.unique(near[known], return_inverse=True)
-        each = (weights[known] / total[known, None]).ravel()
-        starts = np.arange(len(known) + 1) * near.shape[1]
-        charges = csr_array((each, columns.ravel(), starts), shape=(len(known), len(charged)))
-        most, nowhere = np.zeros(len(known)), np.full(len(self.places), np.inf)
-        parts = 1 + (len(charged) + len(known)) * len(self.support) // NUMBERS
+        rows = np.arange(len(which))
+        charged, columns = np.unique(near, return_inverse=True)
+        starts = np.arange(len(which) + 1) * near.shape[1]
+        shape = len(which), len(charged)
+        charges = csr_array((weights.ravel(), columns.ravel(), starts), shape=shape)
+        most, worst = np.zeros(len(which)), near[:, 0].copy()
+        nowhere = np.full(len(self.places), np.inf)
+        parts = 1 + (len(charged) + len(which)) * len(self.support) // NUMBERS
         for seen in np.array_split(self.support, parts):
             swept = charges @ (1.0 / self._apart(charged, seen, self.shells))
-            swept *= self._apart(mine, seen, nowhere)
+            swept *= self._apart(which, seen, nowhere)
             least = swept.argmin(axis=1)
             q = 1.0 / swept[rows, least]
-            worst[known] = np.where(q > most, seen[least], worst[known])
+            worst = np.where(q > most, seen[least], worst)
             most = np.maximum(most, q)
-        rates[known] = 1.0 - (1.0 + self.lost) * most
-        return rates, worst
+        return most, worst
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
         """(m, k) distances of asperities; from an asperity to itself, its entry in `themselves`."""

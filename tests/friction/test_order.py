@@ -14,8 +14,9 @@ from path_scenes import around, on_flat, shaded
 
 import convexrough as cr
 from convexrough.bench.scenes import scene as bench_scene
-from convexrough.friction import order
+from convexrough.friction import order, sweeping
 from convexrough.friction.levels import FrictionLevels
+from convexrough.influence.dense import DenseInfluence
 
 NOTHING = Fraction(0)
 
@@ -77,9 +78,44 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
     found = levels.order([NOTHING])
     assert found == "fails" if down else found == "proved" or aim > 0.9
     monkeypatch.setattr(order, "INVERTED", 0)
+    monkeypatch.setattr(order, "SWEPT", 0)
     proved = order.proved_between(levels.top, levels.at(NOTHING), ~levels.top.open)
     assert proved or aim > 0.9
     assert not (proved and down)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("moved", [0.0, 0.15])
+def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
+    """Where moments prove the condition for far asperities, it holds at each of them; and rates are
+    above their bounds for random stiffnesses."""
+    random = np.random.default_rng(seed)
+    points = (cr.Asperities.hexagonal, cr.Asperities.square)[seed % 2](
+        spacing=1.0, tip_radius=1.0, within=11.0
+    ).positions
+    points = points + moved * random.normal(size=points.shape)
+    influence = DenseInfluence.assemble(points, 1.0)
+    n, matrix = len(points), influence.matrix
+    c = influence.separations() * random.uniform(0.05, 0.3, n) * (random.random(n) > 0.1)
+    support = np.flatnonzero(c)
+    swept = sweeping._Swept(influence, support, c)
+    near = swept.neighbours(support, 12)
+    weights = swept.weights(support, near, sweeping.around)
+    last = swept.neighbours(support, 108)[:, -1]
+    gains = swept.gains(support, near, weights, last)
+    proved = np.flatnonzero(gains)
+    assert len(proved) > 0.5 * n
+    for k in proved[::7]:
+        i = support[k]
+        far = support[matrix[i, support] <= matrix[i, last[k]]]
+        far = far[far != i]
+        swept_potential = weights[k] @ swept.potentials(near[k][:, None], far)
+        assert (swept_potential >= (1 + gains[k]) * matrix[i, far]).all()
+    bounds = sweeping.swept_rates(influence, c, 1.0 - matrix @ c, np.zeros(n))
+    assert (bounds[support] > 0).all()
+    for _ in range(3):
+        y = np.linalg.solve(np.eye(n) + matrix * (c * random.random(n)), np.ones(n))
+        assert (y >= bounds).all()
 
 
 @pytest.mark.sample(2)
@@ -100,6 +136,7 @@ def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
 
     asked, unasked = (cr.press(scene, approach=approach) for _ in range(2))
     monkeypatch.setattr(order, "INVERTED", 0)
+    monkeypatch.setattr(order, "SWEPT", 0)
     monkeypatch.setattr(FrictionLevels.order, "__defaults__", (5,))
     assert np.isinf(loss_error(unasked))
     assert cr.prove_order(asked, most=5) == "proved for one step"
