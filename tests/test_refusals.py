@@ -37,7 +37,7 @@ def test_gradients_of_losses_have_bounds_only_where_order_is_proved(
     asperities = cr.Asperities.hexagonal(spacing=0.002, tip_radius=0.02, within=0.0102)
     contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5), approach=5e-5)
     monkeypatch.setattr(order, "INVERTED", 0)
-    monkeypatch.setattr(order, "SWEPT", 0)
+    monkeypatch.setattr(order, "SWEPT", 1)
     monkeypatch.setattr(FrictionLevels.order, "__defaults__", (0,))
     cycle = cr.cycle(contact, maximum=0.1 * contact.load)
     assert cycle.order == "proved for one step"

@@ -78,7 +78,7 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
     found = levels.order([NOTHING])
     assert found == "fails" if down else found == "proved" or aim > 0.9
     monkeypatch.setattr(order, "INVERTED", 0)
-    monkeypatch.setattr(order, "SWEPT", 0)
+    monkeypatch.setattr(order, "SWEPT", 1)
     proved = order.proved_between(levels.top, levels.at(NOTHING), ~levels.top.open)
     assert proved or aim > 0.9
     assert not (proved and down)
@@ -136,7 +136,7 @@ def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
 
     asked, unasked = (cr.press(scene, approach=approach) for _ in range(2))
     monkeypatch.setattr(order, "INVERTED", 0)
-    monkeypatch.setattr(order, "SWEPT", 0)
+    monkeypatch.setattr(order, "SWEPT", 1)
     monkeypatch.setattr(FrictionLevels.order, "__defaults__", (5,))
     assert np.isinf(loss_error(unasked))
     assert cr.prove_order(asked, most=5) == "proved for one step"
