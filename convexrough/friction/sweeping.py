@@ -1,24 +1,16 @@
 r"""Proof of order for many asperities: charges at near neighbours bound the rates from below.
 
-The diagonal matrices C and C~, the support (the asperities with C~ > 0) and the rates
-y(C) = (I + A C)^-1 1 are those of `friction.order`. I + A C is regular for 0 <= C <= C~. For an
-asperity i, choose weights w_j >= 0 of some neighbours j != i on the support; the sum of the weights
-is 1. Let q_i be a number such that for all k != i on the support
-
-    A_ik <= q_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
-
-If 1 - q_i is positive for all i on the support, it is a lower bound on the rate y_i(C): this is (2)
-of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
-
-(1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
-of radius R_j = scale C~_j with scale = 1 / (pi E*). By (1), q_i times the potential of these
-charges is at least the potential of the unit charge, at all asperities k != i of the support.
+docs/theory/states.md, "The proof of order", derives (6), defines its symbols, and compares the
+weights w_k with charges on shells, onto which a unit charge at asperity i is swept. For weights
+that satisfy (6), 1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is
+positive for all i on the support. The shells have the radii R_k = scale C~_k with
+scale = 1 / (pi E*).
 
 There are three ways to find weights:
 
 - Where neighbours are all around i: weights of least energy whose first and second moments vanish:
-  sum w_j d_j = sum w_j d_j^2 = 0, where the complex number d_j is the vector from i to j.
-- At an edge of the contact: a barrier method. It minimises the sum of the weights under (1) with
+  sum w_k d_k = sum w_k d_k^2 = 0, where the complex number d_k is the vector from i to k.
+- At an edge of the contact: a barrier method. It minimises the sum of the weights under (6) with
   q_i = 1, at near asperities and at some far ones. Then the weights are scaled to the sum 1.
 - Outside the contact: one neighbour alone, if the whole support is nearer to this neighbour than to
   i.
@@ -106,10 +98,10 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """Sweeping of unit charges at asperities onto shells around neighbours, as in (1).
+    """Sweeping of unit charges at asperities onto shells around neighbours, as in (6).
 
     support : indices of the asperities on the support
-    shells  : (n,) radii R_j of the shells; 0 off the support
+    shells  : (n,) radii R_k of the shells; 0 off the support
     """
 
     influence: Influence
@@ -129,7 +121,7 @@ class _Swept:
 
     @cached_property
     def lost(self) -> float:
-        """Bound on the relative rounding error of (1)."""
+        """Bound on the relative rounding error of (6)."""
         moved = ROUNDOFF * self.extent / float(self.influence.separations().min())
         return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
