@@ -11,7 +11,8 @@ There are three ways to find weights:
 - Where neighbours are all around i: weights of least energy whose first and second moments vanish:
   sum w_k d_k = sum w_k d_k^2 = 0, where the complex number d_k is the vector from i to k.
 - At an edge of the contact: a barrier method. It minimises the sum of the weights under (6) with
-  q_i = 1, at near asperities and at some far ones. Then the weights are scaled to the sum 1.
+  q_i = 1, at near asperities and at a sample of all others. Then the weights are scaled to the
+  sum 1.
 - Outside the contact: one neighbour alone, if the whole support is nearer to this neighbour than to
   i.
 """
@@ -34,12 +35,11 @@ from convexrough.roundoff import ROUNDOFF
 
 #: NEIGHBOURS: number of neighbours for weights of least energy. MORE: number for each search for
 #: weights of least total. A search adds the constraint that the last result violated most.
-NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
+NEIGHBOURS, MORE = 14, (32,) * 5 + (80,) * 5
 
-#: Weights of least total are constrained at the NEAR nearest asperities, and at one asperity in
-#: each of SECTORS sectors of RINGS rings. CENTRED is a factor in the estimate of how far the total
-#: is above the least one.
-NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
+#: Weights of least total are constrained at the NEAR nearest asperities and at about SAMPLE others.
+#: CENTRED is a factor in the estimate of how far the total is above the least one.
+NEAR, SAMPLE, CENTRED = 60, 100, 3.0
 
 #: Largest number of Newton steps for weights of least total, and the estimated excess of the total
 #: at which the steps end.
@@ -195,11 +195,12 @@ class _Swept:
     def tightest(self, which: Indices, count: int, looked: Indices) -> tuple[Indices, Array]:
         """(m, s) neighbours, and weights of least total by the barrier method."""
         near = self.neighbours(which, count)
-        cost = max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support))
+        cost = max(near.shape[1] * (NEAR + SAMPLE), len(self.support))
         return near, _in_parts(self._tightest, cost, which, near, looked)
 
     def _tightest(self, which: Indices, near: Indices, looked: Indices) -> Array:
-        spread = self._spread(which, near[:, 0])
+        sample = self.support[:: -(-len(self.support) // SAMPLE)]
+        spread = np.where(sample == which[:, None], near[:, :1], sample)
         seen = np.concatenate((self.neighbours(which, NEAR), spread, looked), axis=1)
         apart = np.abs(self.places[seen] - self.places[which][:, None])
         ratios = self.potentials(near[:, :, None], seen[:, None, :]) * apart[:, None, :]
@@ -227,21 +228,6 @@ class _Swept:
             if not len(todo):
                 break
         return weights
-
-    def _spread(self, which: Indices, nearest: Indices) -> Indices:
-        """(m, k) an asperity of the support in each sector of each ring; `nearest` if none is."""
-        away = self.places[self.support] - self.places[which][:, None]
-        itself = self.support == which[:, None]
-        apart = np.abs(np.where(itself, self.extent, away))
-        least = apart.min(axis=1, keepdims=True)
-        ring = np.log(apart / least) / np.log(self.extent / least)
-        sector = np.angle(away) % (2 * np.pi) / (2 * np.pi)
-        place = (ring.clip(0, 0.999) * RINGS).astype(int) * SECTORS
-        place += np.minimum((sector * SECTORS).astype(int), SECTORS - 1)
-        found = np.repeat(nearest[:, None], RINGS * SECTORS, axis=1)
-        row, column = np.nonzero(~itself)
-        found[row, place[row, column]] = self.support[column]
-        return np.asarray(found)
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
         """(m,) bounds 1 - q_i (-inf where all weights are 0), and the k that determine q_i."""
