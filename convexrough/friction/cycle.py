@@ -137,6 +137,7 @@ class Cycle(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
@@ -239,6 +240,9 @@ class Cycle(Table, Plottable):
         asperities : indices of the asperities whose own loops are returned; default all
 
         Raises InputError if the load varies.
+
+        >>> cr.cycle(contact, maximum=0.25 * contact.load).loop(100, [0]).asperity_forces.shape
+        (101, 1)
         """
         return loops([self], points, asperities)[0]
 
@@ -250,7 +254,7 @@ def cycle(
     minimum: float | None = None,
     displacement: float | None = None,
 ) -> Cycle:
-    """The steady cycle between two shear forces at constant load.
+    """The steady cycle between two shear forces at constant load (docs/theory/losses.md).
 
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
@@ -328,6 +332,8 @@ def steady(
     scene: Scene, *, loads: ArrayLike, forces: ArrayLike, influence: Kind | None = None
 ) -> Cycle:
     """The steady state of a closed path of load and shear force that is repeated.
+
+    docs/theory/paths.md, "Closed paths", derives it.
 
     loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
         segments between points are straight, and the last one returns to the first point. As in

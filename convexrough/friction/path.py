@@ -101,6 +101,7 @@ class LoadPath(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
@@ -149,6 +150,8 @@ def load_path(
 ) -> LoadPath:
     """The friction states along a path of load and shear force with straight segments.
 
+    docs/theory/paths.md gives the rules.
+
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
@@ -172,6 +175,8 @@ def load_path(
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     """The friction states along a sequence of shear forces at constant load P.
+
+    docs/theory/paths.md gives the rules.
 
     forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear. As in
         `shear`, Q counts as f P if they differ only by rounding

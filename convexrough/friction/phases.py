@@ -40,7 +40,7 @@ def elliptic_path(
     friction: float,
     chords: int = 96,
 ) -> tuple[Array, Array]:
-    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse.
+    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse (docs/theory/paths.md).
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
@@ -143,6 +143,8 @@ def phase_losses(
     influence: Kind | None = None,
 ) -> PhaseLosses:
     """The energy losses of cycles along ellipses with several phases and amplitudes.
+
+    docs/theory/paths.md, "Lines and ellipses", explains what the losses depend on.
 
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
     phases  : (m,) [rad] from -pi to pi

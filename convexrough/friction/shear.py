@@ -148,7 +148,13 @@ class ShearState(Table, Plottable):
     def change(self, direction: Direction) -> ShearChange:
         """First-order changes of forces, slips and displacement when the scene changes.
 
-        Raises InputError in gross sliding.
+        direction : changes of the scene, of the load or approach, and of the shear force
+
+        Raises InputError in gross sliding, or if `direction` changes both load and approach.
+
+        >>> state = cr.shear(contact, force=0.25 * contact.load)
+        >>> state.change(cr.Direction(friction=0.01)).displacement < 0
+        True
         """
         from convexrough.gradients.change import shear_change  # a higher layer
 
@@ -159,6 +165,8 @@ def shear(
     contact: Contact, *, force: float | None = None, displacement: float | None = None
 ) -> ShearState:
     """The friction state of a pressed contact after monotonic shear at constant load P.
+
+    It is the difference of two normal solutions, (1) of docs/theory/states.md.
 
     Prescribe one of the two:
 

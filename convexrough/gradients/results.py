@@ -143,6 +143,8 @@ def state_gradient(
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
     """Derivatives of the shear force at which one asperity starts to slide on first loading.
 
+    docs/theory/gradients.md, "Weights on single asperities", derives them.
+
     asperity : index of the asperity in the scene
     holding  : quantity kept constant, as in `Contact.gradient`
 

@@ -133,6 +133,7 @@ def shakedown(
     """The largest factor by which a closed path may be scaled so that sliding dies out.
 
     Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
+    docs/theory/shakedown.md derives the limits.
     The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
 
     load, force : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"

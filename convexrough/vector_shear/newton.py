@@ -44,7 +44,14 @@ class FrictionNewton:
     name: str = field(default="newton", init=False)
 
     def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
-        """The state under a total (2,), |T| < sum P, in scaled units."""
+        """The state under a total (2,), |T| < sum P, in scaled units.
+
+        Raises SolverError if the method does not converge.
+
+        >>> problem = contact.cached(FrictionProblem)
+        >>> cr.FrictionNewton().solve(problem, np.array([0.1, 0.0])).increments.shape
+        (37, 2)
+        """
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
         height = Fraction(size) * Fraction(problem.units.force)

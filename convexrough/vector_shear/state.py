@@ -97,6 +97,8 @@ def shear_vector(
 ) -> VectorShearState:
     """The friction state with the full tangential kernel: Q grew from 0 at constant normal load.
 
+    docs/theory/vector-friction.md derives the equations and the bounds.
+
     force  : [force] the pair (Qx, Qy), or a number along x
     solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
 
