@@ -56,15 +56,15 @@ class Slips(NamedTuple):
     own: Array
 
 
-def pieces_of(levels: Array, heights: Array, own: float, k: float) -> tuple[Stick, Slips]:
+def pieces_of(indentations: Array, deflections: Array, own: float, k: float) -> tuple[Stick, Slips]:
     """The pieces of the energy of an asperity, from its memory curve before the step.
 
-    levels, heights : (m,) vertices of this curve; no level exceeds `own`
+    indentations, deflections : (m,) vertices of this curve; no indentation exceeds `own`
     own : indentation of the asperity after the step, positive
     k   : coefficient of the asperity in Hertz's law
     """
-    distinct = np.diff(levels, prepend=-1.0) > 0
-    s, xi = levels[distinct] / own, heights[distinct] / own
+    distinct = np.diff(indentations, prepend=-1.0) > 0
+    s, xi = indentations[distinct] / own, deflections[distinct] / own
     N = hertz.load(s * own, k) / hertz.load(own, k)
     slopes = np.diff(xi) / np.diff(s)
     T = np.concatenate(([0.0], np.cumsum(slopes * np.diff(N))))
@@ -113,7 +113,7 @@ class ConicStepper(Stepper):
             raise SolverError("too dense for a convex program", solver="conic step")
         energies = N * own / parts  # the factors that turn scaled energies W into W_i / p_i
         unit = float(energies.max())
-        vertices = step.curves.levels[which], step.curves.heights[which], own, k
+        vertices = step.curves.indentations[which], step.curves.deflections[which], own, k
         sticks, slips = zip(
             *(pieces_of(*each) for each in zip(*vertices, strict=True)), strict=True
         )

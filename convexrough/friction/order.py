@@ -125,7 +125,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` for m pairs of levels, if each upper level has the path's top load."""
+    """(m,) `proved_between` for the levels in each row; `high` must have the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
     entry_error = np.empty((len(span.c), 1))
     for some, problem in rows.coupled:
@@ -148,7 +148,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
 
 
 class _Span(NamedTuple):
-    """The quantities of the proof for m pairs of levels, as arrays (m, n) or (m, 1).
+    """The quantities of the proof between the levels in m rows, as arrays (m, n) or (m, 1).
 
     support : true on the support
     c       : diagonal of C~
