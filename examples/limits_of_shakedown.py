@@ -29,10 +29,10 @@ def compare() -> Pairs:
     P, last = contact.load, 31  # an asperity of ring A, the last to touch
     swing = FRICTION * P * np.array([1.0, -1.0])
 
-    exact = cr.shakedown(scene, loads=P, force_amplitudes=swing)
-    elastic = cr.shakedown(scene, loads=P, force_amplitudes=swing, kind="elastic")
+    exact = cr.shakedown(scene, load=P, force_amplitudes=swing)
+    elastic = cr.shakedown(scene, load=P, force_amplitudes=swing, kind="elastic")
     across = np.column_stack((0 * swing, swing))
-    vector = cr.shakedown(scene, loads=P, force_amplitudes=across, kind="vector")
+    vector = cr.shakedown(scene, load=P, force_amplitudes=across, kind="vector")
 
     # On first loading the same asperity slides first, at the same force.
     onset = cr.onset_of_sliding(contact, which=[last])[0] / (FRICTION * P)
@@ -68,7 +68,7 @@ def over_both_amplitudes() -> cr.Shakedown:
     p, q = cr.elliptic_path(
         load=0.0, load_amplitude=0.1 * P, force_amplitude=0.2 * FRICTION * P, friction=FRICTION
     )
-    return cr.shakedown(scene, loads=P, load_amplitudes=p, force_amplitudes=q)
+    return cr.shakedown(scene, load=P, load_amplitudes=p, force_amplitudes=q)
 
 
 if __name__ == "__main__":

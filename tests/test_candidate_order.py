@@ -42,7 +42,7 @@ def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
     yield cr.shear_vector(contact, force=force)
     for kind in ("exact", "elastic"):
         amplitudes = [0.05 * load, -0.05 * load]
-        yield cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)
+        yield cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
     path: dict[str, Any] = dict(loads=[load, 0.8 * load], forces=[0.0, 0.15 * load])
     yield cr.load_path(scene, **path)
     yield cr.load_path(scene, general_steps=2, **path)

@@ -76,7 +76,7 @@ def test_amplitudes_that_are_masked_or_no_numbers() -> None:
         {"force_amplitudes": [1e-9, -1e-9, 0.0], "load_amplitudes": masked},
     ):
         with pytest.raises(cr.InputError, match="_amplitudes: found 1 masked"):
-            cr.shakedown(scene, loads=1e-7, **given)
+            cr.shakedown(scene, load=1e-7, **given)
     for wrong in (None, "1e-8", [1e-8]):
         with pytest.raises(cr.InputError, match="load_amplitude"):
             cr.phase_losses(

@@ -63,7 +63,7 @@ def results() -> dict[str, Any]:
         cr.read_scene(NEW_SCENE),
         contact.proof(),
         cr.load_path(scene, loads=contact.load * np.array([1.0, 0.7]), forces=[Q, -Q / 2]),
-        cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q]),
+        cr.shakedown(scene, load=contact.load, force_amplitudes=[Q, -Q]),
         cr.phase_losses(scene, load=contact.load, load_amplitude=Q, force_amplitude=Q / 2,
                         phases=[0.0, 1.0], factors=[0.5, 1.0], chords=6),
         cr.compare_paths(scene, loads=[contact.load] * 2, forces=[Q, -Q]),

@@ -48,13 +48,12 @@ class ConeRows(NamedTuple):
     cones: int
 
 
-def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
+def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
     """The cones of n lifts as rows of  A x + s = b  with s in second-order cones.
 
     lifts : for four cones, the columns of y2, y3, y4, y5 and z, (n,) each; for five cones, the
         columns of y1, ..., y5 and z
     width : number of variables of the program
-    ones  : (n,) columns of variables, one for each lift, that replace the constant 1 in its cones
 
     Rows are grouped by lift, with three rows per cone.
     """
@@ -65,9 +64,6 @@ def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = Non
     cones = SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
     rows = cones.reshape(-1, 7)  # rows of one lift
     constant, coefficients = rows[:, 0], rows[:, 7 - names :]
-    if ones is not None:
-        columns = np.vstack((ones, columns))
-        constant, coefficients = np.zeros(len(rows)), np.column_stack((constant, coefficients))
     row, name = np.nonzero(coefficients)
     at = (len(rows) * np.arange(n) + row[:, None], columns[name])
     values = np.broadcast_to(-coefficients[row, name][:, None], at[1].shape)

@@ -1,20 +1,15 @@
 """The general step as one second-order cone program: a check of the solution by Newton's method.
 
-The general step is a step along a load path without the assumption of order. The elastic energy
-W(T) of an asperity is the integral of its deflection over its shear force T. It consists of pieces:
-one on which the asperity sticks, and others on which it slips. There is one of these for each
-direction of slip and each straight part (layer) of the memory curve before the step in which the
-slip front may end (docs/theory/without-order.md). W is convex, so it is the convex hull of its
-pieces. The cones of `convexrough.convex.cones` represent each piece exactly. Piece j has a weight
-w_j >= 0, which replaces the constant 1 in the cones of this piece (its perspective). The weights of
-an asperity add up to 1. The forces and energies of its pieces add up to those of the asperity.
-Forces are in units of the coefficient of friction f, displacements in units of c_t f with Mindlin's
-ratio c_t: docs/theory/without-order.md, "The step as one cone program".
+The program and its symbols are those of docs/theory/without-order.md, "The step as one cone
+program". The force of an asperity is T_B, plus a part on the piece where it sticks, plus a part on
+each piece where it slips. Forces are in units of the coefficient of friction f, displacements in
+units of c_t f with Mindlin's ratio c_t. In the program of one asperity, forces and loads are also
+divided by its load, and lengths by its indentation.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,118 +26,56 @@ from convexrough.sphere import hertz
 #: one of its steps takes.
 TOLERANCE, STEP = 1e-11, 0.9
 
-#: A piece has LIFT variables: its weight, y1, ..., y5 and z. Y3, Y5, Z are the places of y3, y5, z.
-LIFT, Y3, Y5, Z = 7, 3, 5, 6
-
 #: Layers thinner than this fraction of the load are omitted; the solver's error is larger.
 THIN = 1e-9
 
 
-class ConePiece(NamedTuple):
-    """A piece of W(T). Forces are divided by the load N of the asperity, lengths by k N^(2/3).
-
-    On a slipping piece the level L of the slip front runs from `low` to `high`. With the constants
-    `force`, `rate`, `own` and `energy` of the piece,  T = force - rate L,  the deflection is
-    own - rate L^(2/3),  and  W = own T + (3/5) rate^2 L^(5/3) + energy.  On a stuck piece
-    rate = 0,  |T - force| <= high  and  W = own (T - force) + (T - force)^2 softness / 2 + energy.
+class Stick(NamedTuple):
+    """The piece of W(T) on which the asperity sticks:  |T - force| <= half, where the deflection is
+    own + softness (T - force). If its load does not rise in the step, `half` is 0.
     """
 
-    low: float
-    high: float
-    rate: float
     force: float
     own: float
-    energy: float
-    softness: float = 0.0
-
-    def forces(self) -> tuple[float, float]:
-        """The smallest and the largest force on the piece."""
-        if self.rate == 0.0:
-            return self.force - self.high, self.force + self.high
-        ends = self.force - self.rate * self.low, self.force - self.rate * self.high
-        return min(ends), max(ends)
-
-    @property
-    def force_row(self) -> Array:
-        """(LIFT,) coefficients of T in the variables of a piece."""
-        found = np.zeros(LIFT)
-        found[0], found[Y3] = self.force, -self.rate or 1.0
-        return found
-
-    def objective(self, shift: float) -> Array:
-        """(LIFT,) coefficients of W - shift T^2 / 2 in the variables of a piece."""
-        found = np.zeros(LIFT)
-        found[0] = self.energy - shift * self.force**2 / 2.0
-        if self.rate == 0.0:
-            found[Y3] = self.own - shift * self.force
-            found[Y5] = (self.softness - shift) / 2.0
-            return found
-        found[0] += self.own * self.force
-        found[Y3] = self.rate * (shift * self.force - self.own)
-        found[Y5] = self.rate**2 * (0.6 - shift / 2.0)
-        found[Z] = self.rate**2 * shift / 2.0
-        return found
-
-    def rows(self, lift: Array) -> Array:
-        """(3 k, LIFT) a matrix A: for the variables y of the piece, -A y lies in k cones.
-
-        The cones have dimension 3. The first one stands for the bounds of the piece. On a slipping
-        piece the others are `lift`, the cones for powers. A stuck piece has one other cone, and
-        uses three variables: the weight; y3, the force minus the force in the middle of the piece;
-        and y5, the square of y3 divided by the weight.
-        """
-        low = -self.high if self.rate == 0.0 else self.low
-        bounds, square = np.zeros((3, LIFT)), np.zeros((3, LIFT))
-        bounds[:2, 0] = (low - self.high) / 2.0, (low + self.high) / 2.0
-        bounds[1, Y3] = square[0, 0] = square[0, Y5] = square[1, Y5] = -1.0
-        square[1, 0], square[2, Y3] = 1.0, -2.0
-        return np.vstack((bounds, lift if self.rate else square))
-
-    def cost(self, force: float) -> float:
-        """W at this force, minus the constant `energy`."""
-        if self.rate == 0.0:
-            return (self.own + 0.5 * self.softness * (force - self.force)) * (force - self.force)
-        level = max((self.force - force) / self.rate, 0.0)
-        return self.own * force + 0.6 * self.rate**2 * float(np.cbrt(level)) ** 5
+    half: float
+    softness: float
 
 
-def pieces_of(levels: Array, heights: Array, own: float, k: float) -> list[ConePiece]:
+class Slips(NamedTuple):
+    """The m pieces of W(T) on which the asperity slips, as arrays (m,).
+
+    The load N of the front runs from `high` at the beginning of the piece to `low`. At N
+
+        T = force - rate N,    the deflection is  own - rate N^(2/3).
+    """
+
+    low: Array
+    high: Array
+    rate: Array
+    force: Array
+    own: Array
+
+
+def pieces_of(indentations: Array, deflections: Array, own: float, k: float) -> tuple[Stick, Slips]:
     """The pieces of the energy of an asperity, from its memory curve before the step.
 
-    levels, heights : (m,) vertices of this curve; no level exceeds `own`
+    indentations, deflections : (m,) vertices of this curve; no indentation exceeds `own`
     own : indentation of the asperity after the step, positive
     k   : coefficient of the asperity in Hertz's law
     """
-    distinct = np.diff(levels, prepend=-1.0) > 0
-    s, base = levels[distinct], float(levels[-1])
-    load = float(hertz.load(own, k))
-    N, xi = hertz.load(s, k) / load, heights[distinct] / own
-    slopes = (np.diff(heights[distinct]) / np.diff(s)).tolist()
-    T = np.concatenate(([0.0], np.cumsum(np.array(slopes) * np.diff(N))))
-    top, moved = float(N[-1]), float(xi[-1])
-    found = []
-    start = {1: (float(T[-1]), 0.0), -1: (float(T[-1]), 0.0)}  # force and energy reached so far
-    if own > base * (1 + THIN):
-        softness = (1.0 - base / own) / (1.0 - top)
-        stuck = ConePiece(0.0, 1.0 - top, 0.0, float(T[-1]), moved, 0.0, softness)
-        found.append(stuck)
-        for sign, end in zip((-1, 1), stuck.forces(), strict=True):
-            start[sign] = end, stuck.cost(end)
-    for sign in (1, -1):
-        force, energy = start[sign]
-        for j in reversed(range(len(slopes))):
-            low, high = float(N[j]), float(N[j + 1])
-            rate = sign - slopes[j]  # c (1 - c th)
-            if high - low <= THIN or abs(rate) <= THIN:
-                continue
-            level = float(T[j]) - slopes[j] * low + sign
-            reached = float(xi[j]) - slopes[j] * low ** (2 / 3) + sign
-            piece = ConePiece(low, high, rate, level, reached, 0.0)
-            piece = piece._replace(energy=energy - piece.cost(force))
-            found.append(piece)
-            force = piece.forces()[1 if sign > 0 else 0]
-            energy = piece.cost(force) + piece.energy
-    return found
+    distinct = np.diff(indentations, prepend=-1.0) > 0
+    s, xi = indentations[distinct] / own, deflections[distinct] / own
+    N = hertz.load(s * own, k) / hertz.load(own, k)
+    slopes = np.diff(xi) / np.diff(s)
+    T = np.concatenate(([0.0], np.cumsum(slopes * np.diff(N))))
+    grows = s[-1] * (1 + THIN) < 1
+    softness = (1.0 - s[-1]) / (1.0 - N[-1]) if grows else 0.0
+    stick = Stick(T[-1], xi[-1], 1.0 - N[-1] if grows else 0.0, softness)
+    sign = np.array([[1.0], [-1.0]])
+    low, high, rate = np.broadcast_arrays(N[:-1], N[1:], sign - slopes)
+    force, deflection = sign + T[:-1] - slopes * low, sign + xi[:-1] - slopes * s[:-1]
+    kept = (high - low > THIN) & (np.abs(rate) > THIN)
+    return stick, Slips(*(each[kept] for each in (low, high, rate, force, deflection)))
 
 
 class ConicStepper(Stepper):
@@ -160,9 +93,11 @@ class ConicStepper(Stepper):
         return eta, x, step.at(eta)
 
     def _program(self, step: Step, which: Indices) -> tuple[ConeProgram, float]:
-        """The program in T_i / N_i and the variables of each piece, and the unit of its objective.
+        """The program, and the unit of its objective.
 
-        which : (n,) indices of the asperities that touch after the step, with the loads N_i
+        The variables are T_i / N_i of the n asperities `which`, which touch after the step with the
+        loads N_i; their n parts on the pieces where they stick; and the powers of N^(1/3) on each
+        piece where they slip.
 
         Raises SolverError if the shells, a diagonal that makes the compliance matrix positive
         semidefinite, are too large for the cones.
@@ -178,38 +113,56 @@ class ConicStepper(Stepper):
             raise SolverError("too dense for a convex program", solver="conic step")
         energies = N * own / parts  # the factors that turn scaled energies W into W_i / p_i
         unit = float(energies.max())
-        vertices = step.curves.levels[which], step.curves.heights[which], own, k
-        each = [pieces_of(*values) for values in zip(*vertices, strict=True)]
-        owner = np.repeat(np.arange(n), [len(pieces) for pieces in each])
-        pieces = [piece for some in each for piece in some]
+        vertices = step.curves.indentations[which], step.curves.deflections[which], own, k
+        sticks, slips = zip(
+            *(pieces_of(*each) for each in zip(*vertices, strict=True)), strict=True
+        )
+        stick = Stick(*np.transpose(sticks))
+        slip = Slips(*map(np.concatenate, zip(*slips, strict=True)))
+        owner = np.repeat(np.arange(n), [len(each.low) for each in slips])
+
+        # The columns y1 (with five cones only), y2, ..., y5 and z of each piece of slip.
+        m, names = len(owner), 6 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 5
+        lift = 2 * n + np.arange(names * m).reshape(names, m)
+        width, (_, y3, _, y5, z) = 2 * n + names * m, lift[-5:]
+        powers = power_cones(list(lift), width)
+
+        scale, shift = energies / unit, shifts[owner]
         around = self.A[which] @ step.now.forces
-        linear = [-N * (step.now.deflections[which] / parts + around) / unit]
-        linear += [
-            piece.objective(shifts[i]) * (energies[i] / unit)
-            for i, piece in zip(owner, pieces, strict=True)
-        ]
-        names = range(1 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 2, LIFT)
-        lift = power_cones([np.array([name]) for name in names], LIFT, ones=np.zeros(1, dtype=int))
-        powers = lift.matrix.toarray()
-        cones: Any = sparse.block_diag([piece.rows(powers) for piece in pieces])
-        weights, forces = np.zeros((2, n, len(pieces), LIFT))
-        weights[owner, range(len(pieces)), 0] = 1.0
-        forces[owner, range(len(pieces))] = [piece.force_row for piece in pieces]
-        sums = np.vstack((weights.reshape(n, -1), forces.reshape(n, -1)))
+        linear = np.zeros(width)
+        linear[:n] = -N * (step.now.deflections[which] / parts + around) / unit
+        linear[n : 2 * n] = scale * (stick.own - shifts * stick.force)
+        linear[y3] = scale[owner] * slip.rate * (shift * slip.force - slip.own)
+        linear[y5] = scale[owner] * slip.rate**2 * (0.6 - shift / 2.0)
+        linear[z] = scale[owner] * slip.rate**2 * shift / 2.0
+        bent = np.zeros(width - n)
+        bent[:n] = np.where(stick.half > 0, scale * (stick.softness - shifts), 0.0)
         A = self.A[np.ix_(which, which)] + np.diag(wells)
-        quadratic = np.triu(A * N * (N[:, None] / unit))
-        rows = [[N[None] / N.sum(), None], [-np.eye(2 * n, n, -n), sums], [None, cones]]
-        constraints = sparse.csc_matrix(sparse.block_array(rows))
-        constraints.eliminate_zeros()  # `block_diag` keeps them
-        constant = np.zeros(1 + 2 * n + cones.shape[0])
-        constant[0], constant[1 : n + 1] = step.total / N.sum(), 1.0
+        quadratic = sparse.block_diag(
+            (np.triu(A * N * (N[:, None] / unit)), sparse.diags_array(bent))
+        )
+
+        # T_i = T_B + the part that sticks + sum of rate (high - y3);  the sum of all T_i.
+        rows = np.arange(n)
+        sums = sparse.lil_array((1 + n, width))
+        sums[0, :n] = N / N.sum()
+        sums[1 + rows, rows], sums[1 + rows, n + rows], sums[1 + owner, y3] = 1.0, -1.0, slip.rate
+        total = stick.force + np.bincount(owner, slip.rate * slip.high, n)
+
+        # half >= |part that sticks|,  (high - low) / 2 >= |y3 - (high + low) / 2|
+        bounded = np.concatenate((n + rows, y3))
+        bounds = sparse.lil_array((3 * (n + m), width))
+        bounds[3 * np.arange(n + m) + 1, bounded] = -1.0
+        limits = np.zeros((n + m, 3))
+        limits[:, 0] = np.concatenate((stick.half, (slip.high - slip.low) / 2.0))
+        limits[n:, 1] = -(slip.high + slip.low) / 2.0
         program = ConeProgram(
-            quadratic=sparse.csc_matrix(
-                sparse.block_diag((quadratic, sparse.csc_array((cones.shape[1],) * 2)))
+            quadratic=sparse.csc_matrix(quadratic),
+            linear=linear,
+            constraints=sparse.csc_matrix(sparse.vstack((sums, bounds, powers.matrix))),
+            constant=np.concatenate(
+                ([step.total / N.sum()], total, limits.ravel(), powers.constant)
             ),
-            linear=np.concatenate(linear),
-            constraints=constraints,
-            constant=constant,
-            equalities=1 + 2 * n,
+            equalities=1 + n,
         )
         return program, unit

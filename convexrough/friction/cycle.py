@@ -24,22 +24,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Piece, Point
-from convexrough.friction.levels import FrictionLevels, forces_at, height_at, rounded
+from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.levels import FrictionLevels, forces_at, rounded
+from convexrough.friction.loop import Loop, loop_through
 from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.path import Walk, points_of, pressed_for
+from convexrough.friction.path import points_of, pressed_for
 from convexrough.friction.state import (
     LevelSums,
     by_status,
     displacements_of,
-    states_of,
     stick_radii,
 )
+from convexrough.friction.walk import Closed
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -94,6 +95,7 @@ class Cycle(Table, Plottable):
         curve, not from general steps
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
+    heights          : (m,) [force] Q / f at the points of the path, without rounding
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
@@ -131,9 +133,11 @@ class Cycle(Table, Plottable):
     order: Order
     presses: int
     start: float = field(repr=False)
+    heights: tuple[Fraction, ...] = field(repr=False)
 
     @property
     def scene(self) -> Scene:
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
@@ -186,17 +190,10 @@ class Cycle(Table, Plottable):
         return partial, gross, lost, frozen(levels.to_scene(both.error) + uncertainty)
 
     @cached_property
-    def _walk(self) -> _Closed:
+    def _walk(self) -> Closed:
+        points = list(zip(map(Fraction, self.loads.tolist()), self.heights, strict=True))
         levels = self.contact.cached(FrictionLevels)
-        pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
-        points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
-        return _Closed.around(levels, MemoryCurve.pressed(self.start), points)
-
-    @property
-    def _ends(self) -> tuple[Fraction, Fraction]:
-        """The largest and the smallest T = Q / f."""
-        heights = [T for _, T in self._walk.points]
-        return max(heights), min(heights)
+        return Closed.around(levels, MemoryCurve.pressed(self.start), points)
 
     @property
     def force_amplitude(self) -> float:
@@ -243,44 +240,11 @@ class Cycle(Table, Plottable):
         asperities : indices of the asperities whose own loops are returned; default all
 
         Raises InputError if the load varies.
+
+        >>> cr.cycle(contact, maximum=0.25 * contact.load).loop(100, [0]).asperity_forces.shape
+        (101, 1)
         """
         return loops([self], points, asperities)[0]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Loop(Table):
-    """Points of a closed loop, from the largest shear force to the smallest and back.
-
-    asperities    : (k,) indices of the asperities whose own loops are given
-    forces        : (m,) [force] shear force
-    displacements : (m,) [length] relative tangential displacement of distant points of the two
-        bodies
-    asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] own deflection (the displacement that its own force
-        causes) plus drift of each asperity: docs/theory/paths.md
-
-    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
-    >>> len(loop.forces), loop.asperity_forces.shape
-    (101, (101, 61))
-    """
-
-    _shown = ("area",)
-    _along: ClassVar[Along] = {
-        ("point",): ("forces", "displacements"),
-        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
-        ("asperity",): ("asperities",),
-    }
-
-    asperities: Indices
-    forces: Array
-    displacements: Array
-    asperity_forces: Array
-    asperity_displacements: Array
-
-    @property
-    def area(self) -> float:
-        """[force length] area of the polygon through the points: a little less than the loss."""
-        return float(np.trapezoid(self.forces, self.displacements))
 
 
 def cycle(
@@ -290,7 +254,7 @@ def cycle(
     minimum: float | None = None,
     displacement: float | None = None,
 ) -> Cycle:
-    """The steady cycle between two shear forces at constant load.
+    """The steady cycle between two shear forces at constant load (docs/theory/losses.md).
 
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
@@ -369,6 +333,8 @@ def steady(
 ) -> Cycle:
     """The steady state of a closed path of load and shear force that is repeated.
 
+    docs/theory/paths.md, "Closed paths", derives it.
+
     loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
         segments between points are straight, and the last one returns to the first point. As in
         `shear`, Q counts as f P if they differ only by rounding
@@ -386,45 +352,6 @@ def steady(
     return _cycles(contact, MemoryCurve(), [points], [np.array(forces, dtype=np.float64)])[0]
 
 
-class _Closed(Walk):
-    """A closed path of m points, followed twice; the second cycle is the steady one."""
-
-    @classmethod
-    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> _Closed:
-        return cls(levels, start, [*points, *points, points[0]])
-
-    @property
-    def once(self) -> int:
-        """The number m of points of one cycle."""
-        return len(self.points) // 2
-
-    @property
-    def steady(self) -> list[MemoryCurve]:
-        """The memory curve at each point of the second cycle."""
-        return self.curves[self.once + 1 :]
-
-    @property
-    def cycles(self) -> tuple[list[Piece], list[Piece]]:
-        """The pieces of the loss up to the end of the first cycle, and in every later cycle."""
-        parts = self.pieces[: self.once + 1], self.pieces[self.once + 1 :]
-        first, later = ([piece for cost in part for piece in cost] for part in parts)
-        return first, later
-
-    @cached_property
-    def stuck(self) -> Point:
-        """The point (L*, T*) through which the memory curve always passes from cycle 2 on."""
-        plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
-        return (plus + minus) / 2, (plus - minus) / 2
-
-    @property
-    def least(self) -> Fraction:
-        return min(load for load, _ in self.points)
-
-    @cached_property
-    def needed(self) -> set[Fraction]:
-        return super().needed | {self.stuck[0], self.least}
-
-
 def _cycles(
     contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]], forces: Sequence[Array]
 ) -> list[Cycle]:
@@ -433,7 +360,7 @@ def _cycles(
     paths, forces : for each path the points (P, T) and the shear forces Q
     """
     levels = contact.cached(FrictionLevels)
-    closed = [_Closed.around(levels, start, points) for points in paths]
+    closed = [Closed.around(levels, start, points) for points in paths]
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
         levels.order(needed)  # a proof for the widest range of loads holds for the others
@@ -446,7 +373,7 @@ def _cycles(
     ]
 
 
-def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved: Ball) -> Cycle:
+def _cycle(contact: Contact, closed: Closed, forces: Array, spent: Ball, moved: Ball) -> Cycle:
     """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
     levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
     (first, loss), (first_error, error) = rounded(spent)
@@ -482,7 +409,7 @@ def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved:
         first, both = closed.general.losses[[closed.once, -1]]
         loss, defect = both - first, np.nan
         amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
-    found = Cycle(
+    return Cycle(
         contact=contact,
         loads=frozen(np.array([float(load) for load in loaded])),
         forces=forces_at(closed.points[: closed.once], forces.tolist(), contact.scene),
@@ -507,9 +434,8 @@ def _cycle(contact: Contact, closed: _Closed, forces: Array, spent: Ball, moved:
         order=order,
         presses=levels.presses,
         start=float(closed.start.load),
+        heights=heights,
     )
-    found.__dict__["_walk"] = closed
-    return found
 
 
 def loops(
@@ -535,29 +461,16 @@ def loops(
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
     chosen = indices("asperities", asperities, len(contact.scene))
     widest = max(each.force_amplitude for each in cycles)
-    shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
-    return [_loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen) for each in cycles]
-
-
-def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop through the forces maximum - 2 way, as Q falls, and minimum + 2 way, as Q rises."""
-    contact = cycle.contact
-    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    top, bottom = cycle._ends
-    LOGGER.info(f"computing {len(way) + 1} levels of a loop")
-    drops = [*(min(2 * Fraction(each) / f, top - bottom) for each in way.tolist()), top - bottom]
-    heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]
-    points = [(levels.load, height) for height in (top, bottom, *heights)]
-    walk = Walk(levels, MemoryCurve.pressed(levels.load), points, steps=1)
-    if cycle.order == "fails" and levels.proved:
-        found, some = walk.states(), chosen
-    else:
-        found, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
-    loaded = contact.loads[chosen] > 0
-    mine = (found.forces.value, found.asperity_displacements.value)
-    return Loop(
-        chosen,
-        frozen(np.array([float(f * height) for height in heights])),
-        frozen(found.displacements.value[2:]),
-        *(frozen(np.where(loaded, each[2:, some], 0.0)) for each in mine),
-    )
+    way = (widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:]).tolist()
+    levels = contact.cached(FrictionLevels)
+    return [
+        loop_through(
+            levels,
+            max(each.heights),
+            min(each.heights),
+            [w for w in way if w < each.force_amplitude],
+            chosen,
+            by_steps=each.order == "fails" and levels.proved,
+        )
+        for each in cycles
+    ]

@@ -90,6 +90,10 @@ class Fretting(Table, Plottable):
 def fretting(cycle: Cycle) -> Fretting:
     """The fretting of each asperity in a steady cycle, which `cycle` or `steady` returns.
 
+    The formulas are those of Johnson, Contact Mechanics (1985), sections 4.2 and 7.2.
+
+    Raises InputError if `cycle` is no `Cycle`.
+
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True

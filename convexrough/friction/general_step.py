@@ -63,7 +63,7 @@ COUNTS = (4, 8, 16, 32, 64)
 #: the loss plus NEGLIGIBLE times the largest loss.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
-#: A point on each of n curves: index of the next vertex, level and height, (n,) each.
+#: A point on each of n curves: index of the next vertex, indentation and deflection, (n,) each.
 Front: TypeAlias = tuple[Indices, Array, Array]
 
 
@@ -72,25 +72,25 @@ class OwnCurves:
     """The memory curves of n asperities: polygonal lines of m vertices; the last may be repeated.
 
     coefficients : (n,) k of Hertz's law
-    levels, heights : (n, m) indentations and deflections at the vertices
+    indentations, deflections : (n, m) at the vertices
     """
 
     coefficients: Array
-    levels: Array
-    heights: Array
+    indentations: Array
+    deflections: Array
 
     @classmethod
     def pressed(cls, indentations: Array, coefficients: Array) -> OwnCurves:
         """The curves of asperities without shear."""
-        levels = np.column_stack((np.zeros(len(indentations)), indentations))
-        return cls(coefficients, levels, np.zeros(levels.shape))
+        ends = np.column_stack((np.zeros(len(indentations)), indentations))
+        return cls(coefficients, ends, np.zeros(ends.shape))
 
     @cached_property
     def layers(self) -> tuple[Array, Array, Array]:
         """(n, m) loads and shear forces at the vertices; (n, m - 1) slopes of the layers."""
-        run, added = np.diff(self.levels), np.diff(self.heights)
+        run, added = np.diff(self.indentations), np.diff(self.deflections)
         slopes = np.divide(added, run, out=np.zeros(run.shape), where=run > 0)
-        loads = hertz.load(self.levels, self.coefficients[:, None])
+        loads = hertz.load(self.indentations, self.coefficients[:, None])
         forces = np.cumsum(slopes * np.diff(loads), axis=1)
         return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
 
@@ -104,21 +104,21 @@ class OwnCurves:
 
         The curves must be cut at `indentations`.
         """
-        base, moved = self.levels[:, -1], deflections - self.heights[:, -1]
+        base, moved = self.indentations[:, -1], deflections - self.deflections[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
         front = self._front(sign, np.where(sign == 0, base, indentations - sign * deflections))
-        (after, level, _), k = front, self.coefficients
+        (after, depth, _), k = front, self.coefficients
         loads, forces, slopes = (each[np.arange(len(k)), after - 1] for each in self.layers)
-        low, high = hertz.load(level, k), hertz.load(indentations, k)
+        low, high = hertz.load(depth, k), hertz.load(indentations, k)
         grown = np.where(sticks, indentations - base, 1.0)
         slope = np.where(sticks, moved / grown, sign)
-        stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(level / k**3))
+        stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(depth / k**3))
         return OwnStep(
             self,
             front,
             (indentations, deflections),
-            fronts=np.where(sign != 0, level, indentations),
+            fronts=np.where(sign != 0, depth, indentations),
             forces=forces + slopes * (low - loads) + slope * (high - low),
             stiffness=np.where(np.abs(deflections) < indentations, stiffness, 0.0),
         )
@@ -126,13 +126,13 @@ class OwnCurves:
     def energies(self) -> Array:
         """(n,) elastic energy of the own deflections, divided by c_t f^2."""
         loads, forces, slope = self.layers
-        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.levels)
-        power = np.diff(loads * self.levels)
+        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.indentations)
+        power = np.diff(loads * self.indentations)
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
     def _front(self, sign: Array, wanted: Array) -> Front:
-        """The point on each curve at which  level - sign * height  reaches `wanted` (n,)."""
-        keys, rows = self.levels - sign[:, None] * self.heights, np.arange(len(sign))
+        """The point on each curve where  indentation - sign * deflection  reaches `wanted` (n,)."""
+        keys, rows = self.indentations - sign[:, None] * self.deflections, np.arange(len(sign))
         below = (keys < wanted[:, None]).sum(axis=1)
         after = np.clip(below, 1, keys.shape[1] - 1)
         here, there = (rows, after - 1), (rows, after)
@@ -140,20 +140,23 @@ class OwnCurves:
         part = np.where(below > after, 1.0, 0.0)
         np.divide(wanted - keys[here], width, out=part, where=width > 0)
         part = np.clip(part, 0.0, 1.0)
-        level, height = (
-            each[here] + part * (each[there] - each[here]) for each in (self.levels, self.heights)
+        at_front = (
+            each[here] + part * (each[there] - each[here])
+            for each in (self.indentations, self.deflections)
         )
-        return after, level, height
+        return (after, *at_front)
 
     def ended(self, front: Front, end: tuple[Array, Array]) -> OwnCurves:
-        """The curves up to their fronts, then a line to `end`: levels and heights."""
+        """The curves up to their fronts, then a line to `end`: indentations and deflections."""
         after, *at_front = front
         columns, after = np.arange(int(after.max()) + 2), after[:, None]
-        kept = np.minimum(columns, self.levels.shape[1] - 1)
+        kept = np.minimum(columns, self.indentations.shape[1] - 1)
         unchanged, at = columns < after, columns == after
         whole = (
             np.where(unchanged, old[:, kept], np.where(at, here[:, None], last[:, None]))
-            for old, here, last in zip((self.levels, self.heights), at_front, end, strict=True)
+            for old, here, last in zip(
+                (self.indentations, self.deflections), at_front, end, strict=True
+            )
         )
         return OwnCurves(self.coefficients, *whole)
 
@@ -207,7 +210,7 @@ class Bundle(NamedTuple):
     @property
     def deflections(self) -> Array:
         """(n,) the own deflection of each asperity, divided by c_t f."""
-        return self.curves.heights[:, -1]
+        return self.curves.deflections[:, -1]
 
 
 class Step(NamedTuple):

@@ -27,14 +27,17 @@ from convexrough.normal.levels import NUMBERS
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 
-#: Two loads of a path [force].
-Loads: TypeAlias = tuple[Fraction, Fraction]
+#: The load P and the level L of the front at one moment of a path [force].
+Moment: TypeAlias = tuple[Fraction, Fraction]
+
+#: The values of a load [force] at the beginning and the end of a part of a path.
+Ends: TypeAlias = tuple[Fraction, Fraction]
 
 T = TypeVar("T")
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) the parts of B_i by partial slip, and the parts by sliding, for k pairs P, L."""
+    """(k, n) the parts of B_i by partial slip, and the parts by sliding, for k moments."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -72,12 +75,12 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 
 def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) integrals of -dB/dL over pieces at constant load, which are differences of B."""
-    pairs = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
-    place, found = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}, list[Ball]()
+    moments = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
+    place, found = {each: k for k, each in enumerate(dict.fromkeys(moments))}, list[Ball]()
     for some in _some([*place], 1 + len(levels.candidates)):
-        slip, slide = _of_pairs(levels, some)
+        slip, slide = _at_moments(levels, some)
         found.append((slip + slide).sum())
-    lost = joined([*found, Ball.exact(np.zeros(0))])[[place[pair] for pair in pairs]]
+    lost = joined([*found, Ball.exact(np.zeros(0))])[[place[each] for each in moments]]
     return lost[1::2] - lost[0::2]
 
 
@@ -87,11 +90,11 @@ def _some(values: Sequence[T], size: int) -> Iterator[Sequence[T]]:
     return (values[start : start + step] for start in range(0, len(values), step))
 
 
-def _of_pairs(levels: FrictionLevels, pairs: Sequence[Loads]) -> tuple[Ball, Ball]:
-    """`asperity_losses` for k pairs of loads P and L."""
-    loads = sorted({load for pair in pairs for load in pair})
+def _at_moments(levels: FrictionLevels, moments: Sequence[Moment]) -> tuple[Ball, Ball]:
+    """`asperity_losses` at k moments."""
+    loads = sorted({load for each in moments for load in each})
     rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
-    high, low = (np.array([place[pair[end]] for pair in pairs]) for end in (0, 1))
+    high, low = (np.array([place[each[end]] for each in moments]) for end in (0, 1))
     return asperity_losses(rows.at(high), rows.at(low))
 
 
@@ -156,7 +159,7 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     the proved bounds on these errors are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
-    parts = list[tuple[Fraction, Loads, Loads]]()  # weight, P at both ends, fronts at both ends
+    parts = list[tuple[Fraction, Ends, Ends]]()  # weight; P and front at both ends of a cell
     for piece in pieces:
         part = 0.0 if piece.load_constant else float((piece.top - piece.bottom) / run)
         cut = max(1, round(cells * part))
@@ -167,13 +170,13 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
         )
         weight = 1 - piece.sign * piece.slope
         parts += [(weight, *both) for both in zip(pairwise(loads), pairwise(fronts), strict=True)]
-    levels.prepare(load for _, *both in parts for pair in both for load in pair)
+    levels.prepare(load for _, *both in parts for ends in both for load in ends)
     totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
     for some in _some(parts, 4 + 4 * len(levels.candidates)):
-        pairs = [(P, min(L, P)) for _, loads, fronts in some for P in loads for L in fronts]
+        moments = [(P, min(L, P)) for _, loads, fronts in some for P in loads for L in fronts]
         weights = exactly([weight for weight, _, _ in some])
         same = np.array([P == R for _, (P, R), _ in some])[:, None]
-        for k, values in enumerate(_of_pairs(levels, pairs)):
+        for k, values in enumerate(_at_moments(levels, moments)):
             one, other = values[1::4] - values[0::4], values[3::4] - values[2::4]
             lost = weights[:, None] * where(same, one, _hull(one, other))
             totals[k] = totals[k] + of_rows(np.transpose, lost).sum()

@@ -50,6 +50,8 @@ class Onset(NamedTuple):
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
+    It is f (P - the load of the first touch): docs/theory/states.md, "First loading".
+
     In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
     (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. The
     result is also nan if `prove_order` gives "fails" between the load of the asperity's first touch

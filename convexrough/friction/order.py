@@ -1,58 +1,9 @@
-r"""Proof of order: no indentation falls as the load rises, which theorems on friction require.
+"""Proof of order: no indentation falls as the load rises, which theorems on friction require.
 
-Why friction needs it, and a simpler theorem: docs/theory/states.md, "Order".
-
-A *level* is the normal solution at one total load L: the approach D0, loads P_i, and indentations
-n_i, which are minus the gap where asperity i is open. Let A be the compliance matrix, d the
-offsets, and C the diagonal matrix of c_i = dP_i / dn_i, which is 0 where i is open. By the contact
-law n + A P = D0 + d, the *rates* y = dn / dD0 solve (I + A C) y = 1. There is order from the load
-L1 down to L0 if the following holds at all loads between them: y_i >= 0 for each asperity i that
-may touch at the highest load of the load path, and all other asperities are open. By (a) and (b),
-the level at L1 and the approach D0(L0) can suffice to prove order. Symbols of the proof:
-- The *support* is the set of asperities that are not proved open at L1.
-- C~ >= C(L1) is diagonal, 0 off the support; I + A C' is regular for all diagonal 0 <= C' <= C~.
-- delta is diagonal, 0 <= delta <= C~. From here on C is any diagonal matrix, C~ - delta <= C <= C~,
-  and y solves (I + A C) y = 1 with this C.
-- v_k are the *weights* for asperity i: any numbers on the support, except v_i = 0. w_k = v_k C~_k.
-- t_k = v_k + sum_j w_j A_jk,                                                                   (1)
-  r_k = |A_ik - t_k| if k != i, and r_i = max(-t_i, 0). In (2), r_k = max(A_ik - t_k, 0) is enough.
-
-Bounds. If 0 <= y_k <= m_k <= 1 for all k on the support, then
-
-    y_i >= 1 - sum_k (w_k + max(-v_k, 0) delta_k m_k + r_k C~_k),                               (2)
-    y_i (1 - t_i C_i) <= 1 - sum_k (w_k - max(v_k, 0) delta_k m_k - r_k C~_k).                  (3)
-
-1. Let z = C y. Then y + A z = 1, so sum_k t_k z_k = sum_k w_k - sum_k v_k (C~_k - C_k) y_k.
-2. Row i of y + A z = 1 is 1 - y_i = (A z)_i. As A_ii = 0, sum_k t_k z_k differs from it by t_i z_i
-   and a number of size at most sum_k r_k z_k over k != i.
-3. (2) and (3) follow from 0 <= z_k <= C~_k and 0 <= (C~_k - C_k) y_k <= delta_k m_k.
-
-(a) Start from m = 1 and decrease m by (3). Suppose that for all i on the support the right side of
-(2), with 2 r in place of r, is positive, and
-|1 - sum_k w_k| <= 2 (1 - max(t_i, 0) C~_i - sum_k r_k C~_k). Then all rates on the support are > 0.
-
-1. If |y| <= Y, (2) and (3) hold for C = C~ and delta = 0, with Y r in place of r.
-2. So by the last condition Y = 2 is such a bound at C~, and by (2) the rates are positive there.
-3. Let C = C~ - x D with 0 <= D <= delta, and let x rise from 0 to 1. As long as no rate is
-   negative, y = 1 - A C y <= 1, so y <= m by (3), and y exceeds a positive constant by (2).
-4. The rates are continuous in x, so none of them becomes 0.
-5. If delta = C~, the last condition is not needed: replace C by x C, from x = 0 with y = 1.
-
-(b) Let F = D0(L1) - D0(L0) and delta_k >= C~_k - c_k(n_k(L1) - m_k F), with c_k as a function of
-n_k. Outside the support let y_i >= -u_i by (2), and let the gap at L1 exceed u_i F. Then y > 0 on
-the support down to L0, and all other asperities stay open.
-
-1. By the implicit function theorem the solution continues downwards, with dn / dD0 = y.
-2. Until D0 has fallen by F, n_k falls by less than m_k F, so C~ - delta <= C <= C~ and (a) holds.
-3. No gap closes, as the bounds on y_i show.
-4. The load falls strictly with D0, and loads stay in the box in which the certificate of L1 proves
-   that there is one solution. So the continued solution is the level of each load.
-5. If L0 = 0, this holds down to every L > 0.
-
-Asperities that are open at L1 but touch at the highest load need u_i <= 0. Let X be the inverse of
-I + C~ A. Weights with t_k = A_ik for k != i are v = (row i of A X) - s (row i of X), with the
-number s that makes v_i = 0. If too many asperities touch for an inverse, `friction.sweeping` finds
-weights of near neighbours.
+docs/theory/states.md, "The proof of order", states and proves the theorem and defines its symbols;
+(3), (4), the theorem and the corollary in this module are those of that section. C~ and delta are
+diagonal matrices. Weights come from an inverse or, if too many asperities touch for that, from
+`friction.sweeping`.
 """
 
 from __future__ import annotations
@@ -96,7 +47,7 @@ BETWEEN, FEW_BETWEEN = 7, 1
 #: Largest number of asperities of which rates are bounded by an inverse.
 MOST_BOUNDED = 4 * INVERTED
 
-#: Number of times that (3) decreases m. A heuristic.
+#: Number of times that (4) decreases m. A heuristic.
 IMPROVEMENTS = 4
 
 
@@ -141,7 +92,7 @@ def order_between(
 
 
 def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """True if the upper level proves order down to the lower level, by (a) and (b) above.
+    """True if the upper level proves order down to the lower level, by the corollary.
 
     rising : (n,) true for asperities that may touch at the highest load of the path
     most   : as in `order_between`
@@ -176,7 +127,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` for m pairs of levels, if each upper level has the path's top load."""
+    """(m,) `proved_between` for the levels in each row; `high` must have the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
     entry_error = np.empty((len(span.c), 1))
     for some, problem in rows.coupled:
@@ -199,7 +150,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
 
 
 class _Span(NamedTuple):
-    """The quantities of the proof for m pairs of levels, as arrays (m, n) or (m, 1).
+    """The quantities of the proof between the levels in m rows, as arrays (m, n) or (m, 1).
 
     support : true on the support
     c       : diagonal of C~
@@ -243,19 +194,19 @@ class _Span(NamedTuple):
 
     @property
     def spare(self) -> Array:
-        """(m, n) largest u of (b): open asperities with rates above -u stay open."""
+        """(m, n) largest u of the corollary: open asperities with rates above -u stay open."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.nan_to_num(self.gaps / self.drop, posinf=np.inf) * (1 - SAFETY))
 
     def _delta(self, m: Array) -> Array:
-        """(m, s) the smallest delta of (b), for bounds m on the rates."""
+        """(m, s) the smallest delta of the corollary, for bounds m on the rates."""
         fallen = np.maximum(self.depth - m * self.drop * (1 + SAFETY), 0.0)
         slopes = 1.5 * np.sqrt(fallen) / self.steep
         return np.asarray(np.clip(self.c - slopes * (1 - SAFETY) + SAFETY * self.c, 0.0, self.c))
 
     @np.errstate(all="ignore")
     def rates(self, entries: Array, entry_error: Array) -> Array:
-        """(m, r) lower bounds (2) on rates, with weights by an inverse; -inf where (a) fails.
+        """(m, r) lower bounds (3) on rates, with the best weights; -inf where the theorem fails.
 
         The arrays of this object must be for s asperities that include the support.
 
@@ -269,7 +220,7 @@ class _Span(NamedTuple):
         v = entries @ X
         v[:, s] -= (v[:, s, s] / X[:, s, s])[:, :, None] * X
         v[:, s, s] = 0.0
-        left = v @ matrix  # t of (1)
+        left = v @ matrix  # t_k, then t_k - A_ik
         own = np.maximum(left[:, s, s], 0.0) * self.c
         left -= entries
         left[:, s, s] = np.minimum(left[:, s, s], 0.0)

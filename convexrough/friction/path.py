@@ -1,17 +1,7 @@
 """`load_path` computes friction states along a path of load P and shear force Q.
 
-`history` does so at constant P. With the coefficient of friction f, the points of a path are the
-pairs P, T = Q / f. The memory curve stores the friction state (docs/theory/paths.md). It is a
-polygonal line. Its height at a load s is the shear force, divided by f, that the layers of the
-contact up to s carry; the layer at s is the contact force and area that are added as the load grows
-from s to s + ds. A level is a total load, or the normal solution at this load. Forces and
-displacements are sums over the vertices of the memory curve. The slip front is the level down to
-which slip has reached. The loss along a straight segment of the path is a sum over pieces; on each
-piece the front falls through one straight part of the memory curve (`curve.Piece`).
-
-Order holds if no indentation falls as the load rises. If order fails, the memory curve does not
-apply. Then `general_step` computes the states step by step (docs/theory/without-order.md), without
-proofs.
+`history` does so at constant P. With the coefficient of friction f, the points of a path are
+(P, T) with T = Q / f; `walk.Walk` follows them.
 """
 
 from __future__ import annotations
@@ -19,24 +9,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from itertools import accumulate
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Piece, Point
-from convexrough.friction.general_step import SteppedPath, Stepper, followed
+from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.general_step import Stepper
 from convexrough.friction.levels import FrictionLevels, forces_at, height_at, rounded
-from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import States, states_of, statuses_of
+from convexrough.friction.walk import Walk
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
@@ -47,98 +33,6 @@ if TYPE_CHECKING:
 
 #: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
-
-#: Largest number of vertices of the memory curves at all points of a path. One takes 300 bytes.
-MOST_VERTICES = 2 * 10**7
-
-
-@dataclass(frozen=True, eq=False)
-class Walk:
-    """A path that begins in the friction state `start` and leads through m points along straight
-    segments.
-
-    levels  : the normal solutions of the contact
-    start   : the memory curve of the friction state before the first segment
-    points  : the m points (P, T)
-    steps   : number of general steps per segment; with None, general steps are taken only if order
-        fails and the normal solution of the contact is proved
-    stepper : solver of the general steps
-    """
-
-    levels: FrictionLevels
-    start: MemoryCurve
-    points: Sequence[Point]
-    steps: int | None = None
-    stepper: type[Stepper] = Stepper
-
-    @cached_property
-    def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:
-        curve, segments, vertices = self.start, list[tuple[MemoryCurve, list[Piece]]](), 0
-        for k, (load, height) in enumerate(self.points, 1):
-            curve, pieces = curve.go(load, height)
-            segments.append((curve, pieces))
-            vertices += len(curve.levels)
-            if vertices > MOST_VERTICES:
-                found = f"{vertices:,} vertices of memory curves up to point {k:,}"
-                expected = f"at most {MOST_VERTICES:,}, so fewer reversals within reversals"
-                raise InputError("path", found=found, expected=expected)
-        return segments
-
-    @property
-    def curves(self) -> list[MemoryCurve]:
-        """The memory curve after each point."""
-        return [curve for curve, _ in self._segments]
-
-    @property
-    def pieces(self) -> list[list[Piece]]:
-        """The pieces of each segment; their losses add up to the loss of the segment."""
-        return [pieces for _, pieces in self._segments]
-
-    @cached_property
-    def needed(self) -> set[Fraction]:
-        """The loads of all levels that states, statuses and losses need."""
-        bent = {load for curve in self.curves for load, bend in curve.bends if bend}
-        fronts = {curve.front for curve in self.curves if curve.front is not None}
-        return bent | fronts | {x for each in self.pieces for piece in each for x in piece[2:]}
-
-    @cached_property
-    def order(self) -> Order:
-        """What is proved about order, from the lowest of the needed loads to the contact's load."""
-        return self.levels.order(self.needed)
-
-    @cached_property
-    def general(self) -> SteppedPath | None:
-        """Results of general steps, or None.
-
-        General steps are taken if the caller asks for them, or if order fails and the normal
-        solution of the contact is proved.
-        """
-        if self.steps is None and (self.order != "fails" or not self.levels.proved):
-            return None
-        return followed(self.levels, self.start, self.points, self.steps, self.stepper)
-
-    def states(self) -> States:
-        if self.general is not None:
-            return self.general.states
-        found = states_of(self.levels, self.curves)
-        return found.unproved() if self.order == "fails" else found
-
-    def status(self) -> NDArray[np.str_]:
-        """(m, N) the statuses at each point."""
-        if self.general is not None:
-            return self.general.status
-        each = [statuses_of(self.levels, curve, self.order) for curve in self.curves]
-        return frozen(np.array(each))
-
-    def losses(self) -> tuple[Array, Array]:
-        """(m,) [force length] energy lost since the start, and proved bounds on the errors."""
-        unknown = frozen(np.full(len(self.points), np.inf))
-        if self.general is not None:
-            return self.general.losses, unknown
-        each = losses(self.levels, self.pieces)
-        since_start = Ball.stacked([*accumulate(each[k] for k in range(len(each)))])
-        spent, errors = rounded(since_start * self.levels.loss_unit)
-        return spent, errors if self.order == "proved" else unknown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -207,6 +101,7 @@ class LoadPath(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
@@ -255,6 +150,8 @@ def load_path(
 ) -> LoadPath:
     """The friction states along a path of load and shear force with straight segments.
 
+    docs/theory/paths.md gives the rules.
+
     loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; the bodies
         separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
@@ -278,6 +175,8 @@ def load_path(
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     """The friction states along a sequence of shear forces at constant load P.
+
+    docs/theory/paths.md gives the rules.
 
     forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear. As in
         `shear`, Q counts as f P if they differ only by rounding

@@ -40,7 +40,7 @@ def elliptic_path(
     friction: float,
     chords: int = 96,
 ) -> tuple[Array, Array]:
-    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse.
+    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse (docs/theory/paths.md).
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
@@ -144,6 +144,8 @@ def phase_losses(
 ) -> PhaseLosses:
     """The energy losses of cycles along ellipses with several phases and amplitudes.
 
+    docs/theory/paths.md, "Lines and ellipses", explains what the losses depend on.
+
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
     phases  : (m,) [rad] from -pi to pi
     factors : (k,) factors by which both amplitudes are multiplied
@@ -170,9 +172,9 @@ def phase_losses(
         checks.phase(f"phases[{i}]", turn)
     alone = _smooth_alone(scene, load)
     rough, smooth = list[Cycle](), list[float]()
-    pairs = list(product(sizes.tolist(), turns.tolist()))
-    for k, (size, phase) in enumerate(pairs):
-        LOGGER.info(f"ellipse {k + 1} of {len(pairs)}")
+    ellipses = list(product(sizes.tolist(), turns.tolist()))
+    for k, (size, phase) in enumerate(ellipses):
+        LOGGER.info(f"ellipse {k + 1} of {len(ellipses)}")
         with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
             P, Q = elliptic_path(
                 load=load,
@@ -192,8 +194,8 @@ def phase_losses(
         load_amplitude=float(load_amplitude),
         force=float(force),
         force_amplitude=float(force_amplitude),
-        phases=frozen(np.array([phase for _, phase in pairs])),
-        factors=frozen(np.array([size for size, _ in pairs])),
+        phases=frozen(np.array([phase for _, phase in ellipses])),
+        factors=frozen(np.array([size for size, _ in ellipses])),
         losses=frozen(np.array([each.loss for each in rough])),
         loss_errors=frozen(np.array([each.loss_error for each in rough])),
         smooth=frozen(np.array(smooth)),

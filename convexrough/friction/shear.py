@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -19,8 +18,8 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
-from convexrough.friction.path import Walk
 from convexrough.friction.state import stick_radii
+from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -86,6 +85,7 @@ class ShearState(Table, Plottable):
         slip; the effect of other asperities is left out
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides or is open
+    height        : [force] Q / f, without rounding
 
     >>> state = cr.shear(contact, displacement=9.88e-6)
     >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
@@ -105,16 +105,12 @@ class ShearState(Table, Plottable):
     slips: Array
     stick_radii: Array
     certificate: ShearCertificate
+    height: Fraction = field(repr=False)
 
     @property
     def status(self) -> NDArray[np.str_]:
         """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
         return self.certificate.status
-
-    @cached_property
-    def _height(self) -> Fraction:
-        """T = Q / f. `shear` sets it exactly, as a prescribed displacement determines it."""
-        return self.contact.cached(FrictionLevels).height(self.force)
 
     @property
     def order(self) -> Order:
@@ -152,7 +148,13 @@ class ShearState(Table, Plottable):
     def change(self, direction: Direction) -> ShearChange:
         """First-order changes of forces, slips and displacement when the scene changes.
 
-        Raises InputError in gross sliding.
+        direction : changes of the scene, of the load or approach, and of the shear force
+
+        Raises InputError in gross sliding, or if `direction` changes both load and approach.
+
+        >>> state = cr.shear(contact, force=0.25 * contact.load)
+        >>> state.change(cr.Direction(friction=0.01)).displacement < 0
+        True
         """
         from convexrough.gradients.change import shear_change  # a higher layer
 
@@ -163,6 +165,8 @@ def shear(
     contact: Contact, *, force: float | None = None, displacement: float | None = None
 ) -> ShearState:
     """The friction state of a pressed contact after monotonic shear at constant load P.
+
+    It is the difference of two normal solutions, (1) of docs/theory/states.md.
 
     Prescribe one of the two:
 
@@ -228,7 +232,7 @@ def shear(
         force_error=float(total.error) + unknown if force is None else 0.0,
         displacement_error=float(moved.error) + unknown if displacement is None else unknown,
     )
-    state = ShearState(
+    return ShearState(
         contact=contact,
         force=float(total.value) if force is None else force,
         displacement=float(moved.value) if displacement is None else displacement,
@@ -237,9 +241,8 @@ def shear(
         slips=frozen(np.where(loaded, drifts.value, 0.0)),
         stick_radii=frozen(radii),
         certificate=certificate,
+        height=walk.points[0][1],
     )
-    state.__dict__["_height"] = walk.points[0][1]
-    return state
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:

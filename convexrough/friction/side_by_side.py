@@ -113,6 +113,8 @@ def compare_paths(
 ) -> PathComparison:
     """Comparison of the general step, the memory curve and the conic step on one path.
 
+    docs/theory/without-order.md describes the steps, docs/theory/paths.md the memory curve.
+
     loads, forces, start, influence : as in `load_path`
 
     Raises InputError for the same reasons as `load_path`, and SolverError if no method answers.

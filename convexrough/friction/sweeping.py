@@ -1,44 +1,22 @@
 r"""Proof of order for many asperities: charges at near neighbours bound the rates from below.
 
-The diagonal matrices C and C~, the support (the asperities with C~ > 0) and the rates
-y(C) = (I + A C)^-1 1 are those of `friction.order`. I + A C is regular for 0 <= C <= C~. For an
-asperity i, choose weights w_j >= 0 of some neighbours j != i on the support; the sum of the weights
-is 1. Let q_i be a number such that for all k != i on the support
+docs/theory/states.md, "The proof of order", derives (6), defines its symbols, and compares the
+weights w_k with charges on shells, onto which a unit charge at asperity i is swept. For weights
+that satisfy (6), 1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is
+positive for all i on the support. The shells have the radii R_k = scale C~_k with
+scale = 1 / (pi E*).
 
-    A_ik <= q_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
+The weights are those of least electrostatic energy, together with a charge -1 at i, for which some
+moments vanish. Let the complex number d_k be the vector from i to k, divided by the direction from
+the middle of the support to i. The moments are:
 
-If 1 - q_i is positive for all i on the support, it is a lower bound on the rate y_i(C): this is (2)
-of `friction.order` with v_j = q_i w_j / C~_j and delta = C~.
-
-(1) compares potentials. A unit charge at i is swept onto its neighbours, as charges w_j on shells
-of radius R_j = scale C~_j with scale = 1 / (pi E*). By (1), q_i times the potential of these
-charges is at least the potential of the unit charge, at all asperities k != i of the support.
-
-*Weights.* Of all weights with the sum 1 and certain moments equal to 0, those with the least
-electrostatic energy of the charges w_j and -1 at i are the solution of a small linear system;
-neighbours with a negative weight are left out, and the system is solved again. Let the complex
-number d_j be the vector from i to j, divided by the direction from the middle of the support to i.
-The moments are:
-
-- all around i: sum w_j d_j and sum w_j d_j^2;
-- at an edge: the imaginary part of sum w_j d_j, along the edge, and
-  sum w_j (|d_j|^2 - 3 Re(d_j)^2), the term of second order of the potential towards the middle;
-- at a corner: the imaginary part of sum w_j d_j.
+- all around i: sum w_k d_k and sum w_k d_k^2; then (7) of that page proves (6) for far asperities;
+- at an edge: the imaginary part of sum w_k d_k, along the edge, and
+  sum w_k (|d_k|^2 - 3 Re(d_k)^2), the term of second order of the potential towards the middle;
+- at a corner: the imaginary part of sum w_k d_k.
 
 For an asperity outside the contact one neighbour alone suffices, if the whole support is nearer to
 this neighbour than to i.
-
-*Far asperities.* Let k be at the distance r from i, farther than all j with w_j > 0. Let g_j be the
-angle between the directions from i to j and to k. With Legendre's polynomials P_l,
-1 / r_jk is the sum of |d_j|^l P_l(cos g_j) / r^(l + 1) over l >= 0. Here P_2(cos g) is
-(1 + 3 cos 2g) / 4, P_3(cos g) is (3 cos g + 5 cos 3g) / 8, and |P_l| <= 1. So
-
-    sum w_j / r_jk >= 1 / r + s / r^3,                                                           (2)
-    s = sum w |d|^2 / 4 - r |sum w d| - 3 |sum w d^2| / 4
-        - (3 |sum w |d|^2 d| + 5 |sum w d^3|) / (8 r) - sum w |d|^4 / (r (r - |d|)).
-
-If the moments all around i are 0, s is positive from some distance on. So (1) need be computed for
-near asperities only, and the proof takes time in proportion to the number of asperities.
 """
 
 from __future__ import annotations
@@ -76,8 +54,8 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 # All numbers here are heuristics.
 
-#: Numbers of neighbours and moments of the weights that are tried, until (1) is proved. A try also
-#: uses those asperities at which earlier weights violated (1) most. Tries with more than MORE
+#: Numbers of neighbours and moments of the weights that are tried, until (6) is proved. A try also
+#: uses those asperities at which earlier weights violated (6) most. Tries with more than MORE
 #: neighbours are made for at most FEW asperities.
 TRIES: tuple[tuple[int, Moments], ...] = (
     (12, around), (10, edge), (14, corner), (32, around), (32, edge),
@@ -88,7 +66,7 @@ MORE, FEW = 32, 300
 #: Number of neighbours of an asperity outside the contact of which one alone is tried.
 ALONE = 14
 
-#: Number of nearest asperities, per neighbour with a weight, for which (1) is computed where (2)
+#: Number of nearest asperities, per neighbour with a weight, for which (6) is computed where (7)
 #: proves it for all others.
 NEAR = 9
 
@@ -140,10 +118,10 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: NDArray[Any]) -> Arr
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """Sweeping of unit charges at asperities onto shells around neighbours, as in (1).
+    """Sweeping of unit charges at asperities onto shells around neighbours, as in (6).
 
     support : indices of the asperities on the support
-    shells  : (n,) radii R_j of the shells; 0 off the support
+    shells  : (n,) radii R_k of the shells; 0 off the support
     """
 
     influence: Influence
@@ -168,7 +146,7 @@ class _Swept:
 
     @cached_property
     def lost(self) -> float:
-        """Bound on the relative rounding error of (1)."""
+        """Bound on the relative rounding error of (6)."""
         moved = ROUNDOFF * self.extent / float(self.influence.separations().min())
         return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
@@ -270,8 +248,8 @@ class _Swept:
         return rates, worst
 
     def gains(self, which: Indices, near: Indices, weights: Array, last: Indices) -> Array:
-        """(m,) g > 0 for which, by (2), q_i = 1 / (1 + g) satisfies (1) for all k at least as far
-        from i as the asperity `last`; 0 where (2) does not prove this.
+        """(m,) g > 0 for which, by (7), q_i = 1 / (1 + g) satisfies (6) for all k at least as far
+        from i as the asperity `last`; 0 where (7) does not prove this.
         """
         d = self.places[near] - self.places[which][:, None]
         apart = np.where(weights > 0, np.abs(d), 0.0)
@@ -295,7 +273,7 @@ class _Swept:
         return np.asarray(swept * np.abs(self.places[seen] - self.places[which][:, None]))
 
     def _everywhere(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
-        """(m,) the least q_i of (1) for the whole support, and the k that determine it."""
+        """(m,) the least q_i of (6) for the whole support, and the k that determine it."""
         from scipy.sparse import csr_array
 
         rows = np.arange(len(which))

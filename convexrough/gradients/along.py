@@ -26,6 +26,7 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, height_at
+from convexrough.friction.walk import Walk
 from convexrough.gradients.parts import ZERO, Moves, Part
 
 #: The shift of P_k or T_k, and the distance below which levels of the two paths correspond, both
@@ -115,14 +116,19 @@ class Along:
         return cls(known, start, steps, [load for load, _ in pairs], heights)
 
     @cached_property
+    def walk(self) -> Walk:
+        points = [(self.loads[k], self.heights[k]) for k, _, _ in self.steps]
+        return Walk(self.known, MemoryCurve.pressed(self.start), points)
+
+    @cached_property
     def sums(self) -> tuple[Sums, Sums]:
         """Weights in (sum of losses) / (c_t f^2), and in (sum of displacements) / (c_t f).
 
         c_t is the ratio of tangential to normal compliance.
         """
-        curve, lost, moved = MemoryCurve.pressed(self.start), Sums(), Sums()
-        for point, loss, displacement in self.steps:
-            curve, pieces = curve.go(self.loads[point], self.heights[point])
+        lost, moved = Sums(), Sums()
+        for step, curve, pieces in zip(self.steps, self.walk.curves, self.walk.pieces, strict=True):
+            _, loss, displacement = step
             if loss:
                 for piece in pieces:
                     lost.add_loss(piece, loss)
@@ -153,10 +159,9 @@ class Along:
 
         The vertices are those of all memory curves along the path.
         """
-        curve, vertices = MemoryCurve.pressed(self.start), set[tuple[Fraction, Fraction]]()
-        for point, _, _ in self.steps:
-            curve = curve.go(self.loads[point], self.heights[point])[0]
-            vertices.update(zip(curve.levels, curve.heights, strict=True))
+        vertices = {
+            vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
+        }
         least = ROUNDED * max(self.loads)
         along = ({P + turn * T for P, T in vertices} for turn in (-1, 0, 1))
         return any(b - a < least for each in along for a, b in pairwise(sorted(each)))

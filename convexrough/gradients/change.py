@@ -183,11 +183,11 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     """
     contact, known = state.contact, with_friction(state)
     checks.instance("direction", direction, Direction)
-    if abs(state._height) == known.load:
+    if abs(state.height) == known.load:
         expected = "a force below f P, where the derivative is finite"
         raise InputError("force", found=f"{state.force}: gross sliding", expected=expected)
     sign = -1.0 if state.force < 0 else 1.0
-    top, low = known.top, level_below(known, "force", state._height, "load")
+    top, low = known.top, level_below(known, "force", state.height, "load")
     bent, f, unit = _Bent.of(top, direction), known.coefficient, known.units.force
     first, total, above = _pressed(contact, direction, bent)
     by_friction = Ball.exact(direction.friction) / f

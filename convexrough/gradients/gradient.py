@@ -184,6 +184,8 @@ class Number:
 class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
+    docs/theory/gradients.md derives them.
+
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
     derivative is at constant values of the other parameters named here. So shear forces Q are
     constant, but neither their fractions Q / (f P) nor the displacements are. If instead the
@@ -297,10 +299,12 @@ class Gradient(Table, Plottable):
 
     @cached_property
     def positions(self) -> Array:
+        """(n, 2) derivatives by x and y, with zeros as in `heights`."""
         return self.shown.in_scene(self.shown.positions.value)
 
     @cached_property
     def position_errors(self) -> Array:
+        """(n, 2) proved bounds on the errors of `positions`."""
         return self.shown.in_scene(self.shown.positions.error)
 
     @cached_property

@@ -122,7 +122,14 @@ class Objective(Record):
         return gradient.value, np.concatenate(slopes)
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
-        """The `Gradient` of the result at parameters (m,), with derivatives by all parameters."""
+        """The `Gradient` of the result at parameters (m,), with derivatives by all parameters.
+
+        Raises InputError as the call does.
+
+        >>> force = cr.Objective(scene=scene, of="load", by=["approach"], approach=5e-5)
+        >>> f"{force.gradient([4e-5]).approach:.4g}"
+        '0.01089'
+        """
         own = [np.asarray(self._own(name)) for name in self.by]
         ends = np.cumsum([each.size for each in own])
         vector = checks.array("parameters", parameters)

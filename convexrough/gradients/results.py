@@ -122,7 +122,7 @@ def state_gradient(
     holding = control_held(contact, holding)
     X, on_forces, on_slips = _checked(contact, weights)
     sign = -1.0 if state.force < 0 else 1.0
-    top, low = known.top, level_below(known, "force", state._height, holding)
+    top, low = known.top, level_below(known, "force", state.height, holding)
     which, travel = top.problem.candidates, known.travel_unit
     weight = travel * (sign * X)
     # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
@@ -142,6 +142,8 @@ def state_gradient(
 
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
     """Derivatives of the shear force at which one asperity starts to slide on first loading.
+
+    docs/theory/gradients.md, "Weights on single asperities", derives them.
 
     asperity : index of the asperity in the scene
     holding  : quantity kept constant, as in `Contact.gradient`
@@ -220,8 +222,8 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         along = Along.of(known, Fraction(0), first + again, cycle.loads, cycle.forces)
         return _gradient(contact, along, holding, paths=True, order=cycle.order)
-    highest, lowest = cycle._ends
-    top, low = known.top, level_below(known, "maximum", (highest - lowest) / 2, holding)
+    amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
+    top, low = known.top, level_below(known, "maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
     weight = known.loss_unit * 8.0
     along_T = weight * T * -0.5

@@ -28,10 +28,10 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along
 
-#: Largest number of loaded asperities for which sums over pairs are computed with balls.
-PAIRWISE = 1000
+#: Largest number of loaded asperities for which sums over asperities are computed with balls.
+IN_BALLS = 1000
 
-#: Number of pairs whose balls are computed together.
+#: Number of terms whose balls are computed together.
 BLOCK = 2**16
 
 
@@ -126,11 +126,11 @@ class Geometry:
 
         scale is 1 / (pi E*), in scaled units.
 
-        loads : vectors P, (m,) each, of the asperities `which`. For more than PAIRWISE asperities
+        loads : vectors P, (m,) each, of the asperities `which`. For more than IN_BALLS asperities
             the sums are computed in float64, and error bounds are infinite if no matrix is stored
         """
-        if len(which) <= PAIRWISE:
-            return self._pair_by_pair(loads, which)
+        if len(which) <= IN_BALLS:
+            return self._in_balls(loads, which)
         influence = self.problem.influence.restricted(which)
         return [self._at_once(each, influence) for each in loads]
 
@@ -142,7 +142,7 @@ class Geometry:
         size = influence.falloff(np.abs(loads.value) * off + loads.error, 2) * influence.scale
         return Ball.around(found, (size * (1 + SAFETY))[:, None])
 
-    def _pair_by_pair(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
+    def _in_balls(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
         points, scale, n = self.contact_points[which], self.problem.exact.scale, len(which)
         found: list[list[Ball]] = [[] for _ in loads]
         rows = max(1, BLOCK // max(1, n))

@@ -58,7 +58,7 @@ class Shakedown(Table, Plottable):
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
 
     >>> Q = 0.1 * contact.load
-    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> limit = cr.shakedown(scene, load=contact.load, force_amplitudes=[Q, -Q])
     >>> limit.lower <= limit.factor <= limit.upper
     True
     """
@@ -123,8 +123,8 @@ class Shakedown(Table, Plottable):
 def shakedown(
     scene: Scene,
     *,
-    loads: float,
-    forces: ArrayLike = 0.0,
+    load: float,
+    force: ArrayLike = 0.0,
     load_amplitudes: ArrayLike = 0.0,
     force_amplitudes: ArrayLike,
     kind: Theory = "exact",
@@ -133,9 +133,10 @@ def shakedown(
     """The largest factor by which a closed path may be scaled so that sliding dies out.
 
     Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
-    The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
+    docs/theory/shakedown.md derives the limits.
+    The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
 
-    loads, forces : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
+    load, force : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
     load_amplitudes : [force] (m,) or one number for all points; must be 0 unless `kind` is "exact"
     force_amplitudes : (m,) [force]; (m, 2) for "vector"
     kind      : "exact", "elastic" or "vector", as in `Shakedown`
@@ -148,26 +149,26 @@ def shakedown(
     0.3517 f P. Here f = 0.5, so Q is 0.1 f P, and the largest amplitude is factor / 10 times f P.
 
     >>> Q = 0.05 * contact.load
-    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> limit = cr.shakedown(scene, load=contact.load, force_amplitudes=[Q, -Q])
     >>> f"{limit.factor / 10:.4f}"
     '0.3517'
     """
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
-    P0 = checks.positive("loads", loads)
+    P0 = checks.positive("load", load)
     if kind not in ("exact", "elastic", "vector"):
         raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
     if kind == "vector":
-        Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
+        Q0, q = _vectors("force", force, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
     else:
-        Q0 = checks.finite("forces", cast("float", forces))
+        Q0 = checks.finite("force", cast("float", force))
         q = checks.array("force_amplitudes", np.atleast_1d(np.asanyarray(force_amplitudes)))
     p = _alike("load_amplitudes", load_amplitudes, len(q))
     t0, t = Q0 / f, q / f
     if kind != "vector":  # exactly, as the factor can depend on small differences
         t0, t, p = Fraction(Q0) / Fraction(f), _fractions(q) / Fraction(f), _fractions(p)
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
-        raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
+        raise InputError("force", found=force, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
         expected = "a path that moves: at least two points, such as [Q, -Q]"
         given = "one point" if len(q) else "none"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from convexrough import checks, fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.friction.cycle import Loop
+from convexrough.friction.loop import Loop
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.paper.states import AMPLITUDES, SHARE, PaperStates

@@ -102,7 +102,14 @@ class FrictionConic:
     name: str = field(default="conic", init=False)
 
     def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
-        """The state under a total (2,), |T| < sum P, in scaled units."""
+        """The state under a total (2,), |T| < sum P, in scaled units.
+
+        Raises SolverError if the program is not convex or the result exceeds `accepted`.
+
+        >>> problem = contact.cached(FrictionProblem)
+        >>> cr.FrictionConic().solve(problem, np.array([0.1, 0.0])).increments.shape
+        (37, 2)
+        """
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
         data, solver = program.apply(), f"friction ({self.name})"

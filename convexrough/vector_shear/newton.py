@@ -44,7 +44,14 @@ class FrictionNewton:
     name: str = field(default="newton", init=False)
 
     def solve(self, problem: FrictionProblem, total: Array) -> VectorState:
-        """The state under a total (2,), |T| < sum P, in scaled units."""
+        """The state under a total (2,), |T| < sum P, in scaled units.
+
+        Raises SolverError if the method does not converge.
+
+        >>> problem = contact.cached(FrictionProblem)
+        >>> cr.FrictionNewton().solve(problem, np.array([0.1, 0.0])).increments.shape
+        (37, 2)
+        """
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
         height = Fraction(size) * Fraction(problem.units.force)
@@ -92,11 +99,11 @@ class _Friction:
         coupling = problem.couple(q)
         roots = _roots(problem, shifted)
         slopes = roots @ np.swapaxes(roots, 1, 2)
-        level = shifted + coupling  # X, at every asperity
-        middle = level.mean(axis=0)
-        pull = np.einsum("nij,nj->i", slopes, level - middle)
+        moved = shifted + coupling  # X, at every asperity
+        middle = moved.mean(axis=0)
+        pull = np.einsum("nij,nj->i", slopes, moved - middle)
         displacement = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
-        defect = level - displacement
+        defect = moved - displacement
         residual = float(np.hypot(*defect.T).max())
         energy = problem.energy(q, coupling)
         scale, at = float(np.hypot(*displacement)), _At(coupling, roots, displacement)

@@ -97,7 +97,9 @@ def shear_vector(
 ) -> VectorShearState:
     """The friction state with the full tangential kernel: Q grew from 0 at constant normal load.
 
-    force  : [force] the pair (Qx, Qy), or a number along x
+    docs/theory/vector-friction.md derives the equations and the bounds.
+
+    force  : [force] (2,) Qx and Qy, or a number along x
     solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
 
     Raises InputError if the scene has no friction or |Q| exceeds f P; SolverError if the solver
@@ -175,11 +177,11 @@ def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> V
 def _vector(force: ArrayLike) -> Array:
     if np.ndim(force) == 0:
         return np.array([checks.array("force", force, length=1)[0], 0.0])
-    pair = checks.array("force", force)
-    if pair.shape != (2,):
+    given = checks.array("force", force)
+    if given.shape != (2,):
         expected = "a number, along x, or a pair (Qx, Qy)"
-        raise InputError("force", found=f"{pair.size} numbers", expected=expected)
-    return pair.copy()
+        raise InputError("force", found=f"{given.size} numbers", expected=expected)
+    return given.copy()
 
 
 def _gross(problem: FrictionProblem, total: Array) -> VectorState:
@@ -264,8 +266,8 @@ def _certificate(
 
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
     n = len(contact.scene)
-    zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
+    zero, none, nothing = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
     certificate = shear(contact, force=0.0).certificate
     return VectorShearState(
-        contact, none, none, pairs, pairs, zero, 0.0, 0.0, 0.0, certificate, solver, 0
+        contact, none, none, nothing, nothing, zero, 0.0, 0.0, 0.0, certificate, solver, 0
     )

@@ -26,8 +26,8 @@ def follow(loads: Any, forces: Any, **options: Any) -> cr.LoadPath:
     return cr.load_path(PAPER, loads=loads, forces=forces, **options)
 
 
-def swung(amplitudes: Any = SWING, loads: float = P, **options: Any) -> cr.Shakedown:
-    return cr.shakedown(PAPER, loads=loads, force_amplitudes=amplitudes, **options)
+def swung(amplitudes: Any = SWING, load: float = P, **options: Any) -> cr.Shakedown:
+    return cr.shakedown(PAPER, load=load, force_amplitudes=amplitudes, **options)
 
 
 BAD = [
@@ -80,9 +80,9 @@ BAD = [
     (lambda: swung(np.zeros((0, 2)), kind="vector"), "force_amplitudes"),
     (lambda: swung(kind="plastic"), "kind"),
     (lambda: swung(load_amplitudes=[0.1 * P] * 2, kind="elastic"), r"load_amplitudes.*not .exact."),
-    (lambda: swung(forces=P), "forces"),
+    (lambda: swung(force=P), "force:"),
     (lambda: swung(kind="vector"), "shape"),
-    (lambda: swung(loads=-P), "loads"),
+    (lambda: swung(load=-P), "load:"),
     # Derivatives.
     (lambda: LIFTED.gradient(load=1.0), "a contact with a load"),
     (

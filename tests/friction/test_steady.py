@@ -16,7 +16,7 @@ from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
-from convexrough.friction.path import Walk
+from convexrough.friction.walk import Walk
 
 
 def octagon(name: str) -> tuple[cr.Scene, Array, Array]:

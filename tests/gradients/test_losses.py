@@ -1,5 +1,6 @@
 """Derivatives of losses and displacements against differences of levels in 130 digits."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -174,6 +175,13 @@ def test_normalised(name: str, holding: Any) -> None:
     assert slope == pytest.approx((normalised(1e-4) - normalised(-1e-4)) / 2e-4, rel=1e-4)
     errors = np.abs(gradient.height_errors).max()
     assert 0 < errors <= SHARP * np.abs(gradient.heights).max()
+
+
+def test_a_pickled_cycle_keeps_the_force_of_its_displacement() -> None:
+    """It was rounded to float64, so that the loss was outside its bounds."""
+    cycle = cr.cycle(pressed("rough"), displacement=3e-6)
+    one, two = (each.gradient() for each in (cycle, pickle.loads(pickle.dumps(cycle))))
+    assert abs((one.number.value - two.number.value).value) <= one.value_error
 
 
 def test_weights_along_a_history() -> None:

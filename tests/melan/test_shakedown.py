@@ -45,7 +45,7 @@ def swung(kind: str, size: float, along: int = 0) -> Array:
 
 
 def test_exact_limits_at_constant_load() -> None:
-    found = cr.shakedown(PAPER, loads=P, force_amplitudes=SWING)
+    found = cr.shakedown(PAPER, load=P, force_amplitudes=SWING)
     assert found.factor == pytest.approx(0.351719571750, rel=1e-11)
     assert found.factors[B] == pytest.approx(0.616512127452, rel=1e-11)
     assert found.lower <= found.factor <= found.upper
@@ -72,7 +72,7 @@ def test_exact_limits_at_constant_load() -> None:
 )
 def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
     p, q = turned(angle)
-    found = cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q)
+    found = cr.shakedown(PAPER, load=0.9 * P, load_amplitudes=p, force_amplitudes=q)
     assert found.factor == pytest.approx(a, rel=1e-11)
     assert found.factors[B] == pytest.approx(b, rel=1e-11)
     assert found.lower <= a * (1 + 1e-12)
@@ -85,7 +85,7 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
     p, q = (np.zeros(2), SWING) if angle is None else turned(angle, chords=8)
     mean, m = P if angle is None else 0.9 * P, len(p)
-    limit = cr.shakedown(PAPER, loads=mean, load_amplitudes=p, force_amplitudes=q)
+    limit = cr.shakedown(PAPER, load=mean, load_amplitudes=p, force_amplitudes=q)
     for asperity, part in product((A, B), (0.99, 1.01)):
         slides = part > 1
         factor = part * limit.factors[asperity]
@@ -106,14 +106,14 @@ def test_a_limit_is_at_most_gross_sliding() -> None:
     The last follows the load, so that nothing ever slides.
     """
     rises = np.array([0.0, 1.3 * P])
-    limit = cr.shakedown(PAPER, loads=P, load_amplitudes=rises, force_amplitudes=[0.03 * P] * 2)
+    limit = cr.shakedown(PAPER, load=P, load_amplitudes=rises, force_amplitudes=[0.03 * P] * 2)
     assert limit.factor == limit.gross == pytest.approx(0.5 / 0.03)
     assert limit.lower <= limit.factor <= limit.upper
     assert limit.limited_by == "sliding"
-    limit = cr.shakedown(PAPER, loads=P, load_amplitudes=rises, force_amplitudes=[0.0, 0.0])
+    limit = cr.shakedown(PAPER, load=P, load_amplitudes=rises, force_amplitudes=[0.0, 0.0])
     assert (limit.factor, limit.limited_by) == (np.inf, None)
     swing = {"load_amplitudes": [0.1 * P, 0.0], "force_amplitudes": [0.02 * P, 0.0]}
-    assert cr.shakedown(PAPER, loads=P, **swing).factor == np.inf
+    assert cr.shakedown(PAPER, load=P, **swing).factor == np.inf
 
 
 @pytest.mark.parametrize("kind", ["exact", "elastic"])
@@ -121,7 +121,7 @@ def test_bounds_near_gross_sliding_hold_for_the_given_numbers(kind: Any) -> None
     """The room that the mean shear force leaves is a small difference of two numbers."""
     mean = 0.5 * P * (1 - 1e-6)
     swing = 0.3e-6 * 0.5 * P
-    found = cr.shakedown(PAPER, loads=P, forces=mean, force_amplitudes=[swing, -swing], kind=kind)
+    found = cr.shakedown(PAPER, load=P, force=mean, force_amplitudes=[swing, -swing], kind=kind)
     exact = (Fraction(P) - 2 * Fraction(mean)) / (2 * Fraction(swing))  # f = 1/2
     assert found.lower <= exact <= found.upper
 
@@ -130,7 +130,7 @@ def test_an_asperity_that_only_opens_is_told() -> None:
     """In phase and flatter than friction: above the limit a ring opens, and nothing slides."""
     for part, what in ((0.2, "opening"), (0.05, "sliding")):
         p, q = part * P * np.array([1.0, -1.0]), 0.05 * P * np.array([1.0, -1.0])
-        limit = cr.shakedown(PAPER, loads=P, load_amplitudes=p, force_amplitudes=q)
+        limit = cr.shakedown(PAPER, load=P, load_amplitudes=p, force_amplitudes=q)
         assert limit.limited_by == what
         above = 1.01 * limit.factor
         found = cr.steady(PAPER, loads=P + above * p, forces=above * q)
@@ -188,7 +188,7 @@ def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
     vector = kind == "vector"
     forces, kernel = mean if vector else mean[0], np.kron(problem.influence.matrix, np.eye(2))
     limit = cr.shakedown(
-        PAPER, loads=P, forces=0.5 * forces, force_amplitudes=swung(kind, 0.5 * P), kind=kind
+        PAPER, load=P, force=0.5 * forces, force_amplitudes=swung(kind, 0.5 * P), kind=kind
     )
     kernel = problem.kernel if vector else kernel
     K = kernel + np.diag(np.repeat(problem.compliance, 2))
@@ -261,7 +261,7 @@ def test_enclosures_hold_the_limit_in_ball_arithmetic(
     """Under a force to and fro the state at rest is 0 by symmetry: lambda = min P_i / |q_i|."""
     scene, load = replace(SCENES[name], material=cr.Material(1.0, ratio)), LARGEST[name]
     amplitudes = swung(kind, 0.5 * load, along)
-    found = cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)
+    found = cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
     loads, shares = exact_shares(scene, load, kind == "vector", along)
     sizes = [sum((y * y for y in each), arb(0)).sqrt() for each in shares]
     limits = [P / (size * arb(load)) for P, size in zip(loads, sizes, strict=True)]
@@ -279,7 +279,7 @@ def test_a_solver_that_lies_does_not_move_the_limit(
     """The bounds get worse, and stay true; or the answer is refused."""
     swing = np.array([[0.0, 1.0], [0.3, -0.8], [-0.6, 0.1]]) * RADIUS
     honest = melan.run_clarabel
-    truth = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    truth = cr.shakedown(PAPER, load=P, force_amplitudes=swing, kind="vector")
     assert list(truth.to_dataframe().columns)[-2:] == ["witness_x", "witness_y"]
     assert truth.to_xarray()["force_amplitude"].shape == (3, 2)
     rng = np.random.default_rng(5)
@@ -297,7 +297,7 @@ def test_a_solver_that_lies_does_not_move_the_limit(
         return raw._replace(x=-x, multipliers=-z)
 
     monkeypatch.setattr(melan, "run_clarabel", liar)
-    found = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    found = cr.shakedown(PAPER, load=P, force_amplitudes=swing, kind="vector")
     assert found.lower <= truth.upper
     assert found.upper >= truth.lower
     assert found.gap > truth.gap or lie == "doubled"
@@ -308,7 +308,7 @@ def test_without_order_no_exact_limit_is_claimed(kind: Any) -> None:
     """The shaded asperity is pushed back by a shear force on all."""
     scene = shaded()
     load = cr.press(scene, approach=1.4).load
-    found = cr.shakedown(scene, loads=load, force_amplitudes=swung(kind, 0.1 * load), kind=kind)
+    found = cr.shakedown(scene, load=load, force_amplitudes=swung(kind, 0.1 * load), kind=kind)
     assert kind == "elastic" or found.order == "fails"
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
 
@@ -319,7 +319,7 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: Any) -> None:
     scene, load = twins()
     assert "undecided" in cr.press(scene, load=load).status
     amplitudes = swung(kind, 0.1 * load)
-    found = cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)
+    found = cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
     assert found.factor > 0
 
@@ -329,7 +329,7 @@ def test_one_asperity_slides_on_only_as_all_do(kind: Any) -> None:
     alone = cr.Asperities([[0.0, 0.0]], 1.0)
     scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
     amplitudes = swung(kind, 1e-7)
-    found = cr.shakedown(scene, loads=1e-6, force_amplitudes=amplitudes, kind=kind)
+    found = cr.shakedown(scene, load=1e-6, force_amplitudes=amplitudes, kind=kind)
     assert found.factor == pytest.approx(5.0)
     assert found.gross == pytest.approx(5.0)
     assert found.proved

@@ -54,8 +54,8 @@ class ShakedownStage(Stage):
         with blamed_on(f"[{self.name}]"):
             found = shakedown(
                 contact.scene,
-                loads=self.reference * self.loads,
-                forces=self.reference * np.array(self.forces),
+                load=self.reference * self.loads,
+                force=self.reference * np.array(self.forces),
                 load_amplitudes=self.reference * np.array(swings),
                 force_amplitudes=self.reference * np.array(self.force_amplitudes),
                 kind=self.kind,
