@@ -297,29 +297,3 @@ def _pass_roundoffs(length: int) -> int:
             total += cost
     assert length == 1  # next_fast_len returns only products of these radices
     return total
-
-
-def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Triples (length, i, j) for the differences (i, j) of sites in a box, sorted by length.
-
-    Of (i, j) and (-i, -j) only one is included.
-    """
-    rows, columns = box.shape
-    reach = 1
-    done = 0.0
-    while True:
-        i = np.arange(0, min(reach, rows - 1) + 1)
-        j = np.arange(-min(reach, columns - 1), min(reach, columns - 1) + 1)
-        i, j = (each.ravel() for each in np.meshgrid(i, j, indexing="ij"))
-        half = (i > 0) | (j > 0)
-        i, j = i[half], j[half]
-        distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
-        # On a reduced basis every difference with |i| or |j| above `reach` is longer than this.
-        whole = reach >= max(rows, columns) - 1
-        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis.T).min())
-        order = np.argsort(distances)
-        for k in order[(distances[order] > done) & (distances[order] <= sure)]:
-            yield float(distances[k]), int(i[k]), int(j[k])
-        if whole:
-            return
-        done, reach = sure, 2 * reach

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,27 +35,14 @@ SLICES, LARGE = 3, 2**22
 MOST_BITS = 48
 
 
-class Values(Protocol):
-    """An even kernel, with values of at most 1, as a function of differences of sites.
-
-    error : bound on the relative error of each value
-    """
-
-    @property
-    def error(self) -> float: ...
-
-    def at(self, i: Indices, j: Indices) -> Pair:
-        """(len(i), len(j)) values at the differences (i, j)."""
-        ...
-
-
 @dataclass(frozen=True)
 class Distances:
     """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
 
-    gram : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns). The
-        first two slices have so few bits that their products with i^2, i j and j^2 are exact, and
-        so are sums of these products
+    gram  : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns).
+        The first two slices have so few bits that their products with i^2, i j and j^2 are exact,
+        and so are sums of these products
+    error : bound on the relative error of each value
     """
 
     gram: Array
@@ -84,6 +71,7 @@ class Distances:
         return cls(slices, PAIR_ROUNDOFF + 12 * ROUNDOFF * 2.0 ** (above - 2 * bits))
 
     def at(self, i: Indices, j: Indices) -> Pair:
+        """(len(i), len(j)) values at the differences (i, j) of sites."""
         squares, cross = np.square(j, dtype=np.float64), j.astype(np.float64)
         parts = []
         for one, both, two in self.gram.tolist():
@@ -132,7 +120,7 @@ class Sliced:
     budget: float
 
     @classmethod
-    def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
+    def of(cls, box: SiteBox, values: Distances, norm: float, unit: float, count: int) -> Sliced:
         """The kernel divided into `count` slices; `norm` is its approximate 2-norm."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
