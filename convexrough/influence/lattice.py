@@ -313,7 +313,7 @@ class LatticeInfluence:
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
-        return sliced.sums(loads, places, *off_sites)
+        return sliced.sums(loads, places) + off_sites
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object that `make` returns, cached under `name` unless there are many asperities."""
@@ -333,8 +333,8 @@ class LatticeInfluence:
         norm = self._kernel.norm * unit / self.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> tuple[Array, float]:
-        """(n,) changes of sum_j P_j / r_ij by deviations from the sites, and their error bound.
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
+        """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
@@ -345,7 +345,7 @@ class LatticeInfluence:
         unknown = max(shrunk) * unknown + 4 * ROUNDOFF * most
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
-            return np.zeros(len(self)), 0.0
+            return Ball.exact(np.zeros(len(self)))
         shares, pulls = loads / top, self._pulls(box)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
@@ -365,7 +365,7 @@ class LatticeInfluence:
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * float(np.abs(change).max())
         unit = top / self.spacing
-        return change * unit, 1.01 * error * unit
+        return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> Smoother:
         return block_smoother(self.cells, self.box.basis, self._unit, root)

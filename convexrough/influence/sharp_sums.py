@@ -269,7 +269,7 @@ class MeshSums:
         ordered = shares.at(product.order.places)
         field, node_error = _to_nodes(product, ordered)
         nodes = Pair(field.high.ravel(), field.low.ravel())
-        on_mesh = self.sliced.sums(nodes, self.places.ravel(), np.zeros(self.places.size), 0.0)
+        on_mesh = self.sliced.sums(nodes, self.places.ravel())
         exact, left, unit, rounding = _from_nodes(product, on_mesh)
         near, errors = self.pairs(ordered)
         back = np.argsort(product.order.places)

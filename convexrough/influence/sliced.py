@@ -142,16 +142,15 @@ class Sliced:
                 return cls(box, unit, kernels, bits, more, values.error, budget)
             more -= 1
 
-    def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """(n,) the sums over j of g_ij P_j, divided by `unit`, plus `change`; g is the kernel.
+    def sums(self, loads: Pair, at: Indices) -> Ball:
+        """(n,) the sums over j of g_ij P_j, divided by `unit`; g is the kernel.
 
-        at     : (n,) indices of the loads' sites in the flattened array that is transformed
-        change : (n,) values to add; each has an error of at most `error`
+        at : (n,) indices of the loads' sites in the flattened array that is transformed
         """
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
         if top == 0.0:
-            return Ball.around(change, error)
+            return Ball.exact(loads)
         size = 2.0 ** np.ceil(np.log2(top))
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
         slices, bits = self._cut(shares)
@@ -162,13 +161,13 @@ class Sliced:
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
         def add_up(some: slice) -> Pair:
-            high, low = change[some], np.zeros(some.stop - some.start)
+            high = low = np.zeros(some.stop - some.start)
             for level, each in zip(levels[::-1], units[::-1], strict=True):
                 part = level.ravel()[at[some]]
                 if level is not levels[-1]:
                     part = np.rint(part)
                 high, lost = two_sum(part * (each * unit), high)
-                low += lost
+                low = low + lost
             return Pair(*two_sum(high, low))
 
         left = behind = 0.0  # norms of the products that `_levels` adds up in its last field
@@ -179,8 +178,7 @@ class Sliced:
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
         radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
-        radius = 1.01 * radius * unit + error + PAIR_ROUNDOFF * float(np.abs(change).max()) + TINY
-        return Ball.around(in_parts(len(at), add_up), radius)
+        return Ball.around(in_parts(len(at), add_up), 1.01 * radius * unit + TINY)
 
     @property
     def norm(self) -> float:
