@@ -90,10 +90,7 @@ class SiteBox:
             with np.errstate(divide="ignore"):
                 nearest = np.sqrt(np.divide(1.0, squares))
             nearest[squares == 0] = 0.0
-            found = nearest
-            for _ in range(power - 1):
-                found = found * nearest
-            return [found]
+            return [nearest**power]
 
         return self.kernels(values, dtype)[0]
 
@@ -118,50 +115,38 @@ class SiteBox:
         rows, columns = self.padded
         last = rows // 2 + 1  # the transform of row -i is, up to sign, conjugate to that of row i
         shape, whole = (last, columns // 2 + 1), np.result_type(dtype, np.complex64)
-        block = max(1, LAID_OUT // columns)
-        blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
-        halves: list[NDArray[Any]] = []
-        sums: dict[int, list[float]] = {}  # for each block: sums of squares of each kernel
+        nowhere = np.zeros(0, dtype=np.intp)
+        count = len(values(nowhere, nowhere, np.zeros((0, 0))))
+        halves = [np.empty(shape, dtype=whole) for _ in range(count)]
+        squares = np.empty((count, last))  # sums of squares of each row
 
         def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # row i stands for row -i, too
-            sums[taken.start] = []
-            for k, each in enumerate(self._laid_out(values, taken)):
-                if k == len(halves):
-                    halves.append(np.empty(shape, dtype=whole))
-                sums[taken.start].append(float(weights @ np.einsum("ij,ij->i", each, each)))
+            laid_out = self._laid_out(values, taken, count)
+            for half, square, each in zip(halves, squares, laid_out, strict=True):
+                square[taken] = weights * np.einsum("ij,ij->i", each, each)
                 waves = fft.rfft(each.astype(dtype, copy=False), axis=1)
-                halves[k][taken] = -1j * waves if odd else waves
+                half[taken] = -1j * waves if odd else waves
 
-        transform(blocks[0])  # this first block shows how many kernels there are
-        threads.each(transform, blocks[1:], self.workers)
-        squares = np.sum([sums[taken.start] for taken in blocks], axis=0)
-        found = []
-        for square in squares.tolist():
-            found.append(Kernel(self._spectrum(halves.pop(0)), math.sqrt(square)))
-        return found
+        threads.each(transform, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
+        norms = np.sqrt(squares.sum(axis=1)).tolist()
+        return [Kernel(self._spectrum(halves.pop(0)), norm) for norm in norms]
 
-    def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values in some rows of the padded box.
+    def _laid_out(self, values: Values, taken: slice, count: int) -> list[Array]:
+        """The values of `count` kernels in some rows of the padded box.
 
         If several differences of sites share an entry of the box, its value is that of the shortest
         difference. Beyond `extent` values are 0.
         """
         shape = taken.stop - taken.start, self.padded[1]
-        squares = np.full(shape, np.inf)
-        found: list[Array] = []
+        squares, found = np.full(shape, np.inf), [np.zeros(shape) for _ in range(count)]
         for within, places, i, j in self._images(taken):
             shorter = self._lengths(i, j)
             nearer = shorter < squares[within, places]
             np.copyto(squares[within, places], shorter, where=nearer)
-            each = values(i, j, shorter)
-            found = found or [np.zeros(shape) for _ in each]
-            for whole, part in zip(found, each, strict=True):
+            for whole, part in zip(found, values(i, j, shorter), strict=True):
                 np.copyto(whole[within, places], part, where=nearer)
-        if not found:  # no difference maps to these rows
-            nowhere = np.zeros(0, dtype=np.intp)
-            found = [np.zeros(shape) for _ in values(nowhere, nowhere, np.zeros((0, 0)))]
         if self.extent < np.inf:
             beyond = squares > self.extent**2
             for whole in found:
@@ -190,13 +175,14 @@ class SiteBox:
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
-            i = np.arange(taken.start, taken.stop) - shift
-            inside = np.flatnonzero(np.abs(i) < rows)
-            if len(inside) == 0:
-                continue
-            within = slice(int(inside[0]), int(inside[-1]) + 1)
-            yield within, slice(columns), i[within], right
-            yield within, slice(width + 1 - columns, width), i[within], left
+            first = max(taken.start, shift + 1 - rows)
+            last = max(first, min(taken.stop, shift + rows))
+            within, i = (
+                slice(first - taken.start, last - taken.start),
+                np.arange(first, last) - shift,
+            )
+            yield within, slice(columns), i, right
+            yield within, slice(width + 1 - columns, width), i, left
 
     def _lengths(self, i: Indices, j: Indices) -> Array:
         """(len(i), len(j)) [spacing^2] the squared lengths |i b1 + j b2|^2."""
@@ -279,9 +265,7 @@ def through_waves(
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
     """Slices of columns; the columns of one slice are transformed together."""
-    width, step = half.shape[1], max(1, ROW // half.itemsize)
-    for start in range(0, width, step):
-        yield slice(start, min(start + step, width))
+    return threads.chunks(half.shape[1], max(1, ROW // half.itemsize))
 
 
 def _least(sites: int, twice: int, length: float) -> int:
@@ -297,29 +281,3 @@ def _pass_roundoffs(length: int) -> int:
             total += cost
     assert length == 1  # next_fast_len returns only products of these radices
     return total
-
-
-def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Triples (length, i, j) for the differences (i, j) of sites in a box, sorted by length.
-
-    Of (i, j) and (-i, -j) only one is included.
-    """
-    rows, columns = box.shape
-    reach = 1
-    done = 0.0
-    while True:
-        i = np.arange(0, min(reach, rows - 1) + 1)
-        j = np.arange(-min(reach, columns - 1), min(reach, columns - 1) + 1)
-        i, j = (each.ravel() for each in np.meshgrid(i, j, indexing="ij"))
-        half = (i > 0) | (j > 0)
-        i, j = i[half], j[half]
-        distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
-        # On a reduced basis every difference with |i| or |j| above `reach` is longer than this.
-        whole = reach >= max(rows, columns) - 1
-        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis.T).min())
-        order = np.argsort(distances)
-        for k in order[(distances[order] > done) & (distances[order] <= sure)]:
-            yield float(distances[k]), int(i[k]), int(j[k])
-        if whole:
-            return
-        done, reach = sure, 2 * reach

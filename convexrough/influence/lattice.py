@@ -10,7 +10,7 @@ its rounding errors and the products with more digits ("sharp" products).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -23,7 +23,7 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
-from convexrough.influence.convolution import Kernel, SiteBox, neighbours, through_waves
+from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.influence.coupling import (
     Coupling,
     JointCoupling,
@@ -267,28 +267,30 @@ class LatticeInfluence:
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
 
-        Pairs are searched, nearest first, until no farther pair can exceed the largest ratio found.
+        Pairs are searched by the difference (i, j) of their sites: first all differences with
+        max(|i|, |j|) = 1, then all with 2, and so on, until no farther pair can exceed the largest
+        ratio found. On a reduced basis these differences have lengths of at least 0.8, 1.6, ...
         """
         if not self._filled:
             return crowding(self.points, radii)
-        (rows, columns), places = self.box.shape, self._boxed[1]
-        field = np.full((rows, self.box.padded[1]), -np.inf)
-        field.ravel()[places] = radii
-        field = field[:, :columns]
+        (i, j), (rows, columns) = self.cells, self.box.shape
         most, worst = 2.0 * float(radii.max()), 0.0
-        for distance, i, j in self._pairs():
-            if most <= worst * distance:
+        for reach in range(1, max(rows, columns)):
+            if most <= worst * self._at_least(0.8 * reach):
                 break
-            worst = max(worst, _largest_sum(field, i, j) / distance)
+            width = columns + reach  # the ends of rows are never mistaken for neighbours
+            field = np.full(rows * width, -np.inf)
+            field[i * width + j] = radii
+            square = np.ndindex(reach + 1, 2 * reach + 1)
+            for a, b in ((a, b - reach) for a, b in square if reach in (a, abs(b - reach))):
+                distance = self._at_least(float(np.hypot(*((a, b) @ self.box.basis))))
+                if a * width + b > 0 and worst * distance < most:
+                    worst = max(worst, _largest_sum(field, a * width + b) / distance)
         return worst
 
-    def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """Triples (bound, i, j) for the differences (i, j) of `neighbours`.
-
-        The bound [length] is below the distance of any two points whose sites differ by (i, j).
-        """
-        for on_sites, i, j in neighbours(self.box):
-            yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
+    def _at_least(self, length: float) -> float:
+        """[length] lower bound on the distance of points on sites this far apart [spacing]."""
+        return self.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
 
     def semidefinite_with(self, radius: float) -> bool:
         """True if A + (scale / radius) I is proved positive semidefinite.
@@ -311,7 +313,7 @@ class LatticeInfluence:
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
-        return sliced.sums(loads, places, *off_sites)
+        return sliced.sums(loads, places) + off_sites
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object that `make` returns, cached under `name` unless there are many asperities."""
@@ -331,8 +333,8 @@ class LatticeInfluence:
         norm = self._kernel.norm * unit / self.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> tuple[Array, float]:
-        """(n,) changes of sum_j P_j / r_ij by deviations from the sites, and their error bound.
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
+        """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
@@ -343,7 +345,7 @@ class LatticeInfluence:
         unknown = max(shrunk) * unknown + 4 * ROUNDOFF * most
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
-            return np.zeros(len(self)), 0.0
+            return Ball.exact(np.zeros(len(self)))
         shares, pulls = loads / top, self._pulls(box)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
@@ -363,26 +365,20 @@ class LatticeInfluence:
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * float(np.abs(change).max())
         unit = top / self.spacing
-        return change * unit, 1.01 * error * unit
+        return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> Smoother:
         return block_smoother(self.cells, self.box.basis, self._unit, root)
 
 
-def _largest_sum(field: Array, i: int, j: int) -> float:
-    """The largest sum of `field` at two sites i rows and j columns apart; 0 if none is positive."""
-    here, there = field[i:], field[: len(field) - i]
-    if j >= 0:
-        here, there = here[:, j:], there[:, : there.shape[1] - j]
-    else:
-        here, there = here[:, :j], there[:, -j:]
-    found = [0.0]
+def _largest_sum(values: Array, apart: int) -> float:
+    """The largest sum of two values that are so far apart in the array; 0 if none is positive."""
+    here, there, found = values[:-apart], values[apart:], [0.0]
 
-    def look(rows: slice) -> None:
-        found.append(float((here[rows] + there[rows]).max(initial=0.0)))
+    def look(some: slice) -> None:
+        found.append(float((here[some] + there[some]).max()))
 
-    rows = max(1, CHUNK // max(here.shape[1], 1))
-    threads.each(look, threads.chunks(len(here), rows), threads.worthwhile(here.size))
+    threads.each(look, threads.chunks(len(here), CHUNK), threads.worthwhile(len(here)))
     return max(found)
 
 
@@ -401,12 +397,10 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     def look(some: slice) -> None:
         steps = sites[some].astype(np.float64)
         for k in (0, 1):
-            high, low = two_sum(points[some, k], -lattice.origin[k])
+            left = Pair(*two_sum(points[some, k], -lattice.origin[k]))
             for n in (0, 1):
-                step, rest = two_product(steps[:, n], lattice.basis[n, k])
-                high, left = two_sum(high, -step)
-                low = low + (left - rest)
-            away[k, some] = high + low
+                left -= Pair(*two_product(steps[:, n], lattice.basis[n, k]))
+            away[k, some] = left.high
 
     threads.each(look, threads.chunks(len(points), CHUNK), threads.worthwhile(len(points)))
     most = float(np.abs(sites).max(initial=0))

@@ -8,10 +8,10 @@ docs/theory/operators-mesh.md derives the method and the error bounds.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -160,20 +160,28 @@ class NearPairs:
         result += loads.dtype.type(self.own) * loads
         return result
 
+    def in_parts(self, size: int) -> Iterator[tuple[slice, Indices]]:
+        """Slices of about `size` entries of `upper` in whole rows, with the row of each entry."""
+        edges, n = self.upper.indptr, self.upper.shape[0]
+        for rows in threads.chunks(n, max(1, size * n // max(self.upper.nnz, 1))):
+            counts = np.diff(edges[rows.start : rows.stop + 1])
+            here = np.repeat(np.arange(rows.start, rows.stop), counts)
+            yield slice(int(edges[rows.start]), int(edges[rows.stop])), here
+
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
     """The interpolation W from nodes to points.
 
     x, y    : (n, width) weights in x and in y; each entry of W is the product of a weight in x and
-        one in y
+        one in y. Their low parts, in single precision, serve only sharp products (`sharp_sums`)
     patches : for each group of consecutive points in one block of mesh cells: the first point, the
         point after the last, and the indices i and j of the first node
     shape   : numbers of nodes of the mesh in both directions
     """
 
-    x: NDArray[Any]
-    y: NDArray[Any]
+    x: Pair
+    y: Pair
     patches: list[tuple[int, int, int, int]]
     shape: tuple[int, int]
 
@@ -186,10 +194,13 @@ class Interpolation:
             start, stop = order.starts[key : key + 2].tolist()
             for first in range(start, stop, BLOCK):
                 patches.append((first, min(first + BLOCK, stop), i, j))
-        x, y = (np.empty((len(order.places), splitting.width), dtype=dtype) for _ in (0, 1))
-        for start in range(0, len(x), PLACES):
-            some = slice(start, start + PLACES)
-            x[some], y[some] = (factor.high for factor in twofold_weights(order, splitting, some))
+        size = len(order.places), splitting.width
+        x, y = (Pair(np.empty(size, dtype), np.empty(size, np.float32)) for _ in (0, 1))
+        for some in threads.chunks(len(order.places), PLACES):
+            for factor, exactly in zip(
+                (x, y), twofold_weights(order, splitting, some), strict=True
+            ):
+                factor.high[some], factor.low[some] = exactly
         extra = splitting.kernel.order - 1
         shape = (rows * splitting.block + extra, columns * splitting.block + extra)
         return cls(x, y, patches, shape)
@@ -197,7 +208,9 @@ class Interpolation:
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W^T P at the nodes of the mesh for loads P (n,), or |W|^T P if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
-        x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
+        x, y = self.x.high, self.y.high
+        if absolute:
+            x, y = np.abs(x), np.abs(y)
         width = x.shape[1]
         column = loads[:, None]
         for start, stop, i, j in self.patches:
@@ -207,12 +220,12 @@ class Interpolation:
 
     def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
         """(n,) W times a field of values at the nodes of the mesh."""
-        result = np.empty(len(self.x), dtype=field.dtype)
-        width = self.x.shape[1]
+        x, y = self.x.high, self.y.high
+        result, width = np.empty(len(x), dtype=field.dtype), x.shape[1]
         for start, stop, i, j in self.patches:
             mine = slice(start, stop)
-            along = self.x[mine] @ field[i : i + width, j : j + width]
-            np.einsum("ij,ij->i", along, self.y[mine], out=result[mine])
+            along = x[mine] @ field[i : i + width, j : j + width]
+            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
         return result
 
 
@@ -354,14 +367,10 @@ class Product:
 
         ordered : (n,) the values v_j at the sorted points
         """
-        upper, points, kernel = self.near.upper, self.order.points, self._softer
+        points, kernel = self.order.points, self._softer
         total, n = np.zeros_like(points), len(points)
-        edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + PAIRS, PAIRS))
-        edges = np.unique(np.append(np.minimum(edges, n), (0, n)))
-        for first, last in pairwise(edges):
-            counts = np.diff(upper.indptr[first : last + 1])
-            here = np.repeat(np.arange(first, last), counts)
-            there = upper.indices[upper.indptr[first] : upper.indptr[last]]
+        for some, here in self.near.in_parts(PAIRS):
+            there = self.near.upper.indices[some]
             apart = points[here] - points[there]
             weights = kernel.local((apart**2).sum(axis=1))
             for k in (0, 1):

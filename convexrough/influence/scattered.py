@@ -53,8 +53,6 @@ class ScatteredInfluence:
     point_error : [length] bound on the error of each coordinate of the points
     tails       : (n, 2) [length] the exact points minus `points`, or None if all differences are 0
         or unknown; see `Scene.contact_tails`
-    tolerance   : target for the relative error that interpolation causes in a product; the error
-        bounds hold for any value of it
 
     For few points, or points in dense clusters, a matrix takes the place of the mesh.
     """
@@ -63,7 +61,6 @@ class ScatteredInfluence:
     scale: float
     point_error: float = 0.0
     tails: Array | None = None
-    tolerance: float = TOLERANCE
 
     name: ClassVar[Kind] = "scattered"
     stored: ClassVar[bool] = False
@@ -74,8 +71,7 @@ class ScatteredInfluence:
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
-        tolerance = max(self.tolerance, SINGLE_TOLERANCE) if dtype == np.float32 else self.tolerance
-        product = self._product(1, tolerance, dtype)
+        product = self._product(1, dtype)
         if product is None:
             return self._dense.apply(loads.astype(np.float64, copy=False)).astype(dtype, copy=False)
         found = product.apply(loads.astype(dtype, copy=False))
@@ -94,7 +90,7 @@ class ScatteredInfluence:
         )
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        product = self._product(power, FALLOFF_TOLERANCE, np.float64)
+        product = self._product(power, np.float64)
         if product is None:
             return self._dense.falloff(strengths, power)
         moved = entry_error(self._unknown, product.near.nearest)
@@ -155,7 +151,7 @@ class ScatteredInfluence:
 
     @property
     def _double(self) -> Product | None:
-        return self._product(1, self.tolerance, np.float64)
+        return self._product(1, np.float64)
 
     @cached_property
     def _dense(self) -> DenseInfluence:
@@ -166,13 +162,17 @@ class ScatteredInfluence:
     def _products(self) -> dict[tuple[int, Any], Product | None]:
         return {}
 
-    def _product(self, power: int, tolerance: float, dtype: Any) -> Product | None:
+    def _product(self, power: int, dtype: Any) -> Product | None:
         """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
         if (power, dtype) not in self._products:
-            splitting, found = Splitting.choose(self.points, power, tolerance), None
+            tolerance = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
+            splitting = Splitting.choose(
+                self.points, power, tolerance if power == 1 else FALLOFF_TOLERANCE
+            )
+            self._products[power, dtype] = None
             if splitting is not None:
                 found = Product.assemble(self.points, splitting, dtype, self.tails)
-            self._products[power, dtype] = found
+                self._products[power, dtype] = found
         return self._products[power, dtype]
 
     @property

@@ -15,16 +15,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import CHUNK, Pair, rounded, two_product, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.influence.pair_sums import PLACES, Product, twofold_weights, within
+from convexrough.influence.pair_sums import Product, within
 from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, exact_series, lebesgue
@@ -41,8 +40,6 @@ FIXED = 160
 
 #: Least number of nodes in the table of L, and number of terms of Taylor's series at each node.
 NODES, TERMS = 1024, 8
-
-LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
@@ -149,10 +146,8 @@ class SharpPairs:
             points = Pair(order.points, order.tails)
         first, second = np.empty_like(upper.data), np.empty_like(upper.data)
 
-        def cut(rows: slice) -> None:
-            starts = upper.indptr[rows.start : rows.stop + 1]
-            some = slice(int(starts[0]), int(starts[-1]))
-            here = np.repeat(np.arange(rows.start, rows.stop), np.diff(starts))
+        def cut(part: tuple[slice, Indices]) -> None:
+            some, here = part
             squares = squared_distances(points.at(here), points.at(upper.indices[some]))
             inverse, soft = squares.inverse_root(), table.at(squares)
             high, low = two_sum(inverse.high, -soft.high)
@@ -160,9 +155,7 @@ class SharpPairs:
             first[some] = rounded(high + low, np.asarray(unit))
             second[some] = (high - first[some]) + low
 
-        rows = max(1, CHUNK * len(ones) // max(len(first), 1))
-        parts = threads.chunks(len(ones), rows)
-        threads.each(cut, parts, threads.worthwhile(len(first)))
+        threads.each(cut, product.near.in_parts(CHUNK), threads.worthwhile(len(first)))
         low, high = (
             csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
             for part in (second, first)
@@ -230,31 +223,25 @@ def in_slices(
 
 
 @dataclass(frozen=True)
-class SoftValues:
+class SoftValues(Distances):
     """The values of the smooth kernel L between nodes of a mesh, times the unit of length.
 
-    near      : the values within the reach, at the index i^2 + j^2 for nodes that differ by (i, j)
-    distances : the values 1 / r beyond the reach
+    near : the values within the reach, at the index i^2 + j^2 for nodes that differ by (i, j)
     """
 
     near: Pair
-    distances: Distances
 
     @classmethod
-    def of(cls, product: Product, unit: float) -> SoftValues:
+    def between(cls, product: Product, unit: float) -> SoftValues:
         mesh, kernel, spacing = product.mesh, product.splitting.kernel, product.splitting.spacing
         basis = [[Fraction(x) / Fraction(unit) for x in row] for row in mesh.basis.tolist()]
-        distances = Distances.of(basis, max(mesh.shape))
+        beyond = Distances.of(basis, max(mesh.shape))
         step, reach = Fraction(spacing) ** 2, Fraction(kernel.reach)
         (near,) = soft_terms(kernel, step, math.ceil(reach**2 / step), 1)
-        return cls(soft_values(near, Fraction(unit) / reach), distances)
-
-    @property
-    def error(self) -> float:
-        return self.distances.error
+        return cls(beyond.gram, beyond.error, soft_values(near, Fraction(unit) / reach))
 
     def at(self, i: Indices, j: Indices) -> Pair:
-        found = self.distances.at(i, j)
+        found = super().at(i, j)
         squares = np.add.outer(i * i, j * j)
         near = squares < len(self.near.high)
         found.high[near], found.low[near] = self.near.at(squares[near])
@@ -266,9 +253,9 @@ class MeshSums:
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
-        self.product, self.lows = product, _low_weights(product)
+        self.product = product
         self.pairs = SharpPairs.of(product)
-        values, norm = SoftValues.of(product, unit), unit * product.kernel.norm
+        values, norm = SoftValues.between(product, unit), unit * product.kernel.norm
         self.sliced = Sliced.of(mesh, values, norm, unit, SLICES)
         self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.padded[1], range(mesh.shape[1]))
 
@@ -280,10 +267,10 @@ class MeshSums:
         size = 2.0 ** np.ceil(np.log2(top))
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
         ordered = shares.at(product.order.places)
-        field, node_error = _to_nodes(product, self.lows, ordered)
+        field, node_error = _to_nodes(product, ordered)
         nodes = Pair(field.high.ravel(), field.low.ravel())
-        on_mesh = self.sliced.sums(nodes, self.places.ravel(), np.zeros(self.places.size), 0.0)
-        exact, left, unit, rounding = _from_nodes(product, self.lows, on_mesh)
+        on_mesh = self.sliced.sums(nodes, self.places.ravel())
+        exact, left, unit, rounding = _from_nodes(product, on_mesh)
         near, errors = self.pairs(ordered)
         back = np.argsort(product.order.places)
         total = (Pair(*two_sum(exact * unit, left * unit)) + near).at(back)
@@ -298,23 +285,12 @@ class MeshSums:
         return Ball.around(Pair(total.high * size, total.low * size), 1.01 * radius * size)
 
 
-def _low_weights(product: Product) -> LowWeights:
-    """(n, width) the low parts of the interpolation weights in x and in y, in single precision."""
-    shape = len(product.order.places), product.splitting.width
-    x, y = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
-    for start in range(0, len(x), PLACES):
-        some = slice(start, start + PLACES)
-        weights = twofold_weights(product.order, product.splitting, some)
-        x[some], y[some] = (factor.low for factor in weights)
-    return x, y
-
-
-def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, float]:
+def _to_nodes(product: Product, ordered: Pair) -> tuple[Pair, float]:
     """W^T P for sorted loads P of at most 1, and a bound on the error at every node."""
     met = _met(product)
     bits = (DIGITS - met.bit_length()) // 2
     exact, left = np.zeros(product.weights.shape), np.zeros(product.weights.shape)
-    for some, patches, x, y in _weighed(product, lows):
+    for some, patches, x, y in _weighed(product):
         mine = ordered.at(np.s_[some, None])
         high, low = two_product(mine.high, y.high)
         low = low + (mine.high * y.low + mine.low * y.high)
@@ -328,9 +304,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
     return Pair(*two_sum(exact, left)), error
 
 
-def _from_nodes(
-    product: Product, lows: LowWeights, on_mesh: Ball
-) -> tuple[Array, Array, float, float]:
+def _from_nodes(product: Product, on_mesh: Ball) -> tuple[Array, Array, float, float]:
     """W times the values on the mesh, as the sum of whole numbers (n,) and rests (n,) in a unit.
 
     The other two results are this unit, and a bound on the error in this unit.
@@ -340,7 +314,7 @@ def _from_nodes(
     values = Slices.of(Pair(high * scale, low * scale), BITS)
     unit = 2.0 ** (-2 * BITS)
     exact, left = np.empty(len(product.order.places)), np.empty(len(product.order.places))
-    for some, patches, x, y in _weighed(product, lows):
+    for some, patches, x, y in _weighed(product):
         across, along = Slices.of(x, BITS), Slices.of(y, BITS)
         for rows, i, j in patches:
             nodes = Slices(values.first[i, j], values.second[i, j])
@@ -356,7 +330,7 @@ def _from_nodes(
 
 
 def _weighed(
-    product: Product, lows: LowWeights
+    product: Product,
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
     """For each group of patches: its points, the slices of each patch, and the weights in x and y.
 
@@ -370,8 +344,7 @@ def _weighed(
             (slice(a - start, b - start), slice(i, i + width), slice(j, j + width))
             for a, b, i, j in patches
         ]
-        x, y = Pair(weights.x[some], lows[0][some]), Pair(weights.y[some], lows[1][some])
-        yield some, places, x, y
+        yield some, places, weights.x.at(some), weights.y.at(some)
 
 
 def _met(product: Product) -> int:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,27 +35,14 @@ SLICES, LARGE = 3, 2**22
 MOST_BITS = 48
 
 
-class Values(Protocol):
-    """An even kernel, with values of at most 1, as a function of differences of sites.
-
-    error : bound on the relative error of each value
-    """
-
-    @property
-    def error(self) -> float: ...
-
-    def at(self, i: Indices, j: Indices) -> Pair:
-        """(len(i), len(j)) values at the differences (i, j)."""
-        ...
-
-
 @dataclass(frozen=True)
 class Distances:
     """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
 
-    gram : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns). The
-        first two slices have so few bits that their products with i^2, i j and j^2 are exact, and
-        so are sums of these products
+    gram  : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns).
+        The first two slices have so few bits that their products with i^2, i j and j^2 are exact,
+        and so are sums of these products
+    error : bound on the relative error of each value
     """
 
     gram: Array
@@ -84,6 +71,7 @@ class Distances:
         return cls(slices, PAIR_ROUNDOFF + 12 * ROUNDOFF * 2.0 ** (above - 2 * bits))
 
     def at(self, i: Indices, j: Indices) -> Pair:
+        """(len(i), len(j)) values at the differences (i, j) of sites."""
         squares, cross = np.square(j, dtype=np.float64), j.astype(np.float64)
         parts = []
         for one, both, two in self.gram.tolist():
@@ -132,7 +120,7 @@ class Sliced:
     budget: float
 
     @classmethod
-    def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
+    def of(cls, box: SiteBox, values: Distances, norm: float, unit: float, count: int) -> Sliced:
         """The kernel divided into `count` slices; `norm` is its approximate 2-norm."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
@@ -154,16 +142,15 @@ class Sliced:
                 return cls(box, unit, kernels, bits, more, values.error, budget)
             more -= 1
 
-    def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """(n,) the sums over j of g_ij P_j, divided by `unit`, plus `change`; g is the kernel.
+    def sums(self, loads: Pair, at: Indices) -> Ball:
+        """(n,) the sums over j of g_ij P_j, divided by `unit`; g is the kernel.
 
-        at     : (n,) indices of the loads' sites in the flattened array that is transformed
-        change : (n,) values to add; each has an error of at most `error`
+        at : (n,) indices of the loads' sites in the flattened array that is transformed
         """
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
         if top == 0.0:
-            return Ball.around(change, error)
+            return Ball.exact(loads)
         size = 2.0 ** np.ceil(np.log2(top))
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
         slices, bits = self._cut(shares)
@@ -174,13 +161,13 @@ class Sliced:
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
 
         def add_up(some: slice) -> Pair:
-            high, low = change[some], np.zeros(some.stop - some.start)
+            high = low = np.zeros(some.stop - some.start)
             for level, each in zip(levels[::-1], units[::-1], strict=True):
                 part = level.ravel()[at[some]]
                 if level is not levels[-1]:
                     part = np.rint(part)
                 high, lost = two_sum(part * (each * unit), high)
-                low += lost
+                low = low + lost
             return Pair(*two_sum(high, low))
 
         left = behind = 0.0  # norms of the products that `_levels` adds up in its last field
@@ -191,8 +178,7 @@ class Sliced:
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
         radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
-        radius = 1.01 * radius * unit + error + PAIR_ROUNDOFF * float(np.abs(change).max()) + TINY
-        return Ball.around(in_parts(len(at), add_up), radius)
+        return Ball.around(in_parts(len(at), add_up), 1.01 * radius * unit + TINY)
 
     @property
     def norm(self) -> float:

@@ -10,7 +10,6 @@ rounding errors about 2^-101.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from convexrough import threads
-from convexrough.arithmetic.balls import TINY, UP, Ball
+from convexrough.arithmetic.balls import TINY, UP, Ball, of_rows, quietly
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
 from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
@@ -53,6 +52,7 @@ class SlicedMatrix:
 
     slices : (m, n) the three parts
     blocks : the columns of each block, and the number of bits of first slices of its loads
+    exponent : the matrix is that of points divided by 2^exponent, so that their extent is about 1
     losses : (3 blocks, m) three factors for each block: of the largest load in the block, of the
         largest rest of a load after two slices, and of the largest rest after one slice. The sum of
         these products over all blocks bounds the error of a product with loads
@@ -60,14 +60,15 @@ class SlicedMatrix:
 
     slices: tuple[Array, Array, Array]
     blocks: list[tuple[slice, int]]
+    exponent: int
     losses: Array
 
     @classmethod
     def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
-        """The rows `rows` for points (n, 2) of extent about 1.
-
-        point_error : bound on the distance of each point from the exact point
-        """
+        """The rows `rows` for points (n, 2), with coordinate errors up to `point_error`."""
+        exponent = math.frexp(np.ptp(points.high, axis=0).max())[1]
+        points = Pair(*(np.ldexp(part, -exponent) for part in points))
+        point_error = math.sqrt(2.0) * math.ldexp(point_error, -exponent) * UP
         here, n = points.at(rows), len(points.high)
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
@@ -101,7 +102,7 @@ class SlicedMatrix:
         whole = ((few * ROUNDOFF) ** 2 + PAIR_ROUNDOFF + moved) * sizes.sum(axis=0)
         losses = np.stack((ordinary[2] + whole, ordinary[0], ordinary[1]), axis=1)
         blocks = [(slice(s, s + BLOCK), b) for s, b in zip(starts, bits, strict=True)]
-        return cls(slices, blocks, losses.reshape(-1, m) * UP)
+        return cls(slices, blocks, exponent, losses.reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
         """The matrix of the points with the increasing indices `which`; errors are not larger."""
@@ -109,10 +110,14 @@ class SlicedMatrix:
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
         columns = (slice(*edges) for edges in pairwise([0, *stops]))
         blocks = [(some, bits) for some, (_, bits) in zip(columns, self.blocks, strict=True)]
-        return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
+        losses = self.losses.take(which, 1)
+        return SlicedMatrix((first, second, rest), blocks, self.exponent, losses)
 
-    def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
-        """High parts, low parts and error bounds (..., m) of products with loads (..., n) <= 1."""
+    @quietly
+    def __matmul__(self, loads: Pair) -> Ball:
+        """The sums over j of P_j / r_ij in these rows, (..., m), for loads P (..., n)."""
+        scale = np.frexp(_most(loads.high))[1]
+        loads = Pair(*(np.ldexp(part, -scale) for part in loads))
         sums, rests, left_over = [], [], []
         for columns, bits in self.blocks:
             a, b, c = (part[:, columns].T for part in self.slices)
@@ -131,78 +136,57 @@ class SlicedMatrix:
         for exact in sums[1:]:
             high, error = two_sum(high, exact)
             low = low + error
-        return (*two_sum(high, low), np.concatenate(left_over, axis=-1) @ self.losses + TINY)
+        radius = np.concatenate(left_over, axis=-1) @ self.losses + TINY
+        parts = (*two_sum(high, low), radius)
+        high, low, radius = (np.ldexp(part, scale - self.exponent) for part in parts)
+        return Ball.around(Pair(high, low), radius * UP + TINY)
 
 
+@dataclass(frozen=True, eq=False)
 class MatrixSums:
-    """The sums over j of P_j / r_ij of points (n, 2), with coordinate errors up to `point_error`.
+    """The sums over j of P_j / r_ij of points (n, 2).
 
     A matrix of up to `KEPT` rows is cached. A larger matrix is computed again for each product.
+
+    point_error : [length] bound on the error of each coordinate
+    part_of     : the sums of more points, and the increasing indices of these points among them
     """
 
-    def __init__(self, points: Pair, point_error: float = 0.0) -> None:
-        self.points, self.point_error = points, point_error
-        self.whole: MatrixSums | None = None
-        self.which: Indices | None = None
+    points: Pair
+    point_error: float = 0.0
+    part_of: tuple[MatrixSums, Indices] | None = None
 
     def restricted(self, which: Indices) -> MatrixSums:
         """The same sums of some of the points only."""
-        if len(which) == len(self.points.high) and (which[1:] > which[:-1]).all():
+        increasing = bool((which[1:] > which[:-1]).all())
+        if increasing and len(which) == len(self.points.high):
             return self
-        part = MatrixSums(self.points.at(which), self.point_error)
-        if len(which) and (which[1:] > which[:-1]).all():
-            part.whole, part.which = self, which
-        return part
+        part_of = (self, which) if increasing and len(which) else None
+        return MatrixSums(self.points.at(which), self.point_error, part_of)
 
     def __call__(self, loads: Pair) -> Ball:
         """The sums (..., n) for loads (..., n)."""
         if loads.high.size == 0:
             return Ball.exact(loads)
-        with np.errstate(all="ignore"):
-            unit = np.frexp(_most(loads.high))[1]
-            loads = Pair(*(np.ldexp(part, -unit) for part in loads))
-            found = [matrix @ loads for matrix in self._matrices()]
-            parts = (
-                found[0]
-                if len(found) == 1
-                else (np.concatenate(x, -1) for x in zip(*found, strict=True))
-            )
-            high, low, radius = (np.ldexp(part, unit - self._scale) for part in parts)
-            return Ball.around(Pair(high, low), radius * UP + TINY)
-
-    def _matrices(self) -> Iterable[SlicedMatrix]:
         n = len(self.points.high)
         if n <= KEPT:
-            return (self._matrix,)
-        rows = threads.chunks(n, KEPT**2 // n)
-        return (SlicedMatrix.of(*self._scaled(some)) for some in rows)
+            return self._matrix @ loads
+        parts = (
+            SlicedMatrix.of(self.points, rows, self.point_error) @ loads
+            for rows in threads.chunks(n, KEPT**2 // n)
+        )
+        found: Ball = of_rows(lambda *each: np.concatenate(each, axis=-1), *parts)
+        return found
 
     @cached_property
     def _matrix(self) -> SlicedMatrix:
-        if self._of_whole:
-            assert self.whole is not None
-            assert self.which is not None
-            return self.whole._matrix.restricted(self.which)
-        return SlicedMatrix.of(*self._scaled(slice(0, None)))
-
-    @cached_property
-    def _of_whole(self) -> bool:
-        """True to use the matrix of all points, `whole`, because it is cached or small enough."""
-        if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
-            return False
-        return "_matrix" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
-
-    @cached_property
-    def _scale(self) -> int:
-        """The exponent k for which the points divided by 2^k have an extent of about 1."""
-        if self._of_whole:
-            assert self.whole is not None
-            return self.whole._scale
-        return math.frexp(np.ptp(self.points.high, axis=0).max())[1]
-
-    def _scaled(self, rows: slice) -> tuple[Pair, slice, float]:
-        points = Pair(*(np.ldexp(part, -self._scale) for part in self.points))
-        return points, rows, math.sqrt(2.0) * math.ldexp(self.point_error, -self._scale) * UP
+        """The matrix, taken from that of more points if this one is cached or small enough."""
+        if self.part_of is not None:
+            whole, which = self.part_of
+            few = len(whole.points.high) <= min(KEPT, max(SMALL, 2 * len(which)))
+            if few or "_matrix" in vars(whole):
+                return whole._matrix.restricted(which)
+        return SlicedMatrix.of(self.points, slice(0, None), self.point_error)
 
 
 def _unit(largest: Array) -> Array:

@@ -81,7 +81,7 @@ def weight(place: float, node: int, order: int) -> Fraction:
 def test_values_within_the_reach_and_beyond(order: int) -> None:
     product = assembled(order, disc(np.random.default_rng(1), 60))
     unit = 2.0 ** floor(log2(SPACING))
-    values = sharp.SoftValues.of(product, unit)
+    values = sharp.SoftValues.between(product, unit)
     assert len(values.near.high) == ceil((0.43 / SPACING) ** 2)
     i, j = np.arange(0, 20), np.arange(-14, 15)
     head, rest = values.at(i, j)
@@ -111,8 +111,7 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     points[0] = 0.7, 0.6
     product, loads = assembled(order, points), scattered_loads(rng, 300)
     weights, placed = product.weights, product.order
-    lows = sharp._low_weights(product)
-    field, error = sharp._to_nodes(product, lows, Pair.exact(loads[placed.places]))
+    field, error = sharp._to_nodes(product, Pair.exact(loads[placed.places]))
     plain = weights.to_nodes(loads[placed.places])
     assert field.high.shape == weights.shape
     missed = 0
@@ -148,8 +147,7 @@ def test_values_at_points(order: int) -> None:
     rest = rng.uniform(-1, 1, weights.shape) * 2.0**20
     nodes = Pair((whole * 2.0**-40).ravel(), (rest * 2.0**-40).ravel())
     on_mesh = Ball.exact(nodes)
-    lows = sharp._low_weights(product)
-    exactly, left, unit, rounding = sharp._from_nodes(product, lows, on_mesh)
+    exactly, left, unit, rounding = sharp._from_nodes(product, on_mesh)
     assert (exactly == np.rint(exactly)).all()
     plain = weights.from_nodes(whole + rest) * 2.0**-40
     missed = 0
