@@ -306,7 +306,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         # At larger loads H is at least this fraction of its value on the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
-        if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
+        if not (convex or box.convexity_at(problem.compliance(most)) < 1):
             return np.inf
     total = float(excess @ moved) + float(
         start.missing.size * max(found.approach.size, start.approach.size)

@@ -19,7 +19,7 @@ from convexrough.normal.boxes import Box
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.level import Level
 from convexrough.normal.load_control import approach_bound
-from convexrough.normal.problem import NormalProblem
+from convexrough.normal.problem import NormalProblem, convexity_number
 from convexrough.normal.proved import proved, solution_in
 from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
@@ -87,12 +87,13 @@ class Levels:
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or box is None:
             return [None] * len(loads)
-        some, levels, closed = max(1, NUMBERS // len(problem)), list[Level | None](), box.closed
+        some, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
+        closed = box.closed(problem)
         for start in range(0, len(loads), some):
             totals = loads[start : start + some]
             rows = [(slice(0, len(totals)), problem)]
             fixed = problem.exact, problem.shells, problem.squares
-            level, good = solved(Stack(rows, *fixed, totals[:, None], by_load=True), closed)
+            level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
             for k in range(len(totals)):
                 levels.append(level.row(k, problem.at_load(totals[k])) if good[k] else None)
         self._known |= {_key(level.load): level for level in levels if level is not None}
@@ -122,7 +123,7 @@ class Levels:
     def _sought(self, problem: NormalProblem, start: Array | None) -> Level:
         """The level proved near refined loads in the box of `top`."""
         state = refined_loads(problem, self._press(problem, start))
-        return proved(problem, state, self.top.box and iter((self.top.box.closed,)))
+        return proved(problem, state, self.top.box and iter((self.top.box.closed(problem),)))
 
 
 def _key(load: Ball) -> tuple[float, float, float]:
@@ -152,7 +153,7 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
 
 def pressed(stack: Stack) -> Array:
     """(m, n) loads by full steps of Newton's method; nan in rows that do not converge."""
-    state, before = Pressed.at(stack, on_hertz_pressure(stack)), np.full(len(stack), np.inf)
+    state, before = Pressed.at(stack, on_hertz_pressure(stack)), np.full(len(stack.control), np.inf)
     for _ in range(STEPS):
         size = np.linalg.norm(state.defect, axis=1)
         expected = np.where(np.isinf(before), size, (size / before) ** 2 * size)
@@ -177,5 +178,5 @@ def widest(stack: Stack, state: Trial) -> Box:
     alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
     corner = np.maximum(alone, state.loads.high)
     h = stack.compliance(corner)
-    nowhere, none = np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
-    return Box("global", stack, corner, h, stack.convexity_at(h), nowhere, none)
+    shells, nowhere, none = stack.shells, np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
+    return Box("global", shells, corner, h, convexity_number(shells, h), nowhere, none)

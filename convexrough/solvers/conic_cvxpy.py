@@ -8,12 +8,13 @@ approaches.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -205,7 +206,7 @@ class LiftedModel:
                 expected = f"approach control, and not above {normal.approach_bound:g}"
                 raise InputError("approach", found=approach, expected=expected)
             self.D0.value = approach
-            normal = replace(normal, approach=approach)
+            normal = normal.at_approach(Ball.exact(approach))
         return judged(self.settings, normal, self.boxes, self.answer())
 
     def answer(self) -> ProgramAnswer:
