@@ -23,7 +23,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices, even
+from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import largest, proved_margin, proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
@@ -122,40 +122,50 @@ class Box(NamedTuple):
         return self._replace(loads=loads, compliance=h, convexity_number=theta, faces=faces)
 
 
+def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
+    """The box that contains every solution, and `loads`; for a stack, one box for each row.
+
+    The shells of the problem prove the convexity if the convexity number is below 1.
+
+    highest : upper bound on the approach at every solution
+    """
+    corner = np.maximum(problem.bounds(highest), loads)
+    h, none = problem.compliance(corner), np.zeros(corner.shape, dtype=bool)
+    number, nowhere = convexity_number(problem.shells, h), np.full(corner.shape, np.inf)
+    return Box("global", problem.shells, corner, h, number, nowhere, none)
+
+
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
     """At most one box on which convexity is proved.
 
     It is the global box, which contains every solution, or else a local box, which contains
     `loads`.
 
-    displacement : (n,) A P for P = `loads`
+    displacement : (n,) upper bounds on A P for P = `loads`
     """
-    shells, highest = problem.shells, problem.overhang(loads, displacement)
-    corner = np.maximum(problem.bounds(highest), loads)  # the box must hold both states
-    h = problem.compliance(corner)
-    if problem.by_load and not convexity_number(shells, h) < 1:  # this bound costs more
-        corner = np.maximum(problem.bounds(min(highest, problem.approach_bound)), loads)
-        h = problem.compliance(corner)
-    nowhere, none = even(np.inf, len(problem)), np.zeros(len(problem), dtype=bool)
-    if (theta := convexity_number(shells, h)) < 1:
-        yield Box("global", shells, corner, h, theta, nowhere, none)
+    highest = problem.overhang(loads, displacement)
+    box = widest(problem, loads, highest)
+    if problem.by_load and not box.convexity_number < 1:  # this bound costs more
+        box = widest(problem, loads, min(highest, problem.approach_bound))
+    if not box.convexity_number < 1:
+        margin = convex_margin(problem.influence, box.compliance, MARGINS)
+        box = box._replace(convexity_number=1.0 - margin)
+    if box.convexity_number < 1:
+        yield box
         return
-    if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
-        yield Box("global", shells, corner, h, 1.0 - margin, nowhere, none)
-        return
-    theta = problem.convexity_number(loads)
+    shells, h = problem.shells, problem.compliance(loads)
+    theta = convexity_number(shells, h)
     if theta > FIT_FROM:
-        radii = problem.radii(problem.compliance(loads))
-        fitted = fitted_shells(problem.influence, radii, FITTED)
-        if (number := float(convexity_number(fitted, problem.compliance(loads)))) < theta:
+        fitted = fitted_shells(problem.influence, problem.radii(h), FITTED)
+        if (number := convexity_number(fitted, h)) < theta:
             shells, theta = fitted, number
     if theta < 1:
         theta = (1.0 + theta) / 2.0
         # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
         faces = (2.0 / 3.0 * problem.coefficients * theta / shells) ** 3
-        local = np.minimum(corner, faces)
-        beyond = np.where(faces < corner, faces, np.inf)
-        yield Box("local", shells, local, problem.compliance(local), theta, beyond, none)
+        local = np.minimum(box.loads, faces)
+        h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
+        yield Box("local", shells, local, h, theta, beyond, box.fixed_open)
 
 
 def box_of_touching(

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.errors import ProofError, SolverError
-from convexrough.normal.boxes import Box
+from convexrough.normal.boxes import Box, widest
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.level import Level
-from convexrough.normal.load_control import approach_bound
-from convexrough.normal.problem import NormalProblem, convexity_number
+from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved, solution_in
-from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
+from convexrough.normal.refine import defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import ROUNDOFF
 
 #: Largest number of candidates for which levels are solved together: for more candidates this saves
 #: no time.
@@ -137,12 +136,14 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
     A row counts as proved only if, in addition, its residual is near its rounding error and the
     status of every asperity is proved.
 
-    box : one box for all rows; default: a box for each row, by `widest`
+    box : one box for all rows; default: for each row the `widest`
     """
     loads = pressed(stack)
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
     state = refined_loads(stack, finite)
-    box = widest(stack, state) if box is None else box
+    if box is None:
+        loads = state.loads.high
+        box = widest(stack, loads, stack.overhang(loads, state.product.upper))
     inside, _, level = solution_in(stack, box, state)
     good = inside & np.ravel(box.convexity_number < 1)
     good &= np.isfinite(level.loads.radius).all(axis=1) & (level.touching | level.open).all(axis=1)
@@ -163,20 +164,3 @@ def pressed(stack: Stack) -> Array:
         step = stack.correct(state.slopes, state.defect, 0.0, todo)
         state, before = Pressed.at(stack, state.unknown + step), size
     return np.where(np.isfinite(size)[:, None], state.loads, np.nan)
-
-
-def widest(stack: Stack, state: Trial) -> Box:
-    """For each row the box that contains every solution and the loads of `state`.
-
-    `NormalProblem.shells` give its convexity number.
-    """
-    highest = stack.control.upper
-    if stack.by_load:
-        given = stack.coefficients, stack.exact.offsets.lower, highest
-        highest = approach_bound(state.loads.high, state.product.upper, *given)
-    depth = np.maximum(highest + stack.exact.offsets.upper, 0.0)
-    alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
-    corner = np.maximum(alone, state.loads.high)
-    h = stack.compliance(corner)
-    shells, nowhere, none = stack.shells, np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
-    return Box("global", shells, corner, h, convexity_number(shells, h), nowhere, none)

@@ -409,21 +409,19 @@ class NormalProblem:
             offsets = offsets - square_sum(*points[:, axes].T) / (far + far)
         return offsets
 
-    def overhang(self, weights: Array, displacement: Array) -> float:
-        """An upper bound on D0 at every solution.
+    def overhang(self, weights: Array, displacement: Array) -> Any:
+        """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
         It is `highest` or, under load control, the result of `load_control.approach_bound` if that
         is smaller.
 
         weights      : (n,) approximate loads, not negative, not all 0
-        displacement : (n,) A times weights
+        displacement : (n,) upper bounds on A times weights
         """
         if not self.by_load:
             return self.highest
-        displacement = displacement + self.influence.rounding(weights).of(displacement)
-        least = self.offsets - self.offset_errors
-        found = approach_bound(weights, displacement, self.coefficients, least, self.load)
-        return min(self.highest, float(found))
+        given = self.coefficients, self.offsets - self.offset_errors, self.load
+        return np.minimum(self.highest, approach_bound(weights, displacement, *given))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""

@@ -33,10 +33,6 @@ CORRECTIONS = 12
 #: A correction aims to reduce the residual to this fraction of the residual's rounding error.
 ENOUGH = 0.1
 
-#: If the sum of the loads misses the total by less than this part, only the largest load is
-#: changed; otherwise all loads are scaled first. A heuristic.
-FITS = 1e-6
-
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
 
@@ -180,24 +176,18 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
     return trial(problem, following, missing, product)
 
 
-def scaled(problem: NormalProblem, loads: Pair) -> Pair:
-    """The loads scaled to the prescribed total, if there is one and any load is positive."""
-    if problem.load is None or not loads.high.any():
-        return loads
-    power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
-    loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-    return loads * (problem.control.mid / sums(loads))
-
-
 def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads, changed to have the prescribed total, and a ball of the remaining difference."""
+    """The loads, scaled to the prescribed total, and a ball of the remaining difference.
+
+    The largest load takes up the rounding errors of the other loads.
+    """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.control
-    if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
-        loads = scaled(problem, loads)
-    completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
+    power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
+    loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
+    completed, n = loads * (problem.control.mid / sums(loads)), loads.high.shape[-1]
     rows = Pair(*(part.reshape(-1, n) for part in completed))  # views
     missing = _missing(rows, problem.control.mid)
     largest_ones = np.arange(len(rows.high)), rows.high.argmax(axis=1)

@@ -43,6 +43,8 @@ class Stack(NormalProblem):
         given = {each.name: getattr(first, each.name) for each in fields(first)} | {
             "coefficients": exact.coefficients.value,
             "offsets": exact.offsets.value,
+            "offset_errors": exact.offsets.error,
+            "highest": np.inf if by_load else control.upper,
             "shells": shells,
             "control": control,
             "by_load": by_load,

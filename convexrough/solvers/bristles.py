@@ -42,6 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
@@ -199,7 +200,7 @@ class BristleProgram:
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
     """The upper ends B (n,); a mask (n,), True where B was cut; and the matrix A + diag(h)."""
     trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
-    approach_bound = problem.overhang(trial, problem.apply(trial))
+    approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)).upper)
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
     box = problem.bounds(approach_bound)
