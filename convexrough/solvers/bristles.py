@@ -86,6 +86,11 @@ class BristleQP:
 
     Raises TooDenseError where contacts are too crowded for a convex program, and SolverError where
     OSQP is missing or does not solve the program.
+
+    >>> rough = cr.solvers.BristleQP(bristles=16, newton_step=False)
+    >>> found = cr.press(scene, approach=5e-5, solver=rough)
+    >>> print(f"{abs(found.loads - contact.loads).max() / contact.loads.max():.1e}")
+    1.0e-03
     """
 
     bristles: int = 64
@@ -101,6 +106,7 @@ class BristleQP:
 
     @property
     def name(self) -> str:
+        """The name in results and messages."""
         return "bristles + Newton step" if self.newton_step else "bristles"
 
     def solve(
