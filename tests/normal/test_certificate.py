@@ -1,11 +1,8 @@
 """The certificate under attack: whatever it is given, no status and no bound may be wrong."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from attacks import ATTACKS, assert_honest, attack, excess
-from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -297,20 +294,13 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
     assert 0 < above <= gap <= 1.01 * above + contact.certificate.duality_gap
 
 
-def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
-    """As `assert_honest`, without the rounding of a difference."""
-    with ctx.workprec(4096):
-        for load, true, bound in zip(loads, exact.loads, certificate.load_errors, strict=True):
-            assert abs(arb(float(load)) - true) <= arb(float(bound))
-
-
 @pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
     scene = paper()
     load = cr.press(scene, approach=PAPER_APPROACH).load
     given = factor * cr.press(scene, load=load).loads
-    assert_loads_within(cr.certify(scene, given, load=load), given, reference(scene, load=load))
+    assert_honest(cr.certify(scene, given, load=load), given, reference(scene, load=load))
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])
@@ -325,4 +315,4 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
     open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(given))
     assert len(open_ones)
     given[open_ones] = 5e-324
-    assert_loads_within(cr.certify(scene, given, **prescribed), given, exact)
+    assert_honest(cr.certify(scene, given, **prescribed), given, exact)
