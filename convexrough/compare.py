@@ -67,6 +67,10 @@ class Entry(Record):
     memory : [bytes] largest increase of the resident memory of the process, which does not count
         memory that the allocator reused; None if there is no solution, or if the system is not
         Linux
+
+    >>> reference, found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"]).entries
+    >>> found.outcome, found.disagreement < 1e-9, found.different_statuses
+    ('answered', True, 0)
     """
 
     solver: str
@@ -87,6 +91,10 @@ class Comparison(Table, Plottable):
     contradictions : a sentence for each contradiction between two certified results of which at
         least one has global scope. Each contradiction shows a mistake in the mathematics or in the
         code
+
+    >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
+    >>> len(found.contacts), found.certified, found.disagreeing(within=1e-9)
+    (2, True, {})
     """
 
     entries: tuple[Entry, ...]
@@ -159,6 +167,10 @@ def compare(
 
     Raises InputError if the reference refuses the input. Errors of the other solvers are reported
     in their entries.
+
+    >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
+    >>> [entry.outcome for entry in found.entries], found.contradictions
+    (['answered', 'answered'], ())
     """
     others = every_solver() if solvers is None else [*map(named, solvers)]
     pressed = partial(press, scene, approach=approach, load=load, influence=influence)
@@ -187,6 +199,9 @@ def every_solver() -> tuple[solvers.Solver, ...]:
     """All solvers of the package, and SCS and QOCO through CVXPY if installed.
 
     Those of the package that end with a Newton step are also used without this step.
+
+    >>> [solver.name for solver in cr.compare.every_solver()][:3]
+    ['newton', 'conic + Newton step', 'conic']
     """
     return (
         solvers.Newton(),
@@ -207,6 +222,9 @@ def solver_named(name: str) -> solvers.Solver:
         the path of a class, such as "mine.Solver", of which an instance is made without arguments
 
     Raises InputError if there is no such solver.
+
+    >>> cr.compare.solver_named("conic") == cr.solvers.Conic()
+    True
     """
     module, _, attribute = name.rpartition(".")
     if not module:
@@ -293,6 +311,11 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     Two results contradict each other if loads, gaps or approaches differ by more than the sum of
     their bounds, or if one proves that an asperity touches and the other that it is open. A result
     without a proof contradicts nothing.
+
+    >>> one = cr.compare.Answer.of(contact)
+    >>> other = one._replace(name="another", loads=1.1 * contact.loads)
+    >>> [line.partition(" of ")[0] for line in cr.compare.contradictions(one, other)]
+    ['newton and another: loads']
     """
     one, other = first.certificate, second.certificate
     if "none" in (one.scope, other.scope):

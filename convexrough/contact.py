@@ -129,8 +129,12 @@ class Contact(Cached, Table, Plottable):
             includes the state at the shear force Q and the loss of the cycle between +Q and -Q; the
             sign of Q does not matter
 
-        Raises InputError for scenes too large for exact arithmetic, and ProofError if nothing is
-        proved, as for states whose `order` is "fails".
+        docs/theory/proof-file.md describes the file. Raises InputError for scenes too large for
+        exact arithmetic, and ProofError if nothing is proved, as for states whose `order` is
+        "fails".
+
+        >>> print(contact.proof().proved.splitlines()[0])
+        proved: under the approach 5e-05 there is a solution, the only one
         """
         from convexrough.proof import NearState, prove, refuse_many  # a higher layer
 
@@ -174,6 +178,8 @@ class Contact(Cached, Table, Plottable):
     ) -> Gradient:
         """Derivatives of a weighted sum of results with respect to the scene, by one linear system.
 
+        docs/theory/gradients.md derives them.
+
         loads, gaps    : (n,) weights of the asperities' loads and gaps
         approach, load : weights of the approach and the total load
         holding        : quantity kept constant, "load" or "approach"; default: the prescribed one
@@ -192,7 +198,13 @@ class Contact(Cached, Table, Plottable):
     def change(self, direction: Direction) -> ContactChange:
         """First-order changes of loads, gaps and approach when the scene changes by `direction`.
 
+        direction : changes of the scene and of the prescribed quantity
+
         Raises InputError and SolverError as `gradient` does.
+
+        >>> change = contact.change(cr.Direction(heights=1e-9))
+        >>> change.loads.shape, change.load > 0
+        ((61,), True)
         """
         from convexrough.gradients.change import contact_change  # a higher layer
 

@@ -41,6 +41,8 @@ class Contacts(Table):
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()
     ((2, 61), [37, 7])
+    >>> bool(contacts[0].load == contacts.loads[0])
+    True
     """
 
     _along: ClassVar[Along] = {
@@ -178,7 +180,8 @@ def press_many(
 
     approach [length] or load [force] : the prescribed quantity, (m,) or one number for all scenes
 
-    Raises InputError for scenes with different numbers of asperities, and the errors of `press`.
+    The result is the same as that of `press` for each scene. Raises InputError for scenes with
+    different numbers of asperities, and the errors of `press`.
 
     >>> contacts = cr.press_many([scene, scene], load=[3e-7, 2e-7])
     >>> bool((contacts[1].loads == contacts.asperity_loads[1]).all())

@@ -93,6 +93,11 @@ class Proof(Record):
 
     document : contents of the proof file (docs/theory/proof-file.md)
     proved   : summary in sentences, as the checker prints it
+
+    >>> proof = cr.press(scene, approach=1e-6).proof()
+    >>> proof.document["claims"]["scope"], "1 contact, 60 open" in proof.proved
+    ('global', True)
+    >>> proof.save(folder / "proof.json")
     """
 
     document: dict[str, Any]
@@ -102,6 +107,8 @@ class Proof(Record):
         """Write the file that `convexrough check` and `python checker.py` read.
 
         path : file name; if writing fails, an existing file remains unchanged
+
+        Raises FileError if the file cannot be written.
         """
         with replacing(Path(path)) as temporary:
             temporary.write_text(json.dumps(self.document, indent=0) + "\n", encoding="utf-8")

@@ -84,8 +84,8 @@ class PressedRows(NamedTuple):
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
         total = where(inside, total, high.load)[:, None]  # rows not `inside` are not proved
-        rows = replace(self.stack, control=total, by_load=True)
-        level, good = solved(rows, self.box.closed)
+        rows = self.stack.at_load(total)
+        level, good = solved(rows, self.box.closed(rows))
         low = level.rows
         ordered = proved_in_rows(rows, self.box, high, low)
         slip, slide = asperity_losses(high, low)
@@ -176,12 +176,12 @@ def _proved(
     shelled = np.concatenate(wells)
     exact = Data(joined(known), joined(offsets), first.exact.scale)
     squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
-    rows = Stack(coupled, exact, shelled, squares, given, by_load)
+    rows = Stack.of(coupled, exact, shelled, squares, given, by_load)
     level, proved = solved(rows)
     good = np.flatnonzero(proved)
     if len(good) and level.box is not None:
-        some = rows.only(good)
-        yield PressedRows(places[good], first, some, level.box.at(good, some), level.rows.at(good))
+        some = rows.only(good), level.box.at(good), level.rows.at(good)
+        yield PressedRows(places[good], first, *some)
 
 
 def _repeated(values: Array, shape: tuple[int, int]) -> Array:

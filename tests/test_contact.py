@@ -6,6 +6,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
+from attacks import assert_honest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -68,22 +69,27 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     scene, approach = NAMED[name]
     prescribed = {control: {"approach": approach, "load": total(name)}[control]}
     contact = cr.press(scene, **prescribed, influence=kind)
-    exact = reference(scene, **prescribed)
+    certificate, exact = contact.certificate, reference(scene, **prescribed)
     assert contact.influence == kind
+    assert (certificate.scope, certificate.holds) == ("global", True)
+    assert_honest(certificate, contact.loads, exact)
     truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
     assert (truth <= 1e-13 * contact.loads).all()
     assert truth.max() < 1e-14 * contact.loads.max()
-    gap_errors = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
-    assert gap_errors.max() < 1e-13 * contact.gaps.max()
-    certificate = contact.certificate
-    assert certificate.scope == "global"
-    assert certificate.holds
-    assert (truth <= certificate.load_errors).all()
-    assert (gap_errors <= certificate.gap_errors).all()
+    assert (
+        np.abs(multiprecision.errors(contact.gaps, exact.gaps)).max() < 1e-13 * contact.gaps.max()
+    )
     assert certificate.load_error <= LOOSE[kind] * truth.max()
     assert certificate.load_error <= 1e-11 * contact.loads.max()
     drift = abs(float(multiprecision.errors([contact.approach], [exact.approach])[0]))
-    assert drift <= min(certificate.approach_error, 1e-14 * contact.approach)
+    assert drift <= 1e-14 * contact.approach
+    rounded = np.array([float(load) for load in exact.loads])
+    known = cr.certify(scene, rounded, **prescribed, influence=kind)
+    assert known.holds
+    assert_honest(known, rounded, exact)
+    if kind != "scattered":  # known to half a unit in the last place
+        half = 2.0**-53 * rounded * (1 + 1e-9) + 1e-24 * rounded.max()
+        assert (known.load_errors <= half).all()
 
 
 def total(name: str) -> float:
@@ -95,12 +101,19 @@ def total(name: str) -> float:
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMED)
 def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
-    """Nor do loads, to within what is proved of each."""
+    """Nor do loads, to within what is proved of each; nor does it matter which solver found them.
+
+    What a solver knows of its loads saves work, and hardly changes what is proved. Balls that are
+    subtracted count underflow: a load that is known to be 0 is so to 1e-300 of the total.
+    """
     scene, approach = NAMED[name]
     first, *others = (
         cr.press(scene, approach=approach, influence=kind) for kind in operators(scene)
     )
     for other in others:
+        again = cr.certify(scene, other.loads, approach=approach, influence=other.influence)
+        known, least = other.certificate.load_errors, 1e-300 * other.load
+        assert_allclose(again.load_errors, known, rtol=0.02, atol=least)
         assert (other.status == first.status).all()
         apart = np.abs(other.loads - first.loads)
         assert (apart <= first.certificate.load_errors + other.certificate.load_errors).all()

@@ -18,18 +18,16 @@ is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices, even
+from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import largest, proved_margin, proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import Stack
+from convexrough.normal.problem import NormalProblem, convexity_number
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
@@ -80,17 +78,17 @@ class Box(NamedTuple):
     """A box of loads, and the convexity of the energy on it; for one problem or for a stack."""
 
     scope: Scope  # "global" if every solution lies in the box
-    problem: NormalProblem | Stack  # its shells may prove the convexity
+    shells: Array  # (n,) 1 / (pi E* s_i) of shells, which may prove the convexity
     loads: Array  # (n,) upper ends of the box; the lower ends are 0
     compliance: Array  # (n,) h at the upper ends
     convexity_number: Any  # 1 - mu
     faces: Array  # (n,) the proof must show that loads are below these; infinite where not needed
     fixed_open: NDArray[np.bool_]  # (n,) True where assumed open, which the proof must then show
 
-    def at(self, rows: Indices, problem: Stack) -> Box:
-        """The boxes of some rows of a stack, with `problem` as the stack of these rows."""
+    def at(self, rows: Indices) -> Box:
+        """The boxes of some rows of a stack."""
         return self._replace(
-            problem=problem,
+            shells=self.shells[rows],
             loads=self.loads[rows],
             compliance=self.compliance[rows],
             convexity_number=self.convexity_number[rows],
@@ -98,10 +96,13 @@ class Box(NamedTuple):
             fixed_open=self.fixed_open[rows],
         )
 
-    @property
+    def convexity_at(self, compliance: Array) -> Any:
+        """The convexity number that the shells prove where this is the compliance."""
+        return convexity_number(self.shells, compliance)
+
     @np.errstate(divide="ignore", invalid="ignore")
-    def closed(self) -> Box:
-        """A box that contains this one, to be tried at another load or approach.
+    def closed(self, problem: NormalProblem) -> Box:
+        """A box that contains this one, to be tried at another load or approach of `problem`.
 
         The solution at the other load or approach may lie outside this box. So `faces` holds the
         upper ends, and the proof must show that the loads are below them. If shells prove the
@@ -110,15 +111,28 @@ class Box(NamedTuple):
         of the box, if that load is larger. So asperities at the rim of the contact, whose loads are
         small, get upper ends far above the error bounds of their loads, too.
         """
-        it, theta = self.problem, self.convexity_number
-        ends = (2.0 / 3.0 * it.coefficients * theta / it.shells) ** 3
-        shelled = it.convexity_at(self.compliance) <= theta * (1 + 4 * SAFETY)
+        theta = self.convexity_number
+        ends = (2.0 / 3.0 * problem.coefficients * theta / self.shells) ** 3
+        shelled = self.convexity_at(self.compliance) <= theta * (1 + 4 * SAFETY)
         wider = shelled & (self.loads > 0) & (ends > self.loads) & np.isfinite(ends)
         loads = np.where(wider, ends, self.loads)
-        h = np.where(wider, it.compliance(loads), self.compliance)
-        theta = np.where(shelled, np.maximum(theta, it.convexity_at(h)), theta)
+        h = np.where(wider, problem.compliance(loads), self.compliance)
+        theta = np.where(shelled, np.maximum(theta, self.convexity_at(h)), theta)
         faces = np.where(loads > 0, loads, np.inf)
         return self._replace(loads=loads, compliance=h, convexity_number=theta, faces=faces)
+
+
+def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
+    """The box that contains every solution, and `loads`; for a stack, one box for each row.
+
+    The shells of the problem prove the convexity if the convexity number is below 1.
+
+    highest : upper bound on the approach at every solution
+    """
+    corner = np.maximum(problem.bounds(highest), loads)
+    h, none = problem.compliance(corner), np.zeros(corner.shape, dtype=bool)
+    number, nowhere = convexity_number(problem.shells, h), np.full(corner.shape, np.inf)
+    return Box("global", problem.shells, corner, h, number, nowhere, none)
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
@@ -127,34 +141,31 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
     It is the global box, which contains every solution, or else a local box, which contains
     `loads`.
 
-    displacement : (n,) A P for P = `loads`
+    displacement : (n,) upper bounds on A P for P = `loads`
     """
     highest = problem.overhang(loads, displacement)
-    corner = np.maximum(problem.bounds(highest), loads)  # the box must hold both states
-    h = problem.compliance(corner)
-    if problem.by_load and not problem.convexity_at(h) < 1:  # this bound costs more
-        corner = np.maximum(problem.bounds(min(highest, problem.approach_bound)), loads)
-        h = problem.compliance(corner)
-    nowhere, none = even(np.inf, len(problem)), np.zeros(len(problem), dtype=bool)
-    if (theta := problem.convexity_at(h)) < 1:
-        yield Box("global", problem, corner, h, theta, nowhere, none)
+    box = widest(problem, loads, highest)
+    if problem.by_load and not box.convexity_number < 1:  # this bound costs more
+        box = widest(problem, loads, min(highest, problem.approach_bound))
+    if not box.convexity_number < 1:
+        margin = convex_margin(problem.influence, box.compliance, MARGINS)
+        box = box._replace(convexity_number=1.0 - margin)
+    if box.convexity_number < 1:
+        yield box
         return
-    if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
-        yield Box("global", problem, corner, h, 1.0 - margin, nowhere, none)
-        return
-    theta = problem.convexity_number(loads)
+    shells, h = problem.shells, problem.compliance(loads)
+    theta = convexity_number(shells, h)
     if theta > FIT_FROM:
-        radii = problem.radii(problem.compliance(loads))
-        fitted = replace(problem, shells=fitted_shells(problem.influence, radii, FITTED))
-        if (number := fitted.convexity_number(loads)) < theta:
-            problem, theta = fitted, number
+        fitted = fitted_shells(problem.influence, problem.radii(h), FITTED)
+        if (number := convexity_number(fitted, h)) < theta:
+            shells, theta = fitted, number
     if theta < 1:
         theta = (1.0 + theta) / 2.0
         # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
-        faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
-        local = np.minimum(corner, faces)
-        beyond = np.where(faces < corner, faces, np.inf)
-        yield Box("local", problem, local, problem.compliance(local), theta, beyond, none)
+        faces = (2.0 / 3.0 * problem.coefficients * theta / shells) ** 3
+        local = np.minimum(box.loads, faces)
+        h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
+        yield Box("local", shells, local, h, theta, beyond, box.fixed_open)
 
 
 def box_of_touching(
@@ -173,13 +184,12 @@ def box_of_touching(
     h = problem.compliance(box)
     shells = np.zeros(len(h))
     shells[which] = fitted_shells(influence, problem.radii(h[which]), FITTED)
-    shelled = replace(problem, shells=shells)
-    number = shelled.convexity_at(h)
+    number = convexity_number(shells, h)
     if not number < 1:
         number = 1.0 - crowded_margin(influence, h[which])
     if not number < 1:
         return None
-    return Box("local", shelled, box, h, number, np.where(touching, box, np.inf), ~touching)
+    return Box("local", shells, box, h, number, np.where(touching, box, np.inf), ~touching)
 
 
 def crowded_margin(influence: Influence, compliance: Array) -> float:

@@ -24,7 +24,7 @@ from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, completed, refined, scaled, trial
+from convexrough.normal.refine import Trial, completed, refined, trial
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -182,7 +182,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
-    pair, missing = completed(problem, scaled(problem, Pair.exact(given)))
+    pair, missing = completed(problem, Pair.exact(given))
     start = trial(problem, pair, missing, problem.pressed_product(pair))
     level = proved(problem, start)
     if len(problem):
@@ -306,7 +306,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         # At larger loads H is at least this fraction of its value on the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
-        if not (convex or box.problem.convexity_at(problem.compliance(most)) < 1):
+        if not (convex or box.convexity_at(problem.compliance(most)) < 1):
             return np.inf
     total = float(excess @ moved) + float(
         start.missing.size * max(found.approach.size, start.approach.size)

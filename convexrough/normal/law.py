@@ -7,17 +7,13 @@ offsets plus the approach.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough.arrays import Array, summed
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import Stack
 from convexrough.sphere import hertz
-
-#: One problem, or a stack with one problem in each row.
-Problem: TypeAlias = NormalProblem | Stack
 
 #: An estimate of the squared contact radius of a rough sphere, divided by that of a smooth sphere.
 #: The estimate affects speed only.
@@ -43,7 +39,7 @@ class Pressed(NamedTuple):
     approach: Any
 
     @classmethod
-    def at(cls, problem: Problem, indentation: Array) -> Pressed:
+    def at(cls, problem: NormalProblem, indentation: Array) -> Pressed:
         """The loads at indentations; one must be positive if a load is prescribed."""
         own = np.maximum(indentation, 0.0)
         ratio = own / problem.coefficients
@@ -74,7 +70,7 @@ class Pressed(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def on_hertz_pressure(problem: Problem) -> Array:
+def on_hertz_pressure(problem: NormalProblem) -> Array:
     """Initial indentations D - A P for loads P distributed like the pressure of a sphere.
 
     P = x^3 s with s = (1 - r^2 / a^2)^(1/2), where r is the distance from the axis and a an
@@ -105,7 +101,7 @@ def on_hertz_pressure(problem: Problem) -> Array:
     return np.asarray(prescribed - np.where(work > 0, x, 0.0) ** 3 * displacement)
 
 
-def smooth_reach(problem: Problem) -> Any:
+def smooth_reach(problem: NormalProblem) -> Any:
     """[length^2] squared contact radius of a smooth body; infinite if the body is flat."""
     scene, units = problem.scene, problem.units
     radius = scene.mean_radius
@@ -113,6 +109,5 @@ def smooth_reach(problem: Problem) -> Any:
         return np.inf
     if problem.approach is not None:
         return radius * np.maximum(problem.approach, 0.0) * units.length
-    assert problem.load is not None
     modulus = scene.material.contact_modulus
     return hertz.contact_radius(problem.load * units.force, modulus, radius) ** 2

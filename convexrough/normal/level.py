@@ -217,7 +217,7 @@ class Level:
             with np.errstate(divide="ignore"):
                 known = np.maximum(self.compliance, (1.0 - SAFETY) / stiffness.upper)
             bound = np.where(self.open, np.inf, known)
-            convexity = self.box.problem.convexity_at(bound)
+            convexity = self.box.convexity_at(bound)
             margin = 1.0 - min(self.box.convexity_number, convexity)
         one, zero = (Ball.exact(np.full(len(touching), x)) for x in (1.0, 0.0))
         compliance = where(touching, 1.0 / where(touching, stiffness, one), zero)

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.errors import ProofError, SolverError
-from convexrough.normal.boxes import Box
+from convexrough.normal.boxes import Box, widest
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.level import Level
-from convexrough.normal.load_control import approach_bound
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved, solution_in
-from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
+from convexrough.normal.refine import defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import ROUNDOFF
 
 #: Largest number of candidates for which levels are solved together: for more candidates this saves
 #: no time.
@@ -87,12 +86,13 @@ class Levels:
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or box is None:
             return [None] * len(loads)
-        some, levels, closed = max(1, NUMBERS // len(problem)), list[Level | None](), box.closed
+        some, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
+        closed = box.closed(problem)
         for start in range(0, len(loads), some):
             totals = loads[start : start + some]
             rows = [(slice(0, len(totals)), problem)]
             fixed = problem.exact, problem.shells, problem.squares
-            level, good = solved(Stack(rows, *fixed, totals[:, None], by_load=True), closed)
+            level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
             for k in range(len(totals)):
                 levels.append(level.row(k, problem.at_load(totals[k])) if good[k] else None)
         self._known |= {_key(level.load): level for level in levels if level is not None}
@@ -122,7 +122,7 @@ class Levels:
     def _sought(self, problem: NormalProblem, start: Array | None) -> Level:
         """The level proved near refined loads in the box of `top`."""
         state = refined_loads(problem, self._press(problem, start))
-        return proved(problem, state, self.top.box and iter((self.top.box.closed,)))
+        return proved(problem, state, self.top.box and iter((self.top.box.closed(problem),)))
 
 
 def _key(load: Ball) -> tuple[float, float, float]:
@@ -136,12 +136,14 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
     A row counts as proved only if, in addition, its residual is near its rounding error and the
     status of every asperity is proved.
 
-    box : one box for all rows; default: a box for each row, by `widest`
+    box : one box for all rows; default: for each row the `widest`
     """
     loads = pressed(stack)
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
     state = refined_loads(stack, finite)
-    box = widest(stack, state) if box is None else box
+    if box is None:
+        loads = state.loads.high
+        box = widest(stack, loads, stack.overhang(loads, state.product.upper))
     inside, _, level = solution_in(stack, box, state)
     good = inside & np.ravel(box.convexity_number < 1)
     good &= np.isfinite(level.loads.radius).all(axis=1) & (level.touching | level.open).all(axis=1)
@@ -152,7 +154,7 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
 
 def pressed(stack: Stack) -> Array:
     """(m, n) loads by full steps of Newton's method; nan in rows that do not converge."""
-    state, before = Pressed.at(stack, on_hertz_pressure(stack)), np.full(len(stack), np.inf)
+    state, before = Pressed.at(stack, on_hertz_pressure(stack)), np.full(len(stack.control), np.inf)
     for _ in range(STEPS):
         size = np.linalg.norm(state.defect, axis=1)
         expected = np.where(np.isinf(before), size, (size / before) ** 2 * size)
@@ -162,20 +164,3 @@ def pressed(stack: Stack) -> Array:
         step = stack.correct(state.slopes, state.defect, 0.0, todo)
         state, before = Pressed.at(stack, state.unknown + step), size
     return np.where(np.isfinite(size)[:, None], state.loads, np.nan)
-
-
-def widest(stack: Stack, state: Trial) -> Box:
-    """For each row the box that contains every solution and the loads of `state`.
-
-    `NormalProblem.shells` give its convexity number.
-    """
-    highest = stack.control.upper
-    if stack.by_load:
-        given = stack.coefficients, stack.exact.offsets.lower, highest
-        highest = approach_bound(state.loads.high, state.product.upper, *given)
-    depth = np.maximum(highest + stack.exact.offsets.upper, 0.0)
-    alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
-    corner = np.maximum(alone, state.loads.high)
-    h = stack.compliance(corner)
-    nowhere, none = np.full(h.shape, np.inf), np.zeros(h.shape, dtype=bool)
-    return Box("global", stack, corner, h, stack.convexity_at(h), nowhere, none)

@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,11 +108,12 @@ class NormalProblem:
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
     shells        : (n,) 1 / (pi E* s_i) with the contact modulus E*. The radii s_i are so small
         that A + diag(shells) is positive semidefinite
-    approach      : D0, or None under load control
-    load          : total load, or None under approach control
+    control       : the prescribed load if `by_load` is True, else the prescribed approach D0
     highest       : upper bound on D0 at any solution; if it is infinite, `approach_bound` computes
         a bound when one is needed
-    exact_control : the prescribed number as a ball; None if it is a float64 number
+
+    A stack (`normal.stack.Stack`) is many problems, one per row. Its arrays are (m, n), or (n,)
+    where all rows are equal, and its `control` is (m, 1).
     """
 
     scene: Scene
@@ -123,10 +124,9 @@ class NormalProblem:
     offset_errors: Array
     influence: Influence
     shells: Array
-    approach: float | None
-    load: float | None
+    control: Ball
+    by_load: bool
     highest: float
-    exact_control: Ball | None = None
 
     def __post_init__(self) -> None:
         # A solver, which may be any class, gets these arrays, and later the proof uses them.
@@ -159,38 +159,36 @@ class NormalProblem:
     @cached_property
     def approach_bound(self) -> float:
         """An upper bound on D0 at every solution."""
-        if self.load is None or self.highest < np.inf:
+        if not self.by_load or self.highest < np.inf:
             return self.highest
         load = self.load * self.units.force
         return highest_approach(self.scene, load, self.influence.name) / self.units.length
 
-    @property
-    def by_load(self) -> bool:
-        """True if the total load is prescribed, not the approach."""
-        return self.load is not None
+    @cached_property
+    def load(self) -> Any:
+        """The prescribed load, a number or (m, 1) for a stack; None under approach control."""
+        return _numbers(self.control) if self.by_load else None
 
     @cached_property
-    def control(self) -> Ball:
-        """The prescribed load or approach as a ball."""
-        given = self.approach if self.load is None else self.load
-        assert given is not None
-        return Ball.exact(given) if self.exact_control is None else self.exact_control
+    def approach(self) -> Any:
+        """The prescribed approach D0, a number or (m, 1); None under load control."""
+        return None if self.by_load else _numbers(self.control)
 
-    def at_load(self, load: Ball) -> NormalProblem:
+    def at_load(self, load: Ball) -> Self:
         """The problem of the same asperities under a total load.
 
         The approach under this load must be at most `approach_bound`.
         """
-        return self._like(approach=None, load=float(load.value), exact_control=load)
+        return self._at(load, by_load=True)
 
-    def at_approach(self, approach: Ball) -> NormalProblem:
+    def at_approach(self, approach: Ball) -> Self:
         """The problem of the same asperities at an approach of at most `approach_bound`."""
-        return self._like(approach=float(approach.value), load=None, exact_control=approach)
+        return self._at(approach, by_load=False)
 
-    def _like(self, **changed: Any) -> NormalProblem:
-        """A problem of the same asperities, with the cached data of this one."""
-        other = replace(self, **changed)
-        for name in ("exact", "row_norm", "largest_entry"):
+    def _at(self, control: Ball, by_load: bool) -> Self:
+        """The problem with another control, and with the cached data of this one."""
+        other = replace(self, control=control, by_load=by_load)
+        for name in ("exact", "squares", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
 
@@ -257,7 +255,7 @@ class NormalProblem:
             taken(self.shells, some),
             np.sqrt(slopes[some]),
             defect[some],
-            balanced=self.load is not None,
+            balanced=self.by_load,
             tolerance=max(REDUCTION, enough),
         )
         return among_zeros(step, some, len(self))
@@ -275,14 +273,14 @@ class NormalProblem:
         return product + Ball.around(moved, error * (1 + SAFETY))
 
     @cached_property
-    def row_norm(self) -> float:
-        """Bound on the largest 2-norm of a row of A."""
+    def row_norm(self) -> Any:
+        """Bound on the largest 2-norm of a row of A: a number, or (m, 1) for a stack."""
         squares = self.influence.falloff(np.ones(len(self)), 2)
         return self.influence.scale * math.sqrt(squares.max(initial=0.0)) * (1 + SAFETY)
 
     @cached_property
-    def largest_entry(self) -> float:
-        """Bound on the largest entry of A."""
+    def largest_entry(self) -> Any:
+        """Bound on the largest entry of A: a number, or (m, 1) for a stack."""
         nearest = float(self.influence.separations().min(initial=np.inf))
         return self.influence.scale / nearest * (1 + SAFETY) if nearest > 0 else np.inf
 
@@ -307,10 +305,10 @@ class NormalProblem:
         modulus = scene.material.contact_modulus
         coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
-            highest = approach = checks.finite("approach", approach)
+            highest = given = checks.finite("approach", approach)
         else:
             assert load is not None  # exactly_one
-            load = checks.positive("load", load)
+            given = checks.positive("load", load)
             if highest is None:
                 highest = highest_approach(scene, load, influence)
 
@@ -321,20 +319,12 @@ class NormalProblem:
         if highest == np.inf:
             top = float(hertz.indentation(load, coefficients.max()))  # of one under the whole load
         units = Units.of(top, _middle(coefficients))
-
-        scale = units.force / units.length / (np.pi * modulus)
-        coupling = couple(scene, candidates, scale, influence)
         return cls(
             scene=scene,
             units=units,
-            candidates=candidates,
-            coefficients=evenly(lambda k: k * units.local, taken(coefficients, candidates)),
-            offsets=offsets[candidates] / units.length,
-            offset_errors=errors[candidates] / units.length,
-            influence=coupling,
-            shells=shells(coupling),
-            approach=None if approach is None else approach / units.length,
-            load=None if load is None else load / units.force,
+            **_about(scene, candidates, taken(coefficients, candidates), units, influence),
+            control=Ball.exact(given / (units.length if load is None else units.force)),
+            by_load=load is not None,
             highest=highest / units.length,
         )
 
@@ -352,20 +342,9 @@ class NormalProblem:
 
     def widened(self, which: Indices) -> NormalProblem:
         """The same problem with a larger set of candidates: the asperities `which` of the scene."""
-        scene, units = self.scene, self.units
-        coefficients = hertz.local_coefficient(
-            scene.material.contact_modulus, scene.relative_radii[which]
-        )
-        influence = couple(scene, which, self.influence.scale, None)
-        return replace(
-            self,
-            candidates=which,
-            coefficients=coefficients * units.local,
-            offsets=scene.offsets[which] / units.length,
-            offset_errors=scene.offset_errors[which] / units.length,
-            influence=influence,
-            shells=shells(influence),
-        )
+        modulus, radii = self.scene.material.contact_modulus, self.scene.relative_radii[which]
+        coefficients = hertz.local_coefficient(modulus, radii)
+        return replace(self, **_about(self.scene, which, coefficients, self.units, None))
 
     def radii(self, compliance: Array) -> Array:
         """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
@@ -413,11 +392,7 @@ class NormalProblem:
         If it is below 1, the energy is convex for all loads from 0 up to `loads`: (3) of
         docs/theory/convexity.md.
         """
-        return float(self.convexity_at(self.compliance(loads)))
-
-    def convexity_at(self, compliance: Array) -> Any:
-        """The `convexity_number` for a compliance (n,); one per row, (m, 1), for (m, n)."""
-        return largest(self.shells / compliance) * (1 + SAFETY)
+        return float(convexity_number(self.shells, self.compliance(loads)))
 
     def twofold_offsets(self) -> Pair:
         """(n,) offsets z - x^2 / (2 Rx) - y^2 / (2 Ry) as pairs of float64 numbers."""
@@ -434,25 +409,47 @@ class NormalProblem:
             offsets = offsets - square_sum(*points[:, axes].T) / (far + far)
         return offsets
 
-    def overhang(self, weights: Array, displacement: Array) -> float:
-        """An upper bound on D0 at every solution.
+    def overhang(self, weights: Array, displacement: Array) -> Any:
+        """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
         It is `highest` or, under load control, the result of `load_control.approach_bound` if that
         is smaller.
 
         weights      : (n,) approximate loads, not negative, not all 0
-        displacement : (n,) A times weights
+        displacement : (n,) upper bounds on A times weights
         """
-        if self.load is None:
+        if not self.by_load:
             return self.highest
-        displacement = displacement + self.influence.rounding(weights).of(displacement)
-        least = self.offsets - self.offset_errors
-        found = approach_bound(weights, displacement, self.coefficients, least, self.load)
-        return min(self.highest, float(found))
+        given = self.coefficients, self.offsets - self.offset_errors, self.load
+        return np.minimum(self.highest, approach_bound(weights, displacement, *given))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""
         return among_zeros(values, self.candidates, len(self.scene))
+
+
+def _about(
+    scene: Scene, which: Indices, coefficients: Array, units: Units, kind: Kind | None
+) -> dict[str, Any]:
+    """The fields of the problem in which the asperities `which` may touch.
+
+    coefficients : (n,) k of these asperities, not scaled;  kind : compliance operator, or None
+    """
+    scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
+    influence = couple(scene, which, scale, kind)
+    return {
+        "candidates": which,
+        "coefficients": evenly(lambda k: k * units.local, coefficients),
+        "offsets": scene.offsets[which] / units.length,
+        "offset_errors": scene.offset_errors[which] / units.length,
+        "influence": influence,
+        "shells": shells(influence),
+    }
+
+
+def convexity_number(shells: Array, compliance: Array) -> Any:
+    """The largest of shells / compliance: one number for (n,); (m, 1), one per row, for (m, n)."""
+    return largest(shells / compliance) * (1 + SAFETY)
 
 
 @lru_cache
@@ -478,6 +475,10 @@ def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
 def _even_coefficient(tip: float, *constants: Any) -> Ball:
     """(1,) the local coefficient of one tip radius, cached because scenes often share it."""
     return _exact_coefficients(np.array([tip]), *constants)
+
+
+def _numbers(control: Ball) -> Any:
+    return control.value if control.shape else float(control.value)
 
 
 def _middle(values: Array) -> float:

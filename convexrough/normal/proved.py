@@ -10,7 +10,7 @@ upper ends of a box.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
-from convexrough.normal.law import Problem
 from convexrough.normal.level import Level, Obstacle
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial
@@ -51,7 +50,7 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
         drop this assumption for asperities whose gaps are not proved
     """
     loads = state.loads.high
-    for box in boxes or tried(problem, loads, state.product.value):
+    for box in boxes or tried(problem, loads, state.product.upper):
         inside, _, found = solution_in(problem, box, state)
         if inside and not (box.fixed_open.any() and (box.fixed_open & ~found.open).any()):
             return found
@@ -78,7 +77,7 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
 
 
 @np.errstate(all="ignore")
-def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
+def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
     """The solution near the trial loads, by the theorem on the box and then on a smaller box.
 
     There are three results. The first is True if it is proved that the box contains the solution;
@@ -97,7 +96,7 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
     within_faces = (trial + at_first < box.faces) & np.isfinite(at_first)
     inside = (within_faces & ~(box.fixed_open & (trial > 0))).all(axis=-1)
     h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
-    number = np.minimum(box.convexity_number, box.problem.convexity_at(h))
+    number = np.minimum(box.convexity_number, box.convexity_at(h))
     within, errors = theorem(h, 1.0 - number)
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
@@ -109,7 +108,7 @@ def solution_in(problem: Problem, box: Box, state: Trial) -> tuple[Any, Array, L
     opened = indentation.negative
     found = Ball.around(state.loads, np.where(opened, 0.0, errors))
     solution = _sharpened(problem, found, indentation), indentation, approach, opened
-    return inside, at_first, Level(cast(Any, problem), *solution, state, box, within, h)
+    return inside, at_first, Level(problem, *solution, state, box, within, h)
 
 
 class _Missing(NamedTuple):
@@ -126,7 +125,7 @@ class _Missing(NamedTuple):
     residual: Any
 
     @classmethod
-    def of(cls, problem: Problem, state: Trial) -> _Missing:
+    def of(cls, problem: NormalProblem, state: Trial) -> _Missing:
         if not state.missing.size.any():
             return cls(0.0, 0.0, 0.0)
         loads, coupled, local = state.loads.high, state.product.upper, state.local
@@ -139,7 +138,7 @@ class _Missing(NamedTuple):
         return cls(*(found if np.all(known) else (np.where(known, x, np.inf) for x in found)))
 
 
-def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
+def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
     """The balls of the loads, with smaller radii where possible.
 
     For a load with a large error the ball of (indentation / k)^(3/2) is used if it is smaller.
@@ -161,7 +160,9 @@ def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tu
     return found.mid, found.radius
 
 
-def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
+def _approach_error(
+    problem: NormalProblem, box: Box, state: Trial, errors: Array, moved: Any
+) -> Any:
     """Bound on |D0 - D0*|, the error of the approach.
 
     At every touching asperity, D0* = k P*^(2/3) + A P* - d. At an open asperity, D0* is at most

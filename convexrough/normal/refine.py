@@ -24,7 +24,7 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
-from convexrough.normal.law import Problem
+from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
 #: Largest number of corrections.
@@ -32,10 +32,6 @@ CORRECTIONS = 12
 
 #: A correction aims to reduce the residual to this fraction of the residual's rounding error.
 ENOUGH = 0.1
-
-#: If the sum of the loads misses the total by less than this part, only the largest load is
-#: changed; otherwise all loads are scaled first. A heuristic.
-FITS = 1e-6
 
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
@@ -55,7 +51,7 @@ class Trial:
     missing : prescribed total minus the sum of the loads; 0 if no total is prescribed
     """
 
-    problem: Problem
+    problem: NormalProblem
     loads: Pair
     product: Ball
     local: Array
@@ -104,7 +100,7 @@ class Trial:
         return self.loads, self.product, self.local, self.gap, self.approach, self.missing
 
 
-def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
+def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     """The trial of these loads; `product` is A P, `missing` is the given total minus their sum."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
@@ -120,7 +116,7 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     return Trial(problem, loads, product, local, above - approach, approach, missing)
 
 
-def refined(problem: Problem, best: Trial) -> Trial:
+def refined(problem: NormalProblem, best: Trial) -> Trial:
     """The trial `best`, corrected until its residual is within rounding or no longer halves."""
     size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
@@ -142,12 +138,12 @@ def refined(problem: Problem, best: Trial) -> Trial:
     return best
 
 
-def refined_loads(problem: Problem, loads: Array, product: Product | None = None) -> Trial:
+def refined_loads(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
     return refined(problem, trial_of(problem, loads, product))
 
 
-def trial_of(problem: Problem, loads: Array, product: Product | None = None) -> Trial:
+def trial_of(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
     """The trial of loads (n,) >= 0, which are changed to have the prescribed total.
 
     product : function that returns A P for loads P; default `problem.product`
@@ -157,7 +153,7 @@ def trial_of(problem: Problem, loads: Array, product: Product | None = None) -> 
 
 
 @quietly
-def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
+def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
     """The trial after one Newton step in the rows for which `todo` is True.
 
     enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
@@ -180,24 +176,18 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
     return trial(problem, following, missing, product)
 
 
-def scaled(problem: Problem, loads: Pair) -> Pair:
-    """The loads scaled to the prescribed total, if there is one and any load is positive."""
-    if problem.load is None or not loads.high.any():
-        return loads
-    power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
-    loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-    return loads * (problem.control.mid / sums(loads))
+def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
+    """The loads, scaled to the prescribed total, and a ball of the remaining difference.
 
-
-def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads, changed to have the prescribed total, and a ball of the remaining difference."""
+    The largest load takes up the rounding errors of the other loads.
+    """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.control
-    if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
-        loads = scaled(problem, loads)
-    completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
+    power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
+    loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
+    completed, n = loads * (problem.control.mid / sums(loads)), loads.high.shape[-1]
     rows = Pair(*(part.reshape(-1, n) for part in completed))  # views
     missing = _missing(rows, problem.control.mid)
     largest_ones = np.arange(len(rows.high)), rows.high.argmax(axis=1)

@@ -6,71 +6,52 @@ The functions of `refine` and `proved` take such a stack in place of a single pr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices, largest
-from convexrough.normal.problem import Data, NormalProblem, Units
-from convexrough.roundoff import SAFETY
-from convexrough.scene.scene import Scene
+from convexrough.arrays import Array, Indices
+from convexrough.normal.problem import Data, NormalProblem
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
-    """Problems in m rows, in scaled units: arrays are (m, n), or (n,) where all rows are equal.
+class Stack(NormalProblem):
+    """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal.
 
     coupled : slices of the rows, each with a problem whose compliance operator is that of these
-        rows
-    exact   : coefficients k, which may be (1,) or (m, 1), and offsets d;  shells : as in
-        `NormalProblem`
-    squares : [length^2] squared distances of summits from the axis
-    control : (m, 1) the prescribed loads if `by_load` is True, else the prescribed approaches
+        rows. Scene and units are those of the first problem
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
-    exact: Data
-    shells: Array
-    squares: Array
-    control: Ball
-    by_load: bool
 
-    def __len__(self) -> int:
-        return int(self.coupled[-1][0].stop)
-
-    @property
-    def scene(self) -> Scene:
-        """A scene that has the same base and material as those of all rows."""
-        return self.coupled[0][1].scene
-
-    @property
-    def units(self) -> Units:
-        return self.coupled[0][1].units
-
-    @cached_property
-    def coefficients(self) -> Array:
-        """The coefficients k, rounded to float64."""
-        return self.exact.coefficients.value
-
-    @cached_property
-    def offsets(self) -> Array:
-        """The offsets d, rounded to float64."""
-        return self.exact.offsets.value
-
-    @property
-    def load(self) -> Array | None:
-        """(m, 1) the prescribed loads, or None."""
-        return self.control.value if self.by_load else None
-
-    @property
-    def approach(self) -> Array | None:
-        """(m, 1) the prescribed approaches, or None."""
-        return None if self.by_load else self.control.value
+    @classmethod
+    def of(
+        cls,
+        coupled: Sequence[tuple[slice, NormalProblem]],
+        exact: Data,
+        shells: Array,
+        squares: Array,
+        control: Ball,
+        by_load: bool,
+    ) -> Stack:
+        """The stack with the numbers `exact`, of which the coefficients may be (1,) or (m, 1)."""
+        first = coupled[0][1]
+        given = {each.name: getattr(first, each.name) for each in fields(first)} | {
+            "coefficients": exact.coefficients.value,
+            "offsets": exact.offsets.value,
+            "offset_errors": exact.offsets.error,
+            "highest": np.inf if by_load else control.upper,
+            "shells": shells,
+            "control": control,
+            "by_load": by_load,
+        }
+        stack = cls(**given, coupled=coupled)
+        stack.__dict__.update(exact=exact, squares=squares)
+        return stack
 
     @cached_property
     def row_norm(self) -> Array:
@@ -83,7 +64,7 @@ class Stack:
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
-        values = np.empty((len(self), 1))
+        values = np.empty((self.coupled[-1][0].stop, 1))
         for rows, problem in self.coupled:
             values[rows] = getattr(problem, name)
         return values
@@ -94,10 +75,11 @@ class Stack:
         slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
 
         def pick(values: Any) -> Any:
-            return values[rows] if len(values.shape) == 2 and len(values) == len(self) else values
+            every = len(values.shape) == 2 and len(values) == len(self.control)
+            return values[rows] if every else values
 
         k, d, scale = self.exact
-        return Stack(
+        return Stack.of(
             [(some, problem) for some, (_, problem) in slices if some.stop > some.start],
             Data(pick(k), pick(d), scale),
             pick(self.shells),
@@ -121,15 +103,7 @@ class Stack:
         """(m, n) A P for P = `others`, to about thirty digits; other arguments are not used."""
         return self.product(others)
 
-    def convexity_at(self, compliance: Array) -> Array:
-        """(m, 1) convexity numbers at loads with this `compliance` (m, n)."""
-        return np.asarray(largest(self.shells / compliance) * (1 + SAFETY))
-
-    def compliance(self, loads: Array) -> Array:
-        """(m, n) h = (2/3) k P^(-1/3)."""
-        return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
-
-    def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
+    def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
         """(m, n) one Newton step of the indentations; nan in rows with an indefinite matrix.
 
         slopes, defect : (m, n) as in `NormalProblem.correct`
@@ -157,7 +131,7 @@ class Stack:
                 if info != 0:
                     shift[k] = np.nan
                     continue
-                if self.load is not None:
+                if self.by_load:
                     shift[k] = w[k] @ y[:, 0] / (w[k] @ y[:, 1])
                 changes[k, order[k]] = w[k] * (y[:, 0] - shift[k] * y[:, 1])
         return np.asarray(np.where(todo[:, None], shift - defect + self.apply(changes), 0.0))

@@ -71,6 +71,10 @@ class Program(Record):
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
     >>> program.what, len(program.asperities)
     ('quadratic, 16 bristles an asperity', 61)
+    >>> energy, about = program.energy(program.objective), program.about()
+    >>> print(f"{energy:.3g}", about["variables"], about["constraints"])
+    -6.49e-12 1037 1037
+    >>> program.save(folder / "bristles.mps")
     """
 
     form: Form
@@ -92,6 +96,10 @@ class Program(Record):
             their sign, and both signs are accepted
 
         Raises InputError for a wrong number of values.
+
+        >>> program = cr.program(scene, approach=5e-5)
+        >>> program.loads(np.zeros(330)).shape
+        (61,)
         """
         m, data = len(self.asperities), self.data
         given = checks.numbers("values", values).ravel()
@@ -107,7 +115,10 @@ class Program(Record):
         return loads
 
     def energy(self, objective: float) -> float:
-        """[force length] the energy for a value of the objective in `energy_unit`."""
+        """[force length] the energy of the contact for a value of the objective in `energy_unit`.
+
+        Raises InputError for an objective that is not finite.
+        """
         sign = -1.0 if self.form == "dual" else 1.0
         return self.energy_unit * (sign * checks.finite("objective", objective) + self.constant)
 
@@ -160,13 +171,13 @@ def program(
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 
+    docs/theory/exact-cones.md derives the cones. Raises TooDenseError if the solution lies outside
+    the boxes in which the program is exact. To check this, Newton's method solves the problem
+    first; SolverError is raised if it finds no solution. Raises InputError for wrong values.
+
     >>> program = cr.program(scene, approach=5e-5)
     >>> program.data.cones
     220
-
-    Raises TooDenseError if the solution lies outside the boxes in which the program is exact. To
-    check this, Newton's method solves the problem first; SolverError is raised if it finds no
-    solution.
     """
     checks.instance("scene", scene, Scene)
     checks.whole("bristles", bristles)

@@ -38,6 +38,9 @@ def named(solver: Solver | str | None) -> Solver:
     """The given solver, the solver that `SOLVERS` has under this name, or Newton's method for None.
 
     Raises InputError for other arguments.
+
+    >>> cr.solvers.named("newton") == cr.solvers.named(None) == cr.solvers.Newton()
+    True
     """
     if solver is None:
         return Newton()

@@ -65,6 +65,12 @@ class TooDenseError(InputError):
     ratios     : (m,) for each, an estimate of the contact radius that it would have if its box did
         not limit its load, divided by (pi/2) s_i, where s_i is half the distance to the nearest
         neighbour. The form with five cones needs ratios below 1
+
+    >>> blunt = cr.Asperities(scene.asperities.positions, tip_radii=0.6)
+    >>> crowded = cr.Scene(1.0, blunt, cr.Material(1.0, 0.3), geometry="summit")
+    >>> cr.press(crowded, approach=5e-5, solver="conic")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    convexrough.solvers.conic.TooDenseError: ... by asperity: 0 (1.00...), expected less than 1
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -168,6 +174,7 @@ class ConeSolver(ABC):
 
     @property
     def name(self) -> str:
+        """The name in results and messages."""
         return f"{self.formulation} + Newton step" if self.newton_step else self.formulation
 
     def solve(
@@ -175,9 +182,11 @@ class ConeSolver(ABC):
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The solution by four cones or, if a cut box limits a load, by five.
+        """The solution in scaled units, by four cones or, if a cut box limits a load, by five.
 
         start : not used
+
+        Raises SolverError and TooDenseError if a check fails.
         """
         try:
             return solve_in(self, problem, ConeBoxes.choose(problem))
@@ -277,8 +286,15 @@ def _after_newton_step(
 class Conic(ConeSolver):
     """A solver of the cone program with Clarabel, an interior-point method.
 
+    docs/theory/exact-cones.md derives the program.
+
     tolerance      : tolerance of the duality gap and of feasibility, in scaled units
+    newton_step    : True to end with one or two Newton steps
     max_iterations : largest number of iterations
+
+    >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Conic())
+    >>> contact.solver, contact.certificate.holds
+    ('conic + Newton step', True)
     """
 
     max_iterations: int = 200
@@ -289,6 +305,7 @@ class Conic(ConeSolver):
 
     @property
     def formulation(self) -> str:
+        """The name without the ending " + Newton step"."""
         return "conic"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:

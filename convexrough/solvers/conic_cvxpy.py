@@ -8,12 +8,13 @@ approaches.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -65,6 +66,11 @@ class ConicCVXPY(ConeSolver):
         `OPTIONS` does not name keep their own tolerances and limits
     solver         : a name from `cvxpy.installed_solvers()`, in upper or lower case
     verbose        : True to print the output of CVXPY and of the solver
+    newton_step    : True to end with one or two Newton steps
+
+    >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.ConicCVXPY())
+    >>> contact.solver, contact.certificate.holds
+    ('conic in CVXPY + Newton step', True)
     """
 
     max_iterations: int | None = None
@@ -81,6 +87,7 @@ class ConicCVXPY(ConeSolver):
 
     @property
     def formulation(self) -> str:
+        """The name without the ending " + Newton step"."""
         default = self.solver == "CLARABEL"
         return "conic in CVXPY" if default else f"conic in CVXPY ({self.solver})"
 
@@ -89,7 +96,11 @@ class ConicCVXPY(ConeSolver):
         return LiftedModel.assemble(self, problem, boxes).answer()
 
     def model(self, problem: NormalProblem, *, five: bool = False) -> LiftedModel:
-        """The program in CVXPY, with four or five cones, to be read, changed or solved again."""
+        """The program in CVXPY, with four or five cones, to be read, changed or solved again.
+
+        problem : the contact problem, from `NormalProblem.assemble`
+        five    : True for five cones per asperity, which are exact for larger loads
+        """
         return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
@@ -146,6 +157,13 @@ class LiftedModel:
     p        : cvxpy.Variable: the loads of the asperities `boxes.members`
     link     : the constraint p == B y3, whose multiplier is minus the gap where p = 0
     total    : the constraint sum p == load, or None; its multiplier is D0 minus the approach
+
+    >>> from convexrough.normal.problem import NormalProblem
+    >>> problem = NormalProblem.assemble(scene, approach=5e-5)
+    >>> model = cr.solvers.ConicCVXPY().model(problem)
+    >>> solution = model.solve()
+    >>> sorted(model.variables), model.loads.shape, bool(model.gaps.min() >= 0)
+    (['p', 'y2', 'y3', 'y4', 'y5', 'z'], (55,), True)
     """
 
     settings: ConicCVXPY
@@ -198,6 +216,8 @@ class LiftedModel:
 
         approach : a new approach in scaled units, at most `normal.approach_bound`; default:
             unchanged
+
+        Raises InputError for other approaches; SolverError and TooDenseError if a check fails.
         """
         normal = self.normal
         if approach is not None:
@@ -205,7 +225,7 @@ class LiftedModel:
                 expected = f"approach control, and not above {normal.approach_bound:g}"
                 raise InputError("approach", found=approach, expected=expected)
             self.D0.value = approach
-            normal = replace(normal, approach=approach)
+            normal = normal.at_approach(Ball.exact(approach))
         return judged(self.settings, normal, self.boxes, self.answer())
 
     def answer(self) -> ProgramAnswer:

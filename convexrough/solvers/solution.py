@@ -23,6 +23,13 @@ class Solution(Record):
         `trial` is given, an upper bound on the residual of the loads in `trial`
     refine   : True if the loads may be corrected to more digits; False to certify them unchanged
     trial    : the loads to more digits, if the solver has computed such loads; else None
+
+    >>> from convexrough.normal.problem import NormalProblem
+    >>> problem = NormalProblem.assemble(scene, approach=5e-5)
+    >>> solution = cr.solvers.Newton().solve(problem)
+    >>> again = cr.solvers.Solution.of(problem, solution.loads, solution.approach, 0)
+    >>> again.residual < 1e-14
+    True
     """
 
     loads: Array
@@ -42,7 +49,10 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution with the residual computed from the loads; a residual nan becomes inf."""
+        """A solution with the residual computed from the loads; a residual nan becomes inf.
+
+        Raises SolverError unless there is a load for each asperity of the problem.
+        """
         if np.shape(loads) != (len(problem),):
             raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
         residual = problem.residual(loads, approach)

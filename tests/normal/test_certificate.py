@@ -1,14 +1,10 @@
 """The certificate under attack: whatever it is given, no status and no bound may be wrong."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from attacks import ATTACKS, assert_honest, attack, excess
-from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from scenes import (
     CASES,
@@ -188,36 +184,6 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     assert margin > 0 or smallest < 1.1e-3
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("kind", operators(rough()))
-def test_bounds_do_not_depend_on_who_solved(kind: Kind) -> None:
-    """`press` and `certify` give the same judgement of the same loads."""
-    scene = rough()
-    contact = cr.press(scene, approach=PAPER_APPROACH, influence=kind)
-    again = cr.certify(scene, contact.loads, approach=PAPER_APPROACH, influence=kind)
-    # What a solver knows of its loads saves work, and hardly changes what is proved. Balls that
-    # are subtracted count underflow: a load that is known to be 0 is so to 1e-300 of the total.
-    least = 1e-300 * contact.load
-    assert_allclose(again.load_errors, contact.certificate.load_errors, rtol=0.02, atol=least)
-    assert (again.status == contact.status).all()
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize(("name", "kind"), CASES)
-def test_the_rounding_of_the_residual_is_counted(name: str, kind: Kind) -> None:
-    """Loads correctly rounded from 50 digits are known to half a unit in the last place."""
-    scene, approach = NAMED[name]
-    exact = reference(scene, approach=approach)
-    rounded = np.array([float(load) for load in exact.loads])
-    certificate = cr.certify(scene, rounded, approach=approach, influence=kind)
-    assert certificate.holds
-    assert_honest(certificate, rounded, exact)
-    if kind != "scattered":
-        assert (
-            certificate.load_errors <= 2.0**-53 * rounded * (1 + 1e-9) + 1e-24 * rounded.max()
-        ).all()
-
-
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
@@ -297,20 +263,13 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
     assert 0 < above <= gap <= 1.01 * above + contact.certificate.duality_gap
 
 
-def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
-    """As `assert_honest`, without the rounding of a difference."""
-    with ctx.workprec(4096):
-        for load, true, bound in zip(loads, exact.loads, certificate.load_errors, strict=True):
-            assert abs(arb(float(load)) - true) <= arb(float(bound))
-
-
 @pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
     scene = paper()
     load = cr.press(scene, approach=PAPER_APPROACH).load
     given = factor * cr.press(scene, load=load).loads
-    assert_loads_within(cr.certify(scene, given, load=load), given, reference(scene, load=load))
+    assert_honest(cr.certify(scene, given, load=load), given, reference(scene, load=load))
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])
@@ -325,4 +284,4 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
     open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(given))
     assert len(open_ones)
     given[open_ones] = 5e-324
-    assert_loads_within(cr.certify(scene, given, **prescribed), given, exact)
+    assert_honest(cr.certify(scene, given, **prescribed), given, exact)

@@ -34,10 +34,13 @@ def by_name(value: Any) -> str:
 
 
 def problem_of(scene: cr.Scene, approach: float, control: str = "approach") -> NormalProblem:
-    """Under load control with the load of that approach: one solution, found in two ways."""
-    if control == "load":
-        return NormalProblem.assemble(scene, load=cr.press(scene, approach=approach).load)
-    return NormalProblem.assemble(scene, approach=approach)
+    return NormalProblem.assemble(scene, **pressed(scene, approach, control)[1])
+
+
+def pressed(scene: cr.Scene, approach: float, control: str) -> tuple[cr.Contact, dict[str, Any]]:
+    """Newton's answer, and how to prescribe it: by the approach, or by its load."""
+    contact = cr.press(scene, approach=approach)
+    return contact, {control: getattr(contact, control)}
 
 
 def hexagonal(density: float, tip_radius: float = 0.02) -> cr.Scene:
@@ -148,15 +151,6 @@ def test_a_refused_friction_program_gives_its_last_forces() -> None:
         FrictionConic(accepted=1e-18).solve(problem, total)
     assert refused.value.iterate is not None
     assert_allclose(refused.value.iterate.sum(axis=0), total, rtol=1e-7)
-
-
-CONTROLS = ("approach", "load")
-
-
-def pressed(scene: cr.Scene, approach: float, control: str) -> tuple[cr.Contact, dict[str, Any]]:
-    """The reference, and how to prescribe it."""
-    contact = cr.press(scene, approach=approach)
-    return contact, {control: getattr(contact, control)}
 
 
 def errors(reference: cr.Contact, prescribed: dict[str, Any], solver: BristleQP) -> Any:
