@@ -10,14 +10,11 @@ import click
 from convexrough.atomic import replacing
 from convexrough.cli.output import (
     DONE,
-    NOT_CERTIFIED,
+    OPTIONS,
     PATH,
     Output,
-    html_option,
     output_options,
     progress,
-    proof_option,
-    proved,
     say_aside,
     written,
 )
@@ -26,10 +23,8 @@ from convexrough.errors import FileError, blamed_on
 
 @click.command()
 @click.argument("scene", type=PATH)
-@proof_option
-@html_option
-@output_options()
-def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
+@output_options(*OPTIONS)
+def run(output: Output, scene: Path) -> int:
     """Compute a scene; write tables, certificate and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
@@ -41,12 +36,12 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
-        return _swept(scene, output, given=html or proof)
+        return _swept(scene, output)
     file = read_scene(scene)
     with blamed_on(scene):
-        if html:
+        if output.html:
             checks.friction(file.scene.friction)
-        if proof:
+        if output.proof:
             from convexrough.proof import refuse_many
 
             refuse_many(file.scene)
@@ -58,25 +53,21 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
-            page = slider_page(results[0]) if html else None
+            page = slider_page(results[0]) if output.html else None
             new.results(results, figures=not output.no_figures)
             new.text("scene.toml", file.text)
             if page is not None:
                 new.text("slider.html", page)
         prove = partial(prove_results, results, partial(say_aside, "warning"))
-        evidence = proved(prove) if proof else None
-        if evidence is not None:
-            evidence.save(new.path / "proof.json")
+        proof = output.proved(prove, new.path)
     status = output.say_results(results, written(new))
-    if evidence is not None:
-        output.say_proof(evidence, new.folder)
-    return NOT_CERTIFIED if proof and evidence is None else status
+    return output.say_proof(proof, new.folder, status)
 
 
-def _swept(sweep: Path, output: Output, *, given: bool) -> int:
+def _swept(sweep: Path, output: Output) -> int:
     from convexrough.cli.sweep import sweep as command
 
-    if given:
+    if output.html or output.proof:
         raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
     own = {"out": output.out, "force": output.force, "as_json": output.as_json}
     status: int = click.get_current_context().invoke(command, sweep=sweep, **own)

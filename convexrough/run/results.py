@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from convexrough import plots
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError, ProofError, file_errors
 from convexrough.friction.shear import shear
@@ -142,13 +143,11 @@ class Writer:
 
     def figures(self, figures: Mapping[str, Figure]) -> None:
         """Write each figure in each format."""
-        from convexrough.plots import save  # matplotlib: only when it draws
-
         for stem, figure in figures.items():
             for kind in self.formats:
                 path = self.path / f"{stem}.{kind}"
                 with replacing(path) as temporary:
-                    save(figure, temporary, kind, self.dpi)
+                    plots.save(figure, temporary, kind, self.dpi)
                 self.files.append(path)
                 figure.set_layout_engine("none")  # the layout is the same in all formats
 

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks, frames
+from convexrough import checks, frames, plots
 from convexrough.contact import Contact
 from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
-from convexrough.plottable import Plottable
-from convexrough.record import Table, rows_of, singular
+from convexrough.record import Record, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
@@ -131,7 +130,7 @@ def numbers_of(found: Any, names: Sequence[str]) -> Summary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Table, Plottable):
+class Result(Record):
     """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
 
     stage   : the stage that was computed
@@ -275,10 +274,8 @@ class Steps(Result):
         })  # fmt: skip
 
     def figures(self) -> Mapping[str, Figure]:
-        from convexrough.plots import between, path_figures  # matplotlib: only when it draws
-
         (found,) = self.found
-        return path_figures(found, fine=between(found))
+        return plots.path_figures(found, fine=plots.between(found))
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""

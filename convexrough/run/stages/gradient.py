@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.gradients.gradient import Holding
@@ -155,7 +156,5 @@ class GradientResult(Single):
         return [f"gradient of the {said['of']}{under}, {held}", *labelled(rows, 22)]
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import gradient_figures  # matplotlib: only when it draws
-
-        figures = [gradient_figures(it, of=LETTERS[self.stage.of]) for it in self.found]
+        figures = [plots.gradient_figures(it, of=LETTERS[self.stage.of]) for it in self.found]
         return figures[0] if figures else {}

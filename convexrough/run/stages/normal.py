@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough import plausibility
+from convexrough import plausibility, plots
 from convexrough.arrays import Array
 from convexrough.contact import Contact, closest_changes
 from convexrough.errors import SolverError
@@ -78,9 +78,7 @@ class NormalResult(Single):
         return plausibility.cautions(self.known[0], self.units)
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import press_figures  # matplotlib: only when it draws
-
-        return press_figures(self.contact)
+        return plots.press_figures(self.contact)
 
     def lines(self) -> list[str]:
         return describe(self.known[0], self.units)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from convexrough import checks
+from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
@@ -247,11 +247,9 @@ class SteadyResult(Single):
         return said
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import phase_figures, steady_figures  # only when it draws
-
-        figures = dict(steady_figures(self.found[0]))
+        figures = dict(plots.steady_figures(self.found[0]))
         for losses in self.found[1:]:
-            figures |= phase_figures(losses)
+            figures |= plots.phase_figures(losses)
         return figures
 
 

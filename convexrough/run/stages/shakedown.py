@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
@@ -111,6 +112,4 @@ class ShakedownResult(Single):
         return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
-
-        return shakedown_figures(self.found[0])
+        return plots.shakedown_figures(self.found[0])
