@@ -40,16 +40,21 @@ class InputError(ConvexroughError, ValueError):
         place = f"{where}: " if where else ""
         super().__init__(f"{place}{what}: found {found}, expected {expected}")
 
-    def within(self, where: str) -> InputError:
-        """The same error, with `where` (a file, for example) in front of the message."""
+    def located(self, where: str, table: str = "") -> InputError:
+        """The same error, with `where` (a file, for example) in front of the message.
+
+        table : the name of a table of this file, in brackets in front of the name of the value
+        """
         place = f"{where}: {self.where}" if self.where else where
-        return InputError(self.what, found=self.found, expected=self.expected, where=place)
+        what = f"[{table}] {self.what}" if table else self.what
+        return InputError(what, found=self.found, expected=self.expected, where=place)
 
 
 @contextmanager
-def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
+def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> Iterator[None]:
     """A context manager: put `where` (a file, a table) in front of InputErrors of the body.
 
+    table : as for `InputError.located`
     unless_known : True to leave errors unchanged that name a place already. A MistakesError never
         changes
     """
@@ -58,7 +63,7 @@ def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
     except InputError as error:
         if isinstance(error, MistakesError) or (unless_known and error.where):
             raise
-        raise error.within(str(where)) from error
+        raise error.located(str(where), table) from error
 
 
 class MistakesError(InputError):

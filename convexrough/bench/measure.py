@@ -97,9 +97,9 @@ TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
 }
 
 
-def reference(scene: Scene, approach: float) -> Array:
+def reference(scene: Scene) -> Array:
     """(n,) [force] accurate loads. Raises SolverError if they are not proved accurate."""
-    contact = press(scene, approach=approach)
+    contact = _pressed(scene)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
         advice = "another approach, or asperities further apart"

@@ -7,7 +7,6 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
@@ -309,7 +308,7 @@ def task_of(
 
     Raises InputError for mistakes that the tables alone do not show.
     """
-    with _blamed_on(path, "material"):
+    with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
 
     def press_on(asperities: Asperities) -> Scene:
@@ -323,7 +322,7 @@ def task_of(
         )
 
     layout, highest = study.asperities, None
-    with _blamed_on(path, "asperities"):
+    with blamed_on(path, "asperities", unless_known=True):
         if asperities is not None:
             scene = press_on(asperities)
         elif layout.pattern == "file":
@@ -389,16 +388,3 @@ def _lattice(
     if most > load:
         found.append((all_that_could_touch(scene, farthest, most)[0], None))
     return max(found, key=lambda each: len(each[0]))
-
-
-@contextmanager
-def _blamed_on(path: Path, table: str) -> Iterator[None]:
-    """Name the file and the table in InputErrors of the body."""
-    try:
-        yield
-    except InputError as error:
-        if error.where:  # the error names another file
-            raise
-        what = f"[{table}] {error.what}"
-        where = str(path)
-        raise InputError(what, found=error.found, expected=error.expected, where=where) from error

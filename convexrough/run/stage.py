@@ -36,11 +36,13 @@ Labels = Mapping[str, Sequence[float]]
 #: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: The names of the numbers in results, by physical dimension; other numbers are dimensionless.
+#: Names of numbers in results and of keys of scene files, by physical dimension; other numbers are
+#: dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
-               "displacement_error", "gap_error"),
+               "displacement_error", "gap_error", "radius", "spacing", "tip_radius", "within",
+               "height_std"),
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),

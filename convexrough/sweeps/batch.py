@@ -71,26 +71,26 @@ class Tables:
 
     def opened(self) -> Callable[[int], Task]:
         """A function from numbers to scenes; consecutive scenes share common data."""
-        layouts: Any = {
-            "summits": lru_cache(KEPT)(read_summits),
-            "lattice": lru_cache(KEPT)(regular),
-        }
-        last: dict[str, Any] = {}
-        return lambda number: task_of(self.path, self._study(number, last), **layouts)
+        summits, lattice = lru_cache(KEPT)(read_summits), lru_cache(KEPT)(regular)
 
-    def _study(self, number: int, last: dict[str, Any]) -> Study:
-        """The checked tables of a scene. Consecutive scenes with equal values share one check."""
-        values, seed = self.grid.point(number)
-        if last.get("values") != values:
+        @lru_cache(1)
+        def checked(number: int) -> Study:
+            values, seed = self.grid.point(number)
             study, mistakes = validate(with_values(self.tables, values, seed))
             if study is None:
                 raise SceneFileError(str(self.path), self.grid.blame(mistakes, seed))
-            last.update(values=values, study=study)
-        known: Study = last["study"]
-        if seed is None or not isinstance(known.asperities, LatticeTable):
-            return known
-        layout = known.asperities.model_copy(update={"seed": seed})
-        return known.model_copy(update={"asperities": layout})
+            return study
+
+        def task(number: int) -> Task:
+            """Scenes that differ only in the seed of heights and tip radii share one check."""
+            study = checked(number if self.grid.draw else number - number % self.grid.each)
+            _, seed = self.grid.point(number)
+            if seed is not None and isinstance(study.asperities, LatticeTable):
+                layout = study.asperities.model_copy(update={"seed": seed})
+                study = study.model_copy(update={"asperities": layout})
+            return task_of(self.path, study, summits=summits, lattice=lattice)
+
+        return task
 
 
 @dataclass(frozen=True)

@@ -43,9 +43,6 @@ ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Errors that mean that one scene failed; other scenes are still computed.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
-#: Keys of a scene file that are lengths.
-LENGTHS = ("radius", "spacing", "tip_radius", "within", "height_std")
-
 
 class Column(NamedTuple):
     """The name of a column, with the name and row of its number in a summary."""
@@ -143,10 +140,7 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
 
 def unit(name: str, units: UnitNames) -> str:
     """The unit of a number of a summary or of a key of a file; "" if unknown."""
-    end = name.rpartition(".")[2]
-    if name.startswith("gradient."):
-        return ""
-    return units.length if end in LENGTHS else unit_of(end, units)
+    return "" if name.startswith("gradient.") else unit_of(name.rpartition(".")[2], units)
 
 
 #: Arrays with an entry or a row for each scene, by their names in `Contacts` or `Cycles`.

@@ -217,7 +217,7 @@ def _planned(
         except FAILURES as error:
             if number == tried - 1:
                 if isinstance(error, InputError) and not error.where:
-                    raise error.within(str(said["source"])) from error
+                    raise error.located(str(said["source"])) from error
                 raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
