@@ -137,7 +137,7 @@ class Task(Record):
     influence: Kind | None = None
 
     def problem(self) -> NormalProblem:
-        """The normal contact problem."""
+        """The normal contact problem, which solvers take. Raises InputError."""
         return NormalProblem.assemble(
             self.scene,
             approach=self.approach,
@@ -147,16 +147,27 @@ class Task(Record):
         )
 
     def press(self) -> Contact:
-        """The contact under the prescribed approach or load. Raises the errors of `press`."""
+        """The contact under the prescribed approach or load, as found by `solver`.
+
+        Raises InputError and SolverError, as `press` does.
+        """
         given = self.approach, self.load, self.influence, self.highest_approach
         return solve(assembled(self.solver, self.scene, *given), self.solver)
 
     def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about stages that do not fit the contact, before they are computed."""
+        """Yield warnings about stages that do not fit the contact, before they are computed."""
         return (each for stage in self.stages.values() for each in stage.cautions(contact))
 
     def compute(self, contact: Contact) -> list[Result]:
-        """The results of all stages; the first is the pressed contact."""
+        """The results of all stages, in the order of `stages`; the first is that of [normal].
+
+        contact : the result of `press()`
+
+        Each result has the methods `summary`, `tables`, `lines`, `figures`, `plot`, `to_dataframe`,
+        which are what the command `run` writes and prints, and the property `certified`.
+
+        Raises InputError and SolverError.
+        """
         return [stage.compute(contact) for stage in self.stages.values()]
 
 
@@ -176,8 +187,8 @@ class SceneFile(Task):
 
     >>> file = cr.read_scene(new_scene)
     >>> contact = file.press()
-    >>> [result.certified for result in file.compute(contact)]
-    [True, True, True, True]
+    >>> [*file.cautions(contact)], [result.certified for result in file.compute(contact)]
+    ([], [True, True, True, True])
     """
 
     path: Path

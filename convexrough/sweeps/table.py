@@ -212,10 +212,8 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
 
     Raises FileError if the folder contains no sweep.
 
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     made = cr.sweep([scene], load=3e-7, measure=["load"], out=folder, workers=1)
-    ...     print(cr.open_sweep(folder).counts())
+    >>> made = cr.sweep([scene], load=3e-7, measure=["load"], out=folder / "a", workers=1)
+    >>> cr.open_sweep(folder / "a").counts()
     {'certified': 1, 'undecided': 0, 'failed': 0}
     """
     found = open_folder(Path(folder))
@@ -238,6 +236,12 @@ class SweepTable(Record):
     >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
     >>> print(table.read(["normal.load", "contact"])["contact"], table.complete)
     [19. 31. 37.] True
+    >>> [block["contact"].tolist() for block in table.blocks(["contact"])]
+    [[19.0, 31.0, 37.0]]
+    >>> print(table.quantiles(["contact"], at=[0.5])["0.5"])
+    [19. 31. 37.]
+    >>> frame = table.to_dataframe(["contact"])
+    >>> axes = table.plot("contact", "normal.load")
     """
 
     manifest: Mapping[str, Any]
@@ -281,7 +285,10 @@ class SweepTable(Record):
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Yield some columns, by default all, one part at a time; for large tables."""
+        """Yield some columns, by default all, one part at a time; for large tables.
+
+        Raises InputError for unknown names, FileError for a damaged part.
+        """
         names = self._chosen(names, self.columns)
         if self.in_memory is not None:
             yield {name: self.in_memory[name] for name in names}
@@ -293,7 +300,8 @@ class SweepTable(Record):
     def read(self, names: Sequence[str] | None = None) -> Columns:
         """Some columns, by default all, as arrays.
 
-        Raises InputError for unknown names, or if the arrays do not fit in memory.
+        Raises InputError for unknown names, or if the arrays do not fit in memory; FileError for a
+        damaged part.
         """
         wanted = self._chosen(names, self.columns)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
@@ -324,6 +332,10 @@ class SweepTable(Record):
 
         Raises ExtraError if Dask is not installed; InputError for unknown names, or if the table
         has no rows or is not in a folder.
+
+        >>> made = cr.sweep([scene], load=3e-7, measure=["load"], out=folder / "b", workers=1)
+        >>> len(made.to_dask(["load"]))
+        1
         """
         frames_of_dask = needed("dask.dataframe", "dask")
         names = self._chosen(columns, self.columns)
