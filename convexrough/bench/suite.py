@@ -194,9 +194,9 @@ def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) 
                          for it in fields(Row)}})  # fmt: skip
     if not figures and page is None:
         return
-    from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
+    from convexrough.bench.figures import cost_figure, work_figure  # matplotlib: only when it draws
 
-    both = bench_figures(bench)
+    both = {"work-precision": work_figure(bench), "cost": cost_figure(bench)}
     if figures:
         new.figures(both)
     if page is not None:
