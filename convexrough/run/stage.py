@@ -178,8 +178,8 @@ class Result(Record):
         return self.rows()
 
     def summary(self) -> Any:
-        """The entry of summary.json: a list of rows, or one mapping."""
-        return self.known
+        """The entry of summary.json: a list of rows, or the only row if rows have no labels."""
+        return self.known if self.stage.labels else self.known[0]
 
     def doubts(self) -> Iterator[str]:
         """The reasons why this result is not certified, one line for each."""
@@ -283,13 +283,6 @@ class Steps(Result):
         """Each number of the stage as a list with an entry for each step."""
         lists = {key: [row[key] for row in self.known] for key in self.known[0]}
         return lists | {"order": self.found[0].order}
-
-
-class Single(Result):
-    """The result of a stage with a single row."""
-
-    def summary(self) -> Summary:
-        return self.known[0]
 
 
 def plain(value: Any) -> Any:

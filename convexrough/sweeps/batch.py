@@ -10,10 +10,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from convexrough.errors import SceneFileError
 from convexrough.run.scene_file import Task, read_summits, regular, task_of
+from convexrough.run.stage import Columns as Columns
 from convexrough.run.study import LatticeTable, Study, validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
 from convexrough.sweeps.measures import FAILURES, Column, Measured, measured, measured_together
@@ -28,8 +28,6 @@ KEPT = 8
 
 #: The entry of the column `seed` if nothing is random.
 NO_SEED = -1
-
-Columns = dict[str, NDArray[Any]]
 
 #: A row of the table: status, message, and measured numbers.
 Row = tuple[str, str, list[float]]

@@ -14,7 +14,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.gradients.gradient import Holding
 from convexrough.gradients.objective import NUMBERS, gradient_of
-from convexrough.run.stage import Columns, Single, Stage, Summary, limit
+from convexrough.run.stage import Columns, Result, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
 
@@ -80,7 +80,7 @@ class GradientStage(Stage):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GradientResult(Single):
+class GradientResult(Result):
     """The result of [gradient]: the gradient, or the reason `none_because` why there is none."""
 
     stage: GradientStage

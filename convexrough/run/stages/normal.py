@@ -14,7 +14,7 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact, closest_changes
 from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
-from convexrough.run.stage import Columns, Single, Stage, Summary, unit_of
+from convexrough.run.stage import Columns, Result, Stage, Summary, unit_of
 from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
@@ -54,7 +54,7 @@ class NormalStage(Stage):
         return NormalResult(self, contact, (contact,))
 
 
-class NormalResult(Single):
+class NormalResult(Result):
     """The result of [normal]: the pressed contact."""
 
     def rows(self) -> list[Summary]:

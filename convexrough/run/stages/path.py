@@ -21,7 +21,7 @@ from convexrough.run.stage import (
     MOST_PRINTED,
     STATUSES,
     Columns,
-    Single,
+    Result,
     Stage,
     Steps,
     Summary,
@@ -199,7 +199,7 @@ class SteadyStage(_Points):
             )
 
 
-class SteadyResult(Single):
+class SteadyResult(Result):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     stage: SteadyStage

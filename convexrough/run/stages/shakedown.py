@@ -11,7 +11,7 @@ from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
-from convexrough.run.stage import Columns, Single, Stage, Summary
+from convexrough.run.stage import Columns, Result, Stage, Summary
 from convexrough.run.values import NUMBER_OR_PAIR, Finite, Force, Mistake, Positive, expected
 
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
@@ -65,7 +65,7 @@ class ShakedownStage(Stage):
         return ShakedownResult(self, contact, (found,))
 
 
-class ShakedownResult(Single):
+class ShakedownResult(Result):
     """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
 
     stage: ShakedownStage
