@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -192,13 +192,7 @@ def case(name: str) -> HardCase:
         name=name,
         family=data["family"],
         why=data["why"],
-        scene=Scene(
-            data["sphere_radius"],
-            Asperities(data["positions"], data["tip_radii"], data["heights"]),
-            Material(data["contact_modulus"], data["poisson_ratio"]),
-            data["friction"],
-            data["geometry"],
-        ),
+        scene=scene_of(data),
         approach=data["prescribed"].get("approach"),
         load=data["prescribed"].get("load"),
         exact_approach=answer["approach"],
@@ -208,6 +202,13 @@ def case(name: str) -> HardCase:
         history=frozen(np.array(_reversals(data["reversals"])) * data["shear_force"]),
         **{each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")},
     )
+
+
+def scene_of(data: Mapping[str, Any]) -> Scene:
+    """The scene of an entry of the file `DATA`."""
+    asperities = Asperities(data["positions"], data["tip_radii"], data["heights"])
+    material = Material(data["contact_modulus"], data["poisson_ratio"])
+    return Scene(data["sphere_radius"], asperities, material, data["friction"], data["geometry"])
 
 
 @cache

@@ -138,3 +138,15 @@ def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
     assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
     *_, narrow = run("within = 0.0067")
     assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
+
+
+STEADY = FRICTION + "[steady]\nreference = 1e60\n"
+STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
+
+
+def test_a_steady_state_of_which_nothing_is_proved(run: Any) -> None:
+    """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
+    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
+    outcome = run(scene_text(layout, more=STEADY))
+    assert outcome.status == 3
+    assert "nan" not in outcome.out

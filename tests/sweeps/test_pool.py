@@ -76,6 +76,7 @@ def deadly(whole: Plan, worst: int) -> Plan:
 
 @pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
 def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
+    """It breaks the executor of a user, which is said."""
     contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
     whole = plan_of(contents, Path("sweep"))
     said = "the process that computed scenes 17 to 17 died twice"
@@ -85,15 +86,9 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
     with ThreadPoolExecutor(1) as here:
         table = run(whole, here, out=tmp_path / "a", resume=True)[0]
     assert same(table, swept(contents))
-
-
-@pytest.mark.sample(0)
-def test_an_executor_that_broke_is_said_to_be() -> None:
-    with (
-        ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
-        pytest.raises(cr.WorkerError, match="executor is broken"),
-    ):
-        run(deadly(PLAN, 3), mine)
+    broken = pytest.raises(cr.WorkerError, match="executor is broken")
+    with ProcessPoolExecutor(1, mp_context=SPAWN) as theirs, broken:
+        run(deadly(PLAN, 3), theirs)
 
 
 def test_threads_of_linear_algebra_do_not_matter() -> None:
