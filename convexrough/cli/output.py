@@ -129,10 +129,12 @@ class Output:
         more: dict[str, Any] | None = None,
     ) -> int:
         """Print the summary with `more`, or results and `lines`; return the exit status."""
-        from convexrough.run.results import describe, summarise, warnings
+        from convexrough.run.results import summarise
 
-        summary = summarise(results) | (more or {})
-        self.say(summary, [*describe(results), *lines], warnings(results))
+        first, *others = (result.lines() for result in results)
+        lines = [*first, *(line for each in others for line in ("", *each)), *lines]
+        warnings = (it for result in results for it in (*result.doubts(), *result.cautions()))
+        self.say(summarise(results) | (more or {}), lines, warnings)
         return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
     def proved(self, work: Callable[[], Proof], folder: Path) -> Proof | None:

@@ -66,19 +66,6 @@ def summarise(results: Iterable[Result]) -> Summary:
     return headed(**{result.name: result.summary() for result in results})
 
 
-def describe(results: Iterable[Result]) -> list[str]:
-    """The printed report of all stages, in aligned lines."""
-    first, *others = results
-    return [*first.lines(), *(line for it in others for line in ("", *it.lines()))]
-
-
-def warnings(results: Iterable[Result]) -> Iterator[str]:
-    """Yield warnings about results that are not proved, and about limits of the model."""
-    for result in results:
-        yield from result.doubts()
-        yield from result.cautions()
-
-
 def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Proof:
     """The proof of the contact and of its states under shear.
 

@@ -93,25 +93,24 @@ class Tables:
 
 @dataclass(frozen=True)
 class Tasks:
-    """Scenes made in Python, by their numbers."""
+    """Scenes made in Python, by their numbers; `control` is "approach" or "load"."""
 
     tasks: Mapping[int, Task]
+    control: str
 
     @property
     def count(self) -> int:
         return len(self.tasks)
 
     def labels(self, numbers: range) -> Columns:
-        by_load = any(task.load is not None for task in self.tasks.values())
-        some = [self.tasks[number] for number in numbers]
-        given = [task.load if by_load else task.approach for task in some]
+        given = [getattr(self.tasks[number], self.control) for number in numbers]
         return {
-            "normal.load" if by_load else "normal.approach": np.array(given, dtype=np.float64),
+            f"normal.{self.control}": np.array(given, dtype=np.float64),
             "seed": np.full(len(numbers), NO_SEED, dtype=np.int64),
         }
 
     def part(self, numbers: range) -> Tasks:
-        return Tasks({number: self.tasks[number] for number in numbers})
+        return Tasks({number: self.tasks[number] for number in numbers}, self.control)
 
     def opened(self) -> Callable[[int], Task]:
         return self.tasks.__getitem__

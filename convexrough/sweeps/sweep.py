@@ -171,7 +171,7 @@ def plan_of_scenes(
         for number, (scene, control) in enumerate(zip(scenes, controls, strict=True))
     }
     said = {"source": "scenes made in Python"}
-    return _planned(Tasks(tasks), measure, said, UnitNames(), **given)
+    return _planned(Tasks(tasks, name), measure, said, UnitNames(), **given)
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
