@@ -12,7 +12,8 @@ import numpy as np
 import scipy
 
 from convexrough.errors import SceneFileError
-from convexrough.run.scene_file import Task, read_summits, regular, task_of
+from convexrough.run.asperity_file import read_summits
+from convexrough.run.scene_file import Task, regular, task_of
 from convexrough.run.stage import Columns as Columns
 from convexrough.run.study import LatticeTable, Study, validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
