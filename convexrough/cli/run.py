@@ -130,9 +130,10 @@ def _swept(
     scheduler: str | None = None,
     **options: Any,
 ) -> int:
+    from convexrough.sweeps.plan import read_sweep
     from convexrough.sweeps.pool import Processes, dask
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
-    from convexrough.sweeps.sweep import read_sweep, run
+    from convexrough.sweeps.sweep import run
 
     folder = output.out or Path(f"{sweep.stem}-sweep")
     with progress("reading the first scene"):

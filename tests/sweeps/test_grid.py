@@ -9,7 +9,7 @@ from sweep_files import SMALL, sweeping, tables
 
 import convexrough as cr
 from convexrough.sweeps.grid import Grid, with_values
-from convexrough.sweeps.sweep import plan_of
+from convexrough.sweeps.plan import plan_of
 
 
 def identity(contents: dict[str, Any], folder: Path = Path()) -> Any:

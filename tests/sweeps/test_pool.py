@@ -14,10 +14,11 @@ import pytest
 from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
 
 import convexrough as cr
-from convexrough.sweeps import sweep
+from convexrough.sweeps import plan
 from convexrough.sweeps.batch import Tables
+from convexrough.sweeps.plan import Plan, plan_of
 from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.sweep import Plan, plan_of, run
+from convexrough.sweeps.sweep import run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
@@ -62,8 +63,8 @@ def test_batches(most: int, influence: str, monkeypatch: pytest.MonkeyPatch) -> 
     measured = {"seeds": 10, "measure": ["contact", "load", "approach", "loss"]}
     contents = tables(solver={"influence": influence}, sweep=measured)
     whole = swept(contents)
-    monkeypatch.setattr(sweep, "LEAST_BATCHES", 1)
-    monkeypatch.setattr(sweep, "MOST_SCENES", most)
+    monkeypatch.setattr(plan, "LEAST_BATCHES", 1)
+    monkeypatch.setattr(plan, "MOST_SCENES", most)
     batches = swept(contents)
     assert batches.manifest["batch"] == most != whole.manifest["batch"]
     assert same(batches, whole)
