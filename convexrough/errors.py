@@ -184,4 +184,7 @@ def needed(module: str, extra: str = "") -> Any:
 
 
 class WorkerError(ConvexroughError):
-    """Workers of a sweep stopped, or run another version of a package; computed rows are kept."""
+    """Workers of a sweep stopped, or run another version of a package.
+
+    Computed rows are kept; `cr.sweep` with `resume=True` computes the rest.
+    """

@@ -97,13 +97,14 @@ class Task(Record):
 class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
+    scene, solver : the scene, and the solver of the normal problem
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
         has all asperities that can touch up to this approach. None if the pattern is limited in
         another way, or if the asperities are not in a pattern
     influence : how the compliance matrix is stored; None for the cheapest way
     stages : the tables of the file that request results, by name; the first table is [normal]
-    text   : text of the file;  seed : seed of its random heights and radii, or None
+    path, text : name and text of the file;  seed : seed of its random heights and radii, or None
     convert : True to convert columns in other units than those of the scene, False to refuse them
     inputs : the SHA-256 of each file that was read, by the path of the file
 
@@ -123,7 +124,8 @@ class SceneFile(Task):
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """The contents of a scene file, checked.
 
-    asperities : asperities that replace those of the file
+    path : name of the file, in the format of docs/reference/scene-file.md
+    asperities : asperities that replace those of the file, such as the summits of a map
 
     Raises FileError if a file cannot be read or is not TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes found when the scene is built.

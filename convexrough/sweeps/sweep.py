@@ -47,6 +47,8 @@ def sweep(
 ) -> SweepTable:
     """A table with a row for each of many scenes, and a column for each measured number.
 
+    docs/how-to/sweep.md describes sweep files.
+
     what     : a sweep file; or its tables, as a mapping; or scenes
     approach, load : only if `what` is scenes, and only one of the two: approaches [length] or loads
         [force]; one number for all scenes, or one for each scene

@@ -177,6 +177,7 @@ class SweepTable(Record):
         measured, over : names of columns; default: the first measured number and the first swept
             key. If the values of the other swept keys that are not random have at most four
             combinations, each combination has bands of its own
+        axes : where to draw; default: new axes
 
         Raises InputError if nothing is swept, if there are no rows, and for unknown names.
         """
@@ -198,7 +199,9 @@ class SweepTable(Record):
     def quantiles(
         self, measured: Sequence[str] | None = None, at: Sequence[float] = USUAL
     ) -> Columns:
-        """Quantiles over seeds; a row for each computed grid point and each measured number.
+        """Quantiles over seeds, as columns by name.
+
+        There is a row for each computed grid point and each measured number.
 
         measured : names of measured numbers, by default all;  at : quantiles, from 0 to 1
 
