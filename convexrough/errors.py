@@ -15,7 +15,14 @@ if TYPE_CHECKING:
 
 
 class ConvexroughError(Exception):
-    """Base class of all errors that this package raises."""
+    """Base class of all errors that this package raises.
+
+    >>> try:
+    ...     cr.press(scene, approach="deep")
+    ... except cr.ConvexroughError as error:
+    ...     print(error)
+    approach: found 'deep', expected a finite number
+    """
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the error with its message, unchanged."""
@@ -33,6 +40,10 @@ class InputError(ConvexroughError, ValueError):
     found    : the value given
     expected : a description of valid values ("a positive number")
     where    : file, table, row or column, if known
+
+    >>> wrong = cr.InputError("load", found=-1.0, expected="a positive number")
+    >>> print(wrong.located("scene.toml", table="normal"))
+    scene.toml: [normal] load: found -1.0, expected a positive number
     """
 
     def __init__(self, what: str, *, found: object, expected: str, where: str = "") -> None:
@@ -40,16 +51,21 @@ class InputError(ConvexroughError, ValueError):
         place = f"{where}: " if where else ""
         super().__init__(f"{place}{what}: found {found}, expected {expected}")
 
-    def within(self, where: str) -> InputError:
-        """The same error, with `where` (a file, for example) in front of the message."""
+    def located(self, where: str, table: str = "") -> InputError:
+        """The same error, with `where` (a file, for example) in front of the message.
+
+        table : the name of a table of this file, in brackets in front of the name of the value
+        """
         place = f"{where}: {self.where}" if self.where else where
-        return InputError(self.what, found=self.found, expected=self.expected, where=place)
+        what = f"[{table}] {self.what}" if table else self.what
+        return InputError(what, found=self.found, expected=self.expected, where=place)
 
 
 @contextmanager
-def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
+def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> Iterator[None]:
     """A context manager: put `where` (a file, a table) in front of InputErrors of the body.
 
+    table : as for `InputError.located`
     unless_known : True to leave errors unchanged that name a place already. A MistakesError never
         changes
     """
@@ -58,7 +74,7 @@ def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
     except InputError as error:
         if isinstance(error, MistakesError) or (unless_known and error.where):
             raise
-        raise error.within(str(where)) from error
+        raise error.located(str(where), table) from error
 
 
 class MistakesError(InputError):
@@ -81,7 +97,14 @@ class TableError(MistakesError):
 
 
 class FileError(ConvexroughError):
-    """A file or folder cannot be read or written, or must not be overwritten."""
+    """A file or folder cannot be read or written, or must not be overwritten.
+
+    >>> try:
+    ...     cr.read_scene("missing.toml")
+    ... except cr.FileError as error:
+    ...     print(error)
+    missing.toml: cannot be read: No such file or directory
+    """
 
 
 @contextmanager
@@ -97,12 +120,15 @@ def file_errors(path: Path, what: str) -> Iterator[None]:
 
 
 class SolverError(ConvexroughError):
-    """A solver stopped without a solution.
+    """A solver stopped without a solution. Solvers of users may raise it, too.
 
     what    : the reason, with the number that shows it
     solver  : name of the solver
     advice  : what to try, or ""
     iterate : [force] the latest loads (n,), or shear forces (n,) or (n, 2); None if there are none
+
+    >>> print(cr.SolverError("no descent after 3 steps", solver="mine", advice="a smaller load"))
+    mine: no descent after 3 steps; a smaller load
     """
 
     def __init__(
@@ -119,7 +145,15 @@ class SolverError(ConvexroughError):
 
 
 class ProofError(ConvexroughError):
-    """Nothing could be proved; the message says why."""
+    """Nothing could be proved; the message says why.
+
+    >>> twins = cr.Asperities([[-5e-5, 0.0], [5e-5, 0.0]], 0.02)
+    >>> try:
+    ...     cr.press(cr.Scene(1.0, twins, scene.material), load=6.6e-8).proof()
+    ... except cr.ProofError as error:
+    ...     print(str(error).split(":")[0])
+    nothing is proved
+    """
 
 
 #: Packages to install for an extra, if their names differ from that of the extra.
@@ -150,4 +184,7 @@ def needed(module: str, extra: str = "") -> Any:
 
 
 class WorkerError(ConvexroughError):
-    """Workers of a sweep stopped, or run another version of a package; computed rows are kept."""
+    """Workers of a sweep stopped, or run another version of a package.
+
+    Computed rows are kept; `cr.sweep` with `resume=True` computes the rest.
+    """

@@ -49,6 +49,9 @@ def assert_certified(
     floor  : [force] a load up to this size counts as 0, that is, its asperity is claimed to be open
 
     Raises AssertionError with the asperities concerned.
+
+    >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
+    'global'
     """
     __tracebackhide__ = True
     verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
@@ -79,6 +82,11 @@ def assert_shear_certified(
         friction times the load, within a fraction 1e-4
 
     Raises AssertionError with the asperities concerned.
+
+    >>> state = cr.shear(contact, force=9e-8)
+    >>> proof = cr.testing.assert_shear_certified(contact, state.forces, force=9e-8, within=1e-9)
+    >>> proof.holds
+    True
     """
     __tracebackhide__ = True
     verdict = _asked(verify_shear, contact, forces, force=force, within=within, sliding=sliding)
@@ -107,6 +115,9 @@ def assert_agree(
     the sum of their error bounds (`compare.contradictions`). Raises AssertionError with the
     asperities concerned; InputError if the numbers of asperities differ, or the prescribed
     quantities of two contacts.
+
+    >>> other = cr.press(scene, approach=5e-5, solver="conic")
+    >>> cr.testing.assert_agree(contact, other, within=1e-9)
     """
     __tracebackhide__ = True
     within = tolerance("within", within)

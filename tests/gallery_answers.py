@@ -38,9 +38,7 @@ def digits(ball: arb) -> str:
 
 def answer(case: dict[str, Any]) -> dict[str, Any]:
     """What is stored as the answer of a case."""
-    a = cr.Asperities(case["positions"], case["tip_radii"], case["heights"])
-    material = cr.Material(case["contact_modulus"], case["poisson_ratio"])
-    scene = cr.Scene(case["sphere_radius"], a, material, case["friction"], case["geometry"])
+    scene = cases.scene_of(case)
     contact = cr.press(scene, **case["prescribed"])
     full = solve_exactly(scene, **case["prescribed"], start=contact.loads, digits=DIGITS)
     return {

@@ -221,22 +221,14 @@ def test_axes_in_axes_out() -> None:
         assert other.get_xlabel()
 
 
-PUBLIC = [name for name in cr.__all__ if hasattr(getattr(cr, name), "__module__")]
-
-#: Where they live: modules whose docstrings' examples are run.
-MODULES = sorted(
-    {getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"}
-    | {getattr(cr.surface, name).__module__ for name in cr.surface.__all__}
-    | {getattr(cr.solvers, name).__module__ for name in cr.solvers.__all__ if name != "SOLVERS"}
-    | {"convexrough.gallery.cases", "convexrough.gallery.any_size"}
-    | {"convexrough.compare", "convexrough.proof"}
-)
+ROOT = Path(cr.__file__).parent
+EXAMPLES = sorted(path for path in ROOT.rglob("*.py") if ">>> " in path.read_text("utf-8"))
 
 
 @pytest.mark.usefixtures("no_processes")
 @pytest.mark.sample(12)
-@pytest.mark.parametrize("module", MODULES)
-def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_examples_in_docstrings(path: Path, tmp_path: Path) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)
     names = {
         "cr": cr,
@@ -246,6 +238,7 @@ def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
         "new_scene": NEW_SCENE,
         "folder": tmp_path,
     }
+    module = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts)
     found = doctest.DocTestFinder().find(importlib.import_module(module), extraglobs=names)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
     for test in found:

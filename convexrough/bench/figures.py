@@ -37,17 +37,11 @@ COLUMNS = 3
 EXACT = 1e-17
 
 
-def bench_figures(bench: Bench) -> dict[str, Figure]:
-    """The figures of the measurements, by file name without extension.
-
-    "work-precision" : time against true error, a panel for each scene, the frontier in grey
-    "cost"           : time to press a scene against the number of asperities
-    """
-    return {"work-precision": work_figure(bench), "cost": cost_figure(bench)}
-
-
 def work_figure(bench: Bench) -> Figure:
-    """The figure of time against true error, with a panel for each scene; lower left is better."""
+    """The figure of time against true error, with a panel for each scene; lower left is better.
+
+    The frontier is grey.
+    """
     panels = bench.panels()
     columns = min(COLUMNS, max(1, len(panels)))
     rows = max(1, -(-len(panels) // columns))

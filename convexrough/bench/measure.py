@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
@@ -23,6 +22,7 @@ from convexrough.friction.shear import shear
 from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.problem import NormalProblem
+from convexrough.run.stage import limit
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
@@ -68,18 +68,13 @@ def _pressed(scene: Scene) -> Contact:
     return press(scene, approach=APPROACH)
 
 
-def _bearable(contact: Contact) -> float:
-    """The friction limit f P."""
-    return checks.friction(contact.scene.friction) * contact.load
-
-
 def _cycled(contact: Contact) -> Cycle:
-    return cycle(contact, maximum=0.5 * _bearable(contact))
+    return cycle(contact, maximum=0.5 * limit(contact))
 
 
 def _along_corners(contact: Contact) -> LoadPath:
     P, T = CORNERS.T
-    return load_path(contact.scene, loads=contact.load * P, forces=_bearable(contact) * T)
+    return load_path(contact.scene, loads=contact.load * P, forces=limit(contact) * T)
 
 
 #: The tasks that are timed at many sizes, by name: the preparation of an argument, and the function
@@ -87,19 +82,19 @@ def _along_corners(contact: Contact) -> LoadPath:
 TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
     "press": (lambda make: make(), _pressed),
     "from nothing": (lambda make: make, lambda make: _pressed(make())),
-    "shear": (lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * _bearable(it))),
+    "shear": (lambda make: _pressed(make()), lambda it: shear(it, force=0.5 * limit(it))),
     "loss curve": (
         lambda make: _pressed(make()),
-        lambda it: cycles(it, _bearable(it) * PARTS_OF_LIMIT),
+        lambda it: cycles(it, limit(it) * PARTS_OF_LIMIT),
     ),
     "load path": (lambda make: _pressed(make()), _along_corners),
     "gradient": (lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")),
 }
 
 
-def reference(scene: Scene, approach: float) -> Array:
+def reference(scene: Scene) -> Array:
     """(n,) [force] accurate loads. Raises SolverError if they are not proved accurate."""
-    contact = press(scene, approach=approach)
+    contact = _pressed(scene)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
         advice = "another approach, or asperities further apart"

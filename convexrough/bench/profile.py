@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.compare import compare, every_solver
 from convexrough.gallery.cases import case, names
-from convexrough.plots.notebook import Figure
+from convexrough.plots.notebook import new_axes
 from convexrough.plots.style import SINGLE, TICK, label
 from convexrough.progress import LOGGER
 from convexrough.solvers import Newton, Solver
@@ -62,8 +62,7 @@ class Profile:
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Plot the part of the cases answered right against time / least time; return the axes."""
-        if axes is None:
-            axes = Figure(figsize=(SINGLE, 3.8), layout="constrained").subplots()
+        axes = new_axes((SINGLE, 3.8)) if axes is None else axes
         finite = self.ratios[np.isfinite(self.ratios)]
         factors = np.unique(np.append(finite, 2.0 * finite.max(initial=1.0)))
         parts = np.array([self.part(factor) for factor in factors])

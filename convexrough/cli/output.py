@@ -47,15 +47,13 @@ solver_option = click.option(
     help="A solver of the package, or the import path of your class, such as mine.Solver; may be "
     "repeated.",
 )  # fmt: skip
-proof_option = click.option(
-    "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
-)
-html_option = click.option(
-    "--html", is_flag=True, help="Also write slider.html, an interactive page."
-)
 
 #: The options that say where results go and in which form, in the order of the help.
 OPTIONS = {
+    "proof": click.option(
+        "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."),
+    "html": click.option(
+        "--html", is_flag=True, help="Also write slider.html, an interactive page."),
     "formats": click.option(
         "--formats", metavar="LIST", default="png", show_default=True,
         callback=lambda *given: _formats(given[-1]), help="Formats of figures: png, svg, pdf."),
@@ -72,11 +70,10 @@ OPTIONS = {
 
 
 def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """A decorator that adds these `OPTIONS`, by default all, to a command.
+    """A decorator that adds these `OPTIONS` to a command.
 
     The command is called with an `Output`, which has their values, as its first argument.
     """
-    names = names or tuple(OPTIONS)
 
     def add(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)
@@ -98,6 +95,8 @@ class Output:
     Its fields are the values of the `OPTIONS`.
     """
 
+    proof: bool = False
+    html: bool = False
     out: Path | None = None
     force: bool = False
     as_json: bool = False
@@ -130,15 +129,38 @@ class Output:
         more: dict[str, Any] | None = None,
     ) -> int:
         """Print the summary with `more`, or results and `lines`; return the exit status."""
-        from convexrough.run.results import describe, summarise, warnings
+        from convexrough.run.results import summarise
 
-        summary = summarise(results) | (more or {})
-        self.say(summary, [*describe(results), *lines], warnings(results))
+        first, *others = (result.lines() for result in results)
+        lines = [*first, *(line for each in others for line in ("", *each)), *lines]
+        warnings = (it for result in results for it in (*result.doubts(), *result.cautions()))
+        self.say(summarise(results) | (more or {}), lines, warnings)
         return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
-    def say_proof(self, proof: Proof, folder: Path) -> None:
-        """Print what is proved, and where proof.json is."""
-        click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}", err=self.as_json)
+    def proved(self, work: Callable[[], Proof], folder: Path) -> Proof | None:
+        """The proof, which is also written to the folder; None without --proof.
+
+        If nothing can be proved, a warning gives the reason, and None is returned.
+        """
+        if not self.proof:
+            return None
+        try:
+            with progress("proving"):
+                found = work()
+        except ProofError as error:
+            say_aside("warning", f"proof.json is not written: {error}")
+            return None
+        found.save(folder / "proof.json")
+        return found
+
+    def say_proof(self, proof: Proof | None, folder: Path, status: int) -> int:
+        """Print what is proved, and where proof.json is; return the exit status.
+
+        status : the exit status unless --proof is given and no proof is found
+        """
+        if proof is not None:
+            click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}", err=self.as_json)
+        return NOT_CERTIFIED if self.proof and proof is None else status
 
 
 def written(new: Writer) -> list[str]:
@@ -149,16 +171,6 @@ def written(new: Writer) -> list[str]:
 
 def say_aside(*parts: str) -> None:
     click.echo(": ".join(("convexrough", *parts)), err=True)
-
-
-def proved(work: Callable[[], Proof]) -> Proof | None:
-    """The proof, or None after a warning with the reason."""
-    try:
-        with progress("proving"):
-            return work()
-    except ProofError as error:
-        say_aside("warning", f"proof.json is not written: {error}")
-        return None
 
 
 @contextmanager

@@ -25,10 +25,9 @@ from convexrough.cli.output import (
     WRONG_INPUT,
     say_aside,
 )
-from convexrough.cli.run import check, new, run
+from convexrough.cli.run import check, new, run, sweep
 from convexrough.cli.solvers import bench, compare, export, gallery, paper
 from convexrough.cli.summits import summits
-from convexrough.cli.sweep import sweep
 from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError, WorkerError
 from convexrough.version import __version__

@@ -1,35 +1,34 @@
-"""Commands: `run` computes a scene file, `new` writes one, and `check` checks a proof file."""
+"""Commands about scene files and proof files: `run`, `sweep`, `new` and `check`."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
 from convexrough.atomic import replacing
 from convexrough.cli.output import (
     DONE,
+    INTERRUPTED,
     NOT_CERTIFIED,
+    OPTIONS,
     PATH,
+    SOLVER_FAILED,
     Output,
-    html_option,
     output_options,
     progress,
-    proof_option,
-    proved,
     say_aside,
     written,
 )
-from convexrough.errors import FileError, blamed_on
+from convexrough.errors import FileError, WorkerError, blamed_on
 
 
 @click.command()
 @click.argument("scene", type=PATH)
-@proof_option
-@html_option
-@output_options()
-def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
+@output_options(*OPTIONS)
+def run(output: Output, scene: Path) -> int:
     """Compute a scene; write tables, certificate and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
@@ -41,12 +40,14 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
-        return _swept(scene, output, given=html or proof)
+        if output.html or output.proof:
+            raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
+        return _swept(scene, output)
     file = read_scene(scene)
     with blamed_on(scene):
-        if html:
+        if output.html:
             checks.friction(file.scene.friction)
-        if proof:
+        if output.proof:
             from convexrough.proof import refuse_many
 
             refuse_many(file.scene)
@@ -58,29 +59,122 @@ def run(output: Output, scene: Path, html: bool, proof: bool) -> int:
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
-            page = slider_page(results[0]) if html else None
+            page = slider_page(results[0]) if output.html else None
             new.results(results, figures=not output.no_figures)
             new.text("scene.toml", file.text)
             if page is not None:
                 new.text("slider.html", page)
         prove = partial(prove_results, results, partial(say_aside, "warning"))
-        evidence = proved(prove) if proof else None
-        if evidence is not None:
-            evidence.save(new.path / "proof.json")
+        proof = output.proved(prove, new.path)
     status = output.say_results(results, written(new))
-    if evidence is not None:
-        output.say_proof(evidence, new.folder)
-    return NOT_CERTIFIED if proof and evidence is None else status
+    return output.say_proof(proof, new.folder, status)
 
 
-def _swept(sweep: Path, output: Output, *, given: bool) -> int:
-    from convexrough.cli.sweep import sweep as command
+def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
+    """The pair (K, N) from the text K/N, which asks for share K of N shares, counted from 1."""
+    if value is None:
+        return None
+    k, _, n = value.partition("/")
+    if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise click.BadParameter(f"{value}: expected K/N, whole numbers with K from 1 to N")
+    return int(k), int(n)
 
-    if given:
-        raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
-    own = {"out": output.out, "force": output.force, "as_json": output.as_json}
-    status: int = click.get_current_context().invoke(command, sweep=sweep, **own)
-    return status
+
+@click.command()
+@click.argument("sweep", type=PATH, required=False)
+@click.option("--part", metavar="K/N", callback=_part,
+              help="Compute the K-th of N shares of the scenes.")  # fmt: skip
+@click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
+@click.option("--scheduler", metavar="ADDRESS",
+              help='Dask scheduler: tcp://..., a file, or "local".')  # fmt: skip
+@click.option("--workers", metavar="N", type=click.IntRange(1),
+              help="Number of processes; default: all cores.")  # fmt: skip
+@click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of the results in DIR.")
+@output_options("out", "force", "as_json")
+def sweep(
+    output: Output,
+    sweep: Path | None,
+    summary: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    resume: bool,
+    part: tuple[int, int] | None,
+) -> int:
+    """Compute every scene of SWEEP, a scene file with a table [sweep].
+
+    Results go to a folder named after the file (rough.toml: rough-sweep) unless --out names
+    another. With --summary DIR in place of SWEEP the command computes no scenes, but prints
+    quantiles of the results in the folder DIR; with --out it also writes them, and figures.
+
+    Exit status: 0 if all computed scenes are certified; 2 if the input is wrong; 3 if a scene is
+    undecided; 4 if a scene failed, or if the sweep stopped because worker processes died or had
+    other versions of packages than this command; 130 if interrupted. If the command stops early,
+    the rows computed so far are kept, and the same command with --resume computes the rest.
+    """
+    if (sweep is None) == (summary is None):
+        raise click.UsageError("Either SWEEP, or --summary DIR.")
+    if summary is not None:
+        return _say_summary(summary, output)
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers and --scheduler exclude each other.")
+    if resume and output.force:
+        raise click.UsageError("--resume and --force exclude each other.")
+    assert sweep is not None  # SWEEP or --summary is given
+    return _swept(sweep, output, workers, scheduler, resume=resume, part=part)
+
+
+def _swept(
+    sweep: Path,
+    output: Output,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    **options: Any,
+) -> int:
+    from convexrough.sweeps.plan import read_sweep
+    from convexrough.sweeps.pool import Processes, dask
+    from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
+    from convexrough.sweeps.sweep import run
+
+    folder = output.out or Path(f"{sweep.stem}-sweep")
+    with progress("reading the first scene"):
+        plan = read_sweep(sweep)
+    try:
+        pool = Processes(workers) if scheduler is None else dask(scheduler)
+        with progress(str(sweep)), pool as executor:
+            table, did = run(plan, executor, out=folder, overwrite=output.force, **options)
+    except KeyboardInterrupt:
+        say_aside("interrupted", progress_kept(folder, plan))
+        return INTERRUPTED
+    except WorkerError as error:
+        say_aside("error", str(error), progress_kept(folder, plan))
+        return SOLVER_FAILED
+    said = summarise(table, **did)
+    output.say(said, describe(said), (*failures(table), *cautions(table)))
+    return _status(said)
+
+
+def _say_summary(folder: Path, output: Output) -> int:
+    from convexrough.record import rows_of
+    from convexrough.sweeps import report
+    from convexrough.sweeps.table import open_sweep
+
+    table = open_sweep(folder)
+    with progress(f"reading {folder}"):
+        said = report.summarise(table)
+        found = table.quantiles(at=report.AT)
+    lines = [*report.describe(said), "", *report.describe_quantiles(found)]
+    if output.out is not None:
+        with progress("writing results"), output.folder(output.out) as new:
+            report.write_summary(new, table, found)
+        lines += [*written(new), *report.figures_left_out(table)]
+    output.say({**said, "quantiles": rows_of(found)}, lines)
+    return _status(said)
+
+
+def _status(summary: dict[str, Any]) -> int:
+    if summary["sweep"]["failed"]:
+        return SOLVER_FAILED
+    return NOT_CERTIFIED if summary["sweep"]["undecided"] else DONE
 
 
 @click.command()

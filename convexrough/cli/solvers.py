@@ -9,10 +9,10 @@ import click
 from convexrough.cli.output import (
     DONE,
     NOT_CERTIFIED,
+    OPTIONS,
     PATH,
     SOLVER_FAILED,
     Output,
-    html_option,
     output_options,
     progress,
     solver_option,
@@ -212,9 +212,8 @@ def bench(output: Output, quick: bool, page: Path | None) -> int:
 
 
 @click.command()
-@html_option
-@output_options()
-def paper(output: Output, html: bool) -> int:
+@output_options(*(name for name in OPTIONS if name != "proof"))
+def paper(output: Output) -> int:
     """Reproduce the example of Dini and Hills (2009).
 
     Tables and figures go to the folder paper-results unless --out names another.
@@ -232,7 +231,7 @@ def paper(output: Output, html: bool) -> int:
         new.tables(figure_data(states))
         if not output.no_figures:
             new.figures(paper_figures(contact, states))
-        if html:
+        if output.html:
             new.text("slider.html", slider_page(found[0]))
         more = {"paper": comparison}
         new.results(found, figures=False, more=more)

@@ -114,7 +114,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
                    "height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
-@output_options()
+@output_options("formats", "dpi", "out", "no_figures", "force", "as_json")
 def summits(
     output: Output,
     surface: Path,

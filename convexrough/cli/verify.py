@@ -18,8 +18,6 @@ from convexrough.cli.output import (
     Output,
     output_options,
     progress,
-    proof_option,
-    proved,
     say_aside,
     written,
 )
@@ -93,8 +91,7 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
               help="Prescribed total of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
 @click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML.")
-@proof_option
-@output_options("out", "force", "as_json")
+@output_options("proof", "out", "force", "as_json")
 def verify(
     output: Output,
     scene: Path,
@@ -105,7 +102,6 @@ def verify(
     shear_force: float | None,
     explain: bool,
     junit: Path | None,
-    proof: bool,
     **how: Any,
 ) -> int:
     """Check contact loads from another code.
@@ -135,12 +131,12 @@ def verify(
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
-    if explain and (output.out or junit or proof):
+    if explain and (output.out or junit or output.proof):
         raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
     if junit is not None and junit.suffix.lower() != ".xml":
         found_ending = junit.suffix or "no ending"
         raise FileError(f"--junit {junit}: found {found_ending}, expected .xml")
-    alone = [Path("proof.json")] if proof and output.out is None else []
+    alone = [Path("proof.json")] if output.proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not output.force:
             raise FileError(f"{each}: exists already; --force replaces it")
@@ -171,11 +167,10 @@ def verify(
         summary = headed(normal=normal) | report.verdict_summary(claims)
         holds = all(claim.holds for claim in claims)
         claimed = np.where(of_loads.claimed, of_loads.values, 0.0)
-        evidence = proved(partial(_proof, file, claimed, holds, scene)) if proof else None
         if new is not None:
             _write(new, summary, claims)
-        if evidence is not None:
-            evidence.save((new.path if new else Path()) / "proof.json")
+        prove = partial(_proof, file, claimed, holds, scene)
+        proof = output.proved(prove, new.path if new else Path())
     if junit is not None:
         write_text(junit, report.junit(claims, names))
     lines = [*(each.note for each in read), *about]
@@ -190,9 +185,7 @@ def verify(
     if not holds:
         reasons = filter(None, map(report.reason, claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")
-    if evidence is not None:
-        output.say_proof(evidence, output.out or Path())
-    return DONE if holds and (evidence is not None or not proof) else NOT_CERTIFIED
+    return output.say_proof(proof, output.out or Path(), DONE if holds else NOT_CERTIFIED)
 
 
 @contextmanager

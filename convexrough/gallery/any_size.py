@@ -37,7 +37,8 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
 
     Each asperity touches with the probability `touching`. Contact radii are random from 0.1 to 0.45
     spacings, tip radii from 4 to 8 spacings, and gaps from 0 to the largest indentation. With other
-    versions of numpy, a `seed` may give other numbers.
+    versions of numpy, a `seed` may give other numbers. Raises InputError for a `count` below 1, and
+    unless `touching` is from 0 to 1.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

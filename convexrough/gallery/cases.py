@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -76,7 +76,11 @@ class HardCase(Record):
     displacement  : digits [length] of the relative displacement of the bodies, or ""
 
     >>> case = cr.gallery.case("grazing-gap-1e-9")
-    >>> case.check(cr.press(case.scene, **case.control).loads).right
+    >>> contact = cr.press(case.scene, **case.control)
+    >>> case.check(contact.loads).right, int(case.touching.sum())
+    (True, 7)
+    >>> state = cr.shear(contact, force=case.shear_force)
+    >>> case.check_shear(state.forces, within=1e-12).right
     True
     """
 
@@ -114,13 +118,20 @@ class HardCase(Record):
 
         within : largest error allowed, over the largest load
         floor  : [force] an asperity with a load up to this counts as open
+
+        Raises InputError for a wrong number of loads.
         """
         given = checks.array("loads", loads, length=len(self))
         claimed = given > checks.non_negative("floor", floor)
         return _judged(given, self.loads, claimed, self.touching, within)
 
     def check_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Checked:
-        """The comparison of shear forces (n,) [force], at the end of a history, with the answer."""
+        """The comparison of shear forces (n,) [force], at the end of `history`, with the answer.
+
+        within : largest error allowed, over the largest shear force
+
+        Raises InputError for a wrong number of forces, and if there is no answer in shear.
+        """
         if not self.forces:
             found = "a case in which an asperity is dragged along by the others"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
@@ -150,6 +161,8 @@ def _judged(
 def names(*wanted: str) -> tuple[str, ...]:
     """The names of all cases, or of the cases and families in `wanted`.
 
+    Raises InputError for an unknown name; the message suggests the most similar one.
+
     >>> cr.gallery.names("few", "clustered")
     ('one', 'one-under-load', 'two-equal', 'clustered')
     """
@@ -165,7 +178,7 @@ def names(*wanted: str) -> tuple[str, ...]:
 
 
 def case(name: str) -> HardCase:
-    """The hard case of this name.
+    """The hard case of this name. Raises InputError if there is none.
 
     >>> cr.gallery.case("one").why
     'one contact: no neighbours, no shells, an answer in closed form'
@@ -179,13 +192,7 @@ def case(name: str) -> HardCase:
         name=name,
         family=data["family"],
         why=data["why"],
-        scene=Scene(
-            data["sphere_radius"],
-            Asperities(data["positions"], data["tip_radii"], data["heights"]),
-            Material(data["contact_modulus"], data["poisson_ratio"]),
-            data["friction"],
-            data["geometry"],
-        ),
+        scene=scene_of(data),
         approach=data["prescribed"].get("approach"),
         load=data["prescribed"].get("load"),
         exact_approach=answer["approach"],
@@ -195,6 +202,13 @@ def case(name: str) -> HardCase:
         history=frozen(np.array(_reversals(data["reversals"])) * data["shear_force"]),
         **{each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")},
     )
+
+
+def scene_of(data: Mapping[str, Any]) -> Scene:
+    """The scene of an entry of the file `DATA`."""
+    asperities = Asperities(data["positions"], data["tip_radii"], data["heights"])
+    material = Material(data["contact_modulus"], data["poisson_ratio"])
+    return Scene(data["sphere_radius"], asperities, material, data["friction"], data["geometry"])
 
 
 @cache

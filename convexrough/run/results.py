@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from convexrough import plots
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError, ProofError, file_errors
 from convexrough.friction.shear import shear
@@ -63,19 +64,6 @@ def headed(**contents: Any) -> Summary:
 def summarise(results: Iterable[Result]) -> Summary:
     """The contents of summary.json, which `--json` prints, in the scene's units."""
     return headed(**{result.name: result.summary() for result in results})
-
-
-def describe(results: Iterable[Result]) -> list[str]:
-    """The printed report of all stages, in aligned lines."""
-    first, *others = results
-    return [*first.lines(), *(line for it in others for line in ("", *it.lines()))]
-
-
-def warnings(results: Iterable[Result]) -> Iterator[str]:
-    """Yield warnings about results that are not proved, and about limits of the model."""
-    for result in results:
-        yield from result.doubts()
-        yield from result.cautions()
 
 
 def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Proof:
@@ -142,13 +130,11 @@ class Writer:
 
     def figures(self, figures: Mapping[str, Figure]) -> None:
         """Write each figure in each format."""
-        from convexrough.plots import save  # matplotlib: only when it draws
-
         for stem, figure in figures.items():
             for kind in self.formats:
                 path = self.path / f"{stem}.{kind}"
                 with replacing(path) as temporary:
-                    save(figure, temporary, kind, self.dpi)
+                    plots.save(figure, temporary, kind, self.dpi)
                 self.files.append(path)
                 figure.set_layout_engine("none")  # the layout is the same in all formats
 

@@ -7,42 +7,29 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from convexrough.arrays import Array
 from convexrough.contact import Contact, assembled, solve
 from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
+from convexrough.run.asperity_file import read_summits
 from convexrough.scene.asperities import CUT_DEVIATIONS, Asperities, largest_tip_radius
 from convexrough.scene.base import checked
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.arrays import reading
-from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, few, named_columns, read_table
-from convexrough.tabular.text import bare
+from convexrough.tabular.table import Reading, few, named_columns
 from convexrough.tabular.toml_slips import explained
-from convexrough.tabular.units import parsed
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
     from convexrough.run.study import LatticeTable, Study
-
-#: Names of columns with results, which are ignored in a table of asperities.
-RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
-           "area", "contact")  # fmt: skip
-
-#: Relative rounding error up to which a last row counts as the means or sums of a table.
-ROUNDED = 1e-3
 
 #: Largest number of mistakes in a scene file that are listed; the other mistakes are counted.
 MOST_MISTAKES = 50
@@ -59,72 +46,6 @@ MOST_PARTS = 100
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
-def unknown(column: str) -> bool:
-    """True if a column may contain heights: its header is not a number, an index or a result."""
-    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
-
-
-def read_summits(
-    path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
-) -> Asperities:
-    """The asperities in a file with columns x and y, and perhaps height (or z) and tip_radius.
-
-    tip_radius : [length] one number or (n,); None if the file has a column tip_radius
-
-    Raises FileError, or InputError with the column or row, if the table is wrong.
-    """
-    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
-    columns = table.columns
-    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
-    if "height" not in columns and unread:
-        named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
-        raise InputError("columns", found=f"{', '.join(unread)}, but no height",
-                         expected=f"a column height; {named}", where=str(path))  # fmt: skip
-    for name, said in table.units.items():
-        if parsed(said) and not how.units.length:
-            expected = f'[units] length in the scene file, as "{said}"'
-            raise InputError(f"column {name}", found=f"{said}, and a scene without units",
-                             expected=expected, where=str(path))  # fmt: skip
-    for name, cells in table.others.items():
-        if bare(name).lower() in INDEX and is_permuted(cells):
-            found = f"{cells[0]:g}, {cells[1]:g}, ..."
-            expected = "the rows in increasing order, or no such column"
-            raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
-    if what := _summary_in_last_row([*columns.values()]):
-        raise InputError(table.rows[-1], found=f"the {what} of the other rows",
-                         expected="an asperity: remove this row", where=str(path))  # fmt: skip
-    given = columns.get("tip_radius")
-    if (given is None) == (tip_radius is None):
-        found = "neither" if given is None else "both"
-        expected = "either a column tip_radius or the key tip_radius in the scene file"
-        raise InputError("tip radii", found=found, expected=expected, where=str(path))
-    positions = np.column_stack((columns["x"], columns["y"]))
-    radii = tip_radius if given is None else given
-    assert radii is not None  # one of the two is given
-    with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
-        return Asperities(positions, radii, columns.get("height", 0.0))
-
-
-def _summary_in_last_row(columns: list[Array]) -> str:
-    """ "means" or "sums" if the last row contains those of the rows above; else ""."""
-    own = columns[2:]
-    if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
-        return ""  # the mean of a regular array is an asperity in its middle
-    for what, of in (("means", np.mean), ("sums", np.sum)):
-        if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
-            return what
-    return ""
-
-
-def is_permuted(cells: NDArray[Any]) -> bool:
-    """True if the cells are the numbers 0, 1, ... or 1, 2, ... in another order."""
-    if cells.dtype.kind != "f" or len(cells) < 2:
-        return False
-    ordered = np.sort(cells)
-    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
-    return bool(counts and (ordered != cells).any())
-
-
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Task(Record):
     """A scene, its prescribed approach or load, and the stages to compute, such as [cycle]."""
@@ -138,7 +59,7 @@ class Task(Record):
     influence: Kind | None = None
 
     def problem(self) -> NormalProblem:
-        """The normal contact problem."""
+        """The normal contact problem, which solvers take. Raises InputError."""
         return NormalProblem.assemble(
             self.scene,
             approach=self.approach,
@@ -148,16 +69,27 @@ class Task(Record):
         )
 
     def press(self) -> Contact:
-        """The contact under the prescribed approach or load. Raises the errors of `press`."""
+        """The contact under the prescribed approach or load, as found by `solver`.
+
+        Raises InputError and SolverError, as `press` does.
+        """
         given = self.approach, self.load, self.influence, self.highest_approach
         return solve(assembled(self.solver, self.scene, *given), self.solver)
 
     def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about stages that do not fit the contact, before they are computed."""
+        """Yield warnings about stages that do not fit the contact, before they are computed."""
         return (each for stage in self.stages.values() for each in stage.cautions(contact))
 
     def compute(self, contact: Contact) -> list[Result]:
-        """The results of all stages; the first is the pressed contact."""
+        """The results of all stages, in the order of `stages`; the first is that of [normal].
+
+        contact : the result of `press()`
+
+        Each result has the methods `summary`, `tables`, `lines`, `figures`, `plot`, `to_dataframe`,
+        which are what the command `run` writes and prints, and the property `certified`.
+
+        Raises InputError and SolverError.
+        """
         return [stage.compute(contact) for stage in self.stages.values()]
 
 
@@ -165,20 +97,21 @@ class Task(Record):
 class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
+    scene, solver : the scene, and the solver of the normal problem
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
         has all asperities that can touch up to this approach. None if the pattern is limited in
         another way, or if the asperities are not in a pattern
     influence : how the compliance matrix is stored; None for the cheapest way
     stages : the tables of the file that request results, by name; the first table is [normal]
-    text   : text of the file;  seed : seed of its random heights and radii, or None
+    path, text : name and text of the file;  seed : seed of its random heights and radii, or None
     convert : True to convert columns in other units than those of the scene, False to refuse them
     inputs : the SHA-256 of each file that was read, by the path of the file
 
     >>> file = cr.read_scene(new_scene)
     >>> contact = file.press()
-    >>> [result.certified for result in file.compute(contact)]
-    [True, True, True, True]
+    >>> [*file.cautions(contact)], [result.certified for result in file.compute(contact)]
+    ([], [True, True, True, True])
     """
 
     path: Path
@@ -191,7 +124,8 @@ class SceneFile(Task):
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """The contents of a scene file, checked.
 
-    asperities : asperities that replace those of the file
+    path : name of the file, in the format of docs/reference/scene-file.md
+    asperities : asperities that replace those of the file, such as the summits of a map
 
     Raises FileError if a file cannot be read or is not TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes found when the scene is built.
@@ -309,7 +243,7 @@ def task_of(
 
     Raises InputError for mistakes that the tables alone do not show.
     """
-    with _blamed_on(path, "material"):
+    with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
 
     def press_on(asperities: Asperities) -> Scene:
@@ -323,7 +257,7 @@ def task_of(
         )
 
     layout, highest = study.asperities, None
-    with _blamed_on(path, "asperities"):
+    with blamed_on(path, "asperities", unless_known=True):
         if asperities is not None:
             scene = press_on(asperities)
         elif layout.pattern == "file":
@@ -389,16 +323,3 @@ def _lattice(
     if most > load:
         found.append((all_that_could_touch(scene, farthest, most)[0], None))
     return max(found, key=lambda each: len(each[0]))
-
-
-@contextmanager
-def _blamed_on(path: Path, table: str) -> Iterator[None]:
-    """Name the file and the table in InputErrors of the body."""
-    try:
-        yield
-    except InputError as error:
-        if error.where:  # the error names another file
-            raise
-        what = f"[{table}] {error.what}"
-        where = str(path)
-        raise InputError(what, found=error.found, expected=error.expected, where=where) from error

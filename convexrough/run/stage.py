@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks, frames
+from convexrough import checks, frames, plots
 from convexrough.contact import Contact
 from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
-from convexrough.plottable import Plottable
-from convexrough.record import Table, rows_of, singular
+from convexrough.record import Record, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
@@ -37,11 +36,13 @@ Labels = Mapping[str, Sequence[float]]
 #: Statuses of asperities, which are also keys for the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: The names of the numbers in results, by physical dimension; other numbers are dimensionless.
+#: Names of numbers in results and of keys of scene files, by physical dimension; other numbers are
+#: dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
-               "displacement_error", "gap_error"),
+               "displacement_error", "gap_error", "radius", "spacing", "tip_radius", "within",
+               "height_std"),
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
@@ -131,7 +132,7 @@ def numbers_of(found: Any, names: Sequence[str]) -> Summary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Table, Plottable):
+class Result(Record):
     """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
 
     stage   : the stage that was computed
@@ -177,8 +178,8 @@ class Result(Table, Plottable):
         return self.rows()
 
     def summary(self) -> Any:
-        """The entry of summary.json: a list of rows, or one mapping."""
-        return self.known
+        """The entry of summary.json: a list of rows, or the only row if rows have no labels."""
+        return self.known if self.stage.labels else self.known[0]
 
     def doubts(self) -> Iterator[str]:
         """The reasons why this result is not certified, one line for each."""
@@ -275,22 +276,13 @@ class Steps(Result):
         })  # fmt: skip
 
     def figures(self) -> Mapping[str, Figure]:
-        from convexrough.plots import between, path_figures  # matplotlib: only when it draws
-
         (found,) = self.found
-        return path_figures(found, fine=between(found))
+        return plots.path_figures(found, fine=plots.between(found))
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""
         lists = {key: [row[key] for row in self.known] for key in self.known[0]}
         return lists | {"order": self.found[0].order}
-
-
-class Single(Result):
-    """The result of a stage with a single row."""
-
-    def summary(self) -> Summary:
-        return self.known[0]
 
 
 def plain(value: Any) -> Any:

@@ -10,10 +10,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from convexrough.errors import SceneFileError
-from convexrough.run.scene_file import Task, read_summits, regular, task_of
+from convexrough.run.asperity_file import read_summits
+from convexrough.run.scene_file import Task, regular, task_of
+from convexrough.run.stage import Columns as Columns
 from convexrough.run.study import LatticeTable, Study, validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
 from convexrough.sweeps.measures import FAILURES, Column, Measured, measured, measured_together
@@ -28,8 +29,6 @@ KEPT = 8
 
 #: The entry of the column `seed` if nothing is random.
 NO_SEED = -1
-
-Columns = dict[str, NDArray[Any]]
 
 #: A row of the table: status, message, and measured numbers.
 Row = tuple[str, str, list[float]]
@@ -71,49 +70,48 @@ class Tables:
 
     def opened(self) -> Callable[[int], Task]:
         """A function from numbers to scenes; consecutive scenes share common data."""
-        layouts: Any = {
-            "summits": lru_cache(KEPT)(read_summits),
-            "lattice": lru_cache(KEPT)(regular),
-        }
-        last: dict[str, Any] = {}
-        return lambda number: task_of(self.path, self._study(number, last), **layouts)
+        summits, lattice = lru_cache(KEPT)(read_summits), lru_cache(KEPT)(regular)
 
-    def _study(self, number: int, last: dict[str, Any]) -> Study:
-        """The checked tables of a scene. Consecutive scenes with equal values share one check."""
-        values, seed = self.grid.point(number)
-        if last.get("values") != values:
+        @lru_cache(1)
+        def checked(number: int) -> Study:
+            values, seed = self.grid.point(number)
             study, mistakes = validate(with_values(self.tables, values, seed))
             if study is None:
                 raise SceneFileError(str(self.path), self.grid.blame(mistakes, seed))
-            last.update(values=values, study=study)
-        known: Study = last["study"]
-        if seed is None or not isinstance(known.asperities, LatticeTable):
-            return known
-        layout = known.asperities.model_copy(update={"seed": seed})
-        return known.model_copy(update={"asperities": layout})
+            return study
+
+        def task(number: int) -> Task:
+            """Scenes that differ only in the seed of heights and tip radii share one check."""
+            study = checked(number if self.grid.draw else number - number % self.grid.each)
+            _, seed = self.grid.point(number)
+            if seed is not None and isinstance(study.asperities, LatticeTable):
+                layout = study.asperities.model_copy(update={"seed": seed})
+                study = study.model_copy(update={"asperities": layout})
+            return task_of(self.path, study, summits=summits, lattice=lattice)
+
+        return task
 
 
 @dataclass(frozen=True)
 class Tasks:
-    """Scenes made in Python, by their numbers."""
+    """Scenes made in Python, by their numbers; `control` is "approach" or "load"."""
 
     tasks: Mapping[int, Task]
+    control: str
 
     @property
     def count(self) -> int:
         return len(self.tasks)
 
     def labels(self, numbers: range) -> Columns:
-        by_load = any(task.load is not None for task in self.tasks.values())
-        some = [self.tasks[number] for number in numbers]
-        given = [task.load if by_load else task.approach for task in some]
+        given = [getattr(self.tasks[number], self.control) for number in numbers]
         return {
-            "normal.load" if by_load else "normal.approach": np.array(given, dtype=np.float64),
+            f"normal.{self.control}": np.array(given, dtype=np.float64),
             "seed": np.full(len(numbers), NO_SEED, dtype=np.int64),
         }
 
     def part(self, numbers: range) -> Tasks:
-        return Tasks({number: self.tasks[number] for number in numbers})
+        return Tasks({number: self.tasks[number] for number in numbers}, self.control)
 
     def opened(self) -> Callable[[int], Task]:
         return self.tasks.__getitem__

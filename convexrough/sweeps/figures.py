@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from convexrough.arrays import Array
-from convexrough.plots.notebook import Figure
+from convexrough.plots.notebook import new_axes
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
@@ -37,8 +37,7 @@ def draw_quantiles(
     others  : other swept keys that are not random; each combination of their values has bands of
         its own if there are at most four; otherwise the legend names them and their number
     """
-    if axes is None:
-        axes = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained").subplots()
+    axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
     good = columns["status"] != "failed"
     rows = {name: values[good] for name, values in columns.items()}
     for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):

@@ -27,6 +27,7 @@ from convexrough.rows import PressedRows, in_rows
 from convexrough.run.scene_file import Task
 from convexrough.run.stage import Stage, limit, unit_of
 from convexrough.run.stages import CycleStage
+from convexrough.scene.scene import Scene
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth_reference
 from convexrough.tabular.units import UnitNames
@@ -42,9 +43,6 @@ ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
 #: Errors that mean that one scene failed; other scenes are still computed.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
-
-#: Keys of a scene file that are lengths.
-LENGTHS = ("radius", "spacing", "tip_radius", "within", "height_std")
 
 
 class Column(NamedTuple):
@@ -143,10 +141,7 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
 
 def unit(name: str, units: UnitNames) -> str:
     """The unit of a number of a summary or of a key of a file; "" if unknown."""
-    end = name.rpartition(".")[2]
-    if name.startswith("gradient."):
-        return ""
-    return units.length if end in LENGTHS else unit_of(end, units)
+    return "" if name.startswith("gradient.") else unit_of(name.rpartition(".")[2], units)
 
 
 #: Arrays with an entry or a row for each scene, by their names in `Contacts` or `Cycles`.
@@ -186,72 +181,57 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
     """The measured numbers of the scenes that are proved together, by the number of the scene."""
-    if not {column.number for column in columns} <= KNOWN:
+    if not asked or not {column.number for column in columns} <= KNOWN:
         return {}
-    groups: dict[tuple[int, bool, int], list[int]] = {}
+    wanted = {column.stage for column in columns}
+    stages = next(iter(asked.values())).stages  # the same [cycle] for all: see `grid.FIXED`
+    cycle = stages.get("cycle") if "cycle" in wanted else None
+    assert cycle is None or isinstance(cycle, CycleStage)
+    groups: dict[tuple[int, bool], list[int]] = {}
     for number, each in asked.items():
-        cycle = _cycle(each, columns)
         usual = each.solver.name == "newton" and each.influence in (None, "dense")
         if usual and not (cycle and each.scene.friction is None):
-            ends = len(cycle.maximum_fraction) if cycle else 0
-            groups.setdefault((len(each.scene), each.load is not None, ends), []).append(number)
+            groups.setdefault((len(each.scene), each.load is not None), []).append(number)
     found: dict[int, Measured] = {}
-    for (_, by_load, _), numbers in groups.items():
-        some = [asked[number] for number in numbers]
-        controls = np.array([each.load if by_load else each.approach for each in some])
+    for (_, by_load), numbers in groups.items():
+        scenes = [asked[number].scene for number in numbers]
+        controls = [asked[it].load if by_load else asked[it].approach for it in numbers]
         try:
-            for rows in in_rows([each.scene for each in some], controls, by_load):
-                mine = [some[k] for k in rows.places.tolist()]
-                for k, known in _known(rows, mine, columns).items():
-                    found[numbers[rows.places[k]]] = known
+            for rows in in_rows(scenes, np.array(controls), by_load):
+                mine = [numbers[place] for place in rows.places.tolist()]
+                known = _known(rows, [asked[number].scene for number in mine], cycle)
+                found |= {mine[k]: each for k, each in known.items()}
         except FAILURES:  # one scene failed, so that `compute` measures each alone
             continue
     return found
 
 
-def _cycle(asked: Task, columns: Sequence[Column]) -> CycleStage | None:
-    stage = asked.stages.get("cycle")
-    wanted = any(column.stage == "cycle" for column in columns)
-    return stage if wanted and isinstance(stage, CycleStage) else None
-
-
 def _known(
-    rows: PressedRows, asked: Sequence[Task], columns: Sequence[Column]
+    rows: PressedRows, scenes: Sequence[Scene], cycle: CycleStage | None
 ) -> dict[int, Measured]:
+    """The numbers of the rows in which everything is proved, by the number of the row."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
-    normal = {name: number(contacts) for name, number in NORMAL.items()}
-    numbers: list[Numbers] = [
-        {(f"normal.{name}", ""): float(values[k]) for name, values in normal.items()}
-        for k in range(len(asked))
-    ]
-    stages = [stage for each in asked if (stage := _cycle(each, columns))]
-    if stages:
-        friction = np.array([each.scene.friction for each in asked], dtype=np.float64)
+    values = {(f"normal.{name}", ""): number(contacts) for name, number in NORMAL.items()}
+    if cycle is not None:
+        friction = np.array([scene.friction for scene in scenes], dtype=np.float64)
         limits = friction * contacts["loads"]
-        smooth = [
-            smooth_reference(each.scene, float(load))
-            for each, load in zip(asked, contacts["loads"], strict=True)
-        ]
+        smooth = map(smooth_reference, scenes, contacts["loads"].tolist())
         scales = np.array([np.nan if each is None else each.energy_scale for each in smooth])
-        highs = np.array([stage.maximum_fraction for stage in stages]).T
-        lows = np.array([stage.lowest for stage in stages]).T
-        for high, low in zip(highs, lows, strict=True):
+        for high, low in zip(cycle.maximum_fraction, cycle.lowest, strict=True):
             proved, fields = rows.cycles(high * limits, low * limits, friction)
             good &= proved
             half = (high - low) / 2.0
             moved = np.where(proved, fields["displacement_amplitudes"], np.nan)  # never 0
             fields |= {"amplitudes": half * limits, "scales": scales, "moved": moved}
             fields["smooth"] = np.where(np.isnan(scales), np.nan, mindlin.loss(half))
-            cycle = {name: number(fields) for name, number in CYCLE.items()}
-            for k, known in enumerate(numbers):
-                label = row_label((low[k], high[k]))
-                known |= {(f"cycle.{name}", label): float(it[k]) for name, it in cycle.items()}
+            label = row_label((low, high))
+            values |= {(f"cycle.{name}", label): number(fields) for name, number in CYCLE.items()}
     return {
         k: Measured(
-            numbers[k],
+            {name: float(each[k]) for name, each in values.items()},
             "",
-            "; ".join(cautions_about(asked[k].scene, contacts["asperity_loads"][k])),
+            "; ".join(cautions_about(scenes[k], contacts["asperity_loads"][k])),
         )
         for k in np.flatnonzero(good).tolist()
     }

@@ -13,8 +13,9 @@ from convexrough.record import rows_of
 from convexrough.run.results import Writer, headed
 from convexrough.run.stage import Summary
 from convexrough.sweeps.batch import Columns
-from convexrough.sweeps.sweep import Plan
-from convexrough.sweeps.table import MANIFEST, SweepTable, open_sweep
+from convexrough.sweeps.folder import MANIFEST
+from convexrough.sweeps.plan import Plan
+from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
 #: The quantiles that are printed, and the largest numbers of printed rows, printed failures and

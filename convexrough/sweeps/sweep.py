@@ -1,14 +1,11 @@
-"""`sweep`: plan and compute many scenes, and return a table."""
+"""`sweep`: compute many scenes, and return a table."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -17,239 +14,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError, MistakesError, SceneFileError
+from convexrough.errors import InputError
 from convexrough.progress import LOGGER
-from convexrough.run.scene_file import Task, digest, read_text, tables_of
-from convexrough.run.stage import Stage
-from convexrough.run.stages import CycleStage, NormalStage, ShearStage
-from convexrough.run.study import Study, validate, validate_table
 from convexrough.scene.scene import Scene
-from convexrough.solvers import Newton
-from convexrough.sweeps.batch import VERSIONS, Batch, Columns, Source, Tables, Tasks
-from convexrough.sweeps.grid import WHERE, Grid, swept, table_in, with_values
-from convexrough.sweeps.measures import FAILURES, Column, Stages, chosen, unit
+from convexrough.sweeps.batch import Batch, Columns
+from convexrough.sweeps.folder import make_folder, part_from
+from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes, read_sweep
 from convexrough.sweeps.pool import Processes, computed
-from convexrough.sweeps.table import SweepTable, make_folder, part_from
-from convexrough.tabular.units import UnitNames
-from convexrough.version import __version__
-
-#: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes.
-MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
-
-#: At most this many scenes are computed in order to find out which numbers can be measured.
-TRIED = 5
+from convexrough.sweeps.table import SweepTable
 
 #: What `sweep` computes: a sweep file, the tables of a sweep file, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
 #: Largest number of scenes that one call computes; for more, each call computes a share.
 MOST = 10**8
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a sweep computes: scenes from `source`, and the numbers in `columns` for each scene.
-
-    manifest : the contents of manifest.json
-    """
-
-    source: Source
-    columns: tuple[Column, ...]
-    manifest: Mapping[str, Any]
-
-    def batch(self, part: range) -> Batch:
-        return Batch(self.source.part(part), self.columns, part)
-
-
-def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file, after a check of the file.
-
-    measure : names of numbers to measure in place of those in the file
-
-    Raises FileError if the file cannot be read or is not TOML; SceneFileError with every mistake.
-    """
-    path = Path(path)
-    text = read_text(path)
-    return plan_of(tables_of(path, text), path, measure, text)
-
-
-def plan_of(
-    contents: Mapping[str, Any], path: Path, measure: Sequence[str] | None = None, text: str = ""
-) -> Plan:
-    """The plan of a sweep, from the tables of a sweep file.
-
-    path : the sweep file, for messages; paths in the tables are relative to its folder
-
-    Raises SceneFileError with every mistake.
-    """
-    tables = {name: table for name, table in contents.items() if name != "sweep"}
-    table = contents.get("sweep")
-    if table is None:
-        known = ", ".join(Grid.model_fields)
-        raise SceneFileError(str(path), [f"[sweep]: missing table; its keys are: {known}"])
-    if measure is not None and isinstance(table, dict):
-        table = {**table, "measure": list(measure)}
-    grid, mistakes = validate_table("sweep", table, Grid)
-    mistakes += _nothing_random(contents)
-    if grid is None or mistakes:
-        varied = {key.partition(".")[0] for _, key in swept(table_in(contents, "sweep"))}
-        others = validate({name: it for name, it in tables.items() if name not in varied})[1]
-        rest = [each for each in others if "missing table" not in each]
-        raise SceneFileError(str(path), [*mistakes, *rest])
-    study, mistakes = _of_values(grid, tables)
-    if study is None or mistakes:
-        raise SceneFileError(str(path), mistakes)
-    own = [tables.get("asperities", {}).get("path")]
-    files = {str(each) for each in grid.axes.get("asperities.path", own) if each is not None}
-    inputs = {each: digest(path.parent / each) for each in sorted(files)}
-    said = {"source": str(path), "text": text, "inputs": inputs}
-    lists = [list(getattr(grid, where).items()) for where in WHERE]  # in order
-    given = {"tables": tables, "swept": lists, "seeds": grid.seeds, "inputs": inputs}
-    return _planned(Tables(grid, tables, path), grid.measure, said, study.units.names, **given)
-
-
-def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a mistake if there are seeds but nothing is random: the seeds would change nothing."""
-    table = table_in(contents, "sweep")
-    given = {*table_in(contents, "asperities")}
-    given |= {key.removeprefix("asperities.") for _, key in swept(table)}
-    rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
-    if "seeds" in table and not table.get("draw") and not rough:
-        yield (
-            "[sweep] seeds: nothing is random: expected height_std or tip_radius_cv in "
-            "[asperities], or a table [sweep.draw]"
-        )
-
-
-def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The checked tables of the first scene (None if wrong), and all mistakes in swept values."""
-    first, seed = grid.point(0)
-    study, mistakes = validate(with_values(tables, first, seed))
-    for where, lists in (("together", grid.together), ("over", grid.over)):
-        for key, values in lists.items() if study else ():
-            for i, value in enumerate(values[1:], 1):
-                _, wrong = validate(with_values(tables, {**first, key: value}, seed))
-                mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
-    return study, grid.blame(mistakes, seed)
-
-
-def plan_of_scenes(
-    scenes: Iterable[Scene],
-    measure: Sequence[str] | None,
-    approach: ArrayLike | None,
-    load: ArrayLike | None,
-    cycle: Sequence[float],
-    shear: Sequence[float],
-) -> Plan:
-    """The plan for scenes made in Python; arguments as for `sweep`. Raises InputError."""
-    stages = _stages(cycle, shear)
-    checks.sequence("scenes", scenes, "a list of scenes, or a sweep file")
-    scenes = tuple(scenes)
-    for i, scene in enumerate(scenes):
-        checks.instance(f"scenes[{i}]", scene, Scene)
-    checks.some("scenes", scenes)
-    checks.exactly_one("approach", approach, "load", load)
-    name, control = ("approach", approach) if load is None else ("load", load)
-    assert control is not None  # exactly_one
-    controls = checks.array(name, control, length=len(scenes), one="scene").tolist()
-    expected = 'a list of numbers of a summary, such as ["load"]'
-    checks.sequence("measure", measure, expected)
-    if not measure:
-        raise InputError("measure", found=measure, expected=expected)
-    content = hashlib.sha256()
-    for scene in scenes:
-        layout, material = scene.asperities, scene.material
-        for values in (layout.positions, layout.tip_radii, layout.heights):
-            content.update(values.tobytes())
-        content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
-        content.update(f"{scene.geometry} {len(scene)}".encode())
-    given = {"scenes": content.hexdigest(), name: controls, "stages": repr(stages)}
-    common: Any = {"approach": None, "load": None, "stages": stages, "solver": Newton()}
-    tasks = {
-        number: Task(scene=scene, **common | {name: control})
-        for number, (scene, control) in enumerate(zip(scenes, controls, strict=True))
-    }
-    said = {"source": "scenes made in Python"}
-    return _planned(Tasks(tasks), measure, said, UnitNames(), **given)
-
-
-def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
-    mistakes: list[str] = []
-    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
-    for model, key, values in models:
-        checks.sequence(model.name, values, "a list of fractions of f P")
-        if len(values):
-            given = checks.array(model.name, values).tolist()
-            table, wrong = validate_table(model.name, {key: given}, model)
-            mistakes += wrong
-            if table is not None:
-                found[model.name] = table
-    if mistakes:
-        raise MistakesError("sweep", mistakes)
-    return found
-
-
-def _planned(
-    source: Source,
-    measures: Sequence[str],
-    said: Mapping[str, Any],
-    units: UnitNames,
-    **given: Any,
-) -> Plan:
-    """The plan for the scenes of `source`. The first solved scene shows which numbers exist.
-
-    said  : entries of the manifest that describe the origin of the sweep
-    given : all input on which the measured numbers depend, except `measures` and the version
-
-    Raises InputError for an unknown measure. If the first `TRIED` scenes all fail, raises the error
-    of the last of them.
-    """
-    ask = source.part(range(tried := min(source.count, TRIED))).opened()
-    for number in range(tried):
-        try:
-            asked = ask(number)
-            contact = asked.press()
-            columns = chosen(contact, asked.stages, measures)
-            break
-        except FAILURES as error:
-            if number == tried - 1:
-                if isinstance(error, InputError) and not error.where:
-                    raise error.within(str(said["source"])) from error
-                raise
-    few = -(-source.count // LEAST_BATCHES)
-    contents = {"version": __version__, "measure": list(measures), **given}
-    text = json.dumps(contents, sort_keys=True, default=repr)
-    grid = source.grid if isinstance(source, Tables) else None
-    labels = list(source.labels(range(0)))
-    numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
-    used = {"normal", *(column.stage for column in columns)}
-    manifest = {
-        "schema": 2,
-        "version": __version__,
-        "sweep": hashlib.sha256(text.encode()).hexdigest(),  # of all that numbers depend on
-        "scenes": source.count,
-        "each": grid.each if grid else 1,  # scenes that differ only in the seed
-        "batch": max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few)),
-        "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
-        "drawn": [*grid.draw] if grid else [],
-        "not_measured": [name for name in asked.stages if name not in used],
-        "own_loads": _own_loads(asked.stages, used, labels) if grid else [],
-        "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
-        **said,
-        "versions": VERSIONS,
-    }
-    return Plan(source, columns, manifest)
-
-
-def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables with loads that do not follow a swept load or approach of [normal]."""
-    if not {"normal.load", "normal.approach"} & {*swept}:
-        return []
-    own = [name for name, stage in stages.items() if name in used and stage.highest_load]
-    return [name for name in own if not any(key.startswith(f"{name}.") for key in swept)]
 
 
 def sweep(
@@ -268,6 +46,8 @@ def sweep(
     shear: Sequence[float] = (),
 ) -> SweepTable:
     """A table with a row for each of many scenes, and a column for each measured number.
+
+    docs/how-to/sweep.md describes sweep files.
 
     what     : a sweep file; or its tables, as a mapping; or scenes
     approach, load : only if `what` is scenes, and only one of the two: approaches [length] or loads

@@ -34,7 +34,7 @@ def tiny() -> Bench:
 @pytest.mark.parametrize("family", ["lattice", "rough"])
 def test_reference_against_50_digits(family: Any) -> None:
     each = scene(family, 1.0)
-    found = reference(each, APPROACH)
+    found = reference(each)
     exact = multiprecision.solve(each, approach=APPROACH)
     off = np.abs(multiprecision.errors(found, exact.loads)).max() / found.max()
     assert 0 < off <= measure.ACCURATE

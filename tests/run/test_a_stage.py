@@ -37,6 +37,7 @@ def test_it_is_computed_written_and_printed(run: Any) -> None:
     assert said[0] == {"quantile": 0.0, "onset": min(written)}
     (*_, result) = file.compute(contact)
     assert result.certified
+    assert "newton; 37 contact" in result._repr_html_()
     assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)
 
 

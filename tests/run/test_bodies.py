@@ -12,21 +12,10 @@ import convexrough as cr
 INF = float("inf")
 
 
-@pytest.mark.parametrize(
-    ("radius", "expected"),
-    [
-        ("inf", INF),
-        ("[1.0, 2]", (1.0, 2.0)),
-        ("[inf, 0.5]", (INF, 0.5)),
-        ("[2.0, 2.0]", 2.0),
-        ("[inf, inf]", INF),
-    ],
-)
-def test_bases(read: Any, radius: str, expected: Any) -> None:
-    assert read(WITHIN, radius=radius).scene.sphere_radius == expected
-
-
-def test_two_bodies(read: Any) -> None:
+def test_bases_and_bodies(read: Any) -> None:
+    radii = {"inf": INF, "[1.0, 2]": (1.0, 2.0), "[inf, 0.5]": (INF, 0.5), "[2.0, 2.0]": 2.0}
+    for radius, expected in (radii | {"[inf, inf]": INF}).items():
+        assert read(WITHIN, radius=radius).scene.sphere_radius == expected
     steel, soft = cr.Material.from_youngs(210e3, 0.3, 8e3), cr.Material.from_youngs(70e3, 0.33)
     assert read(WITHIN, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)
 

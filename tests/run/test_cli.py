@@ -137,7 +137,20 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
 
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
     assert summary["history"]["loss"] == past.losses.tolist()
-    assert re.search(r"^ *0\.5 .* 6 +31 +0$", run(text).out, re.M)
+
+    assert summary["path"]["displacement"][3] == pytest.approx(-1.4399972915528e-06, rel=1e-11)
+    assert summary["path"]["sliding"] == [0, 12, 0, 6]
+    assert summary["steady"]["undecided"] == 0
+    assert summary["shakedown"]["factor"] == pytest.approx(0.351719571750, rel=1e-10)
+    assert [float(row["loss"]) for row in rows(folder / "path.csv")] == summary["path"]["loss"]
+    statuses = [row["status"] for row in rows(folder / "path_asperities.csv")]
+    assert (len(statuses), statuses.count("sliding")) == (4 * 61, 18)
+    assert [len(rows(folder / f"{name}.csv")) for name in ("steady", "shakedown")] == [61, 61]
+
+    printed = run(text).out
+    assert re.search(r"^ *0\.5 .* 6 +31 +0$", printed, re.M)
+    assert "indentations increase with the load: proved" in printed
+    assert printed.count("path of 12 chords; the ellipse loses more, in our tests by at m") == 1
 
 
 SWEEP = """

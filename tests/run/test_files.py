@@ -74,21 +74,3 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
         write(KeyboardInterrupt(), "2", force=True)
     assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
     assert (folder / "one.csv").read_text() == "1"
-
-
-def test_force_replaces_results_of_the_same_command_only(tmp_path: Path) -> None:
-    def write(command: str, *reads: Path) -> None:
-        with results_folder(tmp_path / "out", force=True, reads=reads, command=command) as new:
-            new.text(f"{command}.csv", "1")
-
-    write("run")
-    with pytest.raises(cr.FileError, match="out: holds results of `run`; name another folder"):
-        write("verify")
-    assert (tmp_path / "out/run.csv").exists()
-    write("run")
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere/mine.csv").write_text("mine")
-    link = tmp_path / "out/mine.csv"
-    link.symlink_to(tmp_path / "elsewhere/mine.csv")
-    with pytest.raises(cr.FileError, match=r"out: holds mine\.csv, an input"):
-        write("run", link)

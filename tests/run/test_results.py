@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene_files import FRICTION, HEXAGONAL, WITHIN, scene_text
+from scene_files import FRICTION, HEXAGONAL, scene_text
 
 import convexrough as cr
 
@@ -23,13 +23,18 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     second = ("run", "b.toml", "--out", "out", "--no-figures")
     assert command(*second).refuses("out: not empty; --force replaces")
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
-    for name, *inputs, out in (
-        ("run", "a.toml", "."),
-        ("export", "a.toml", "."),
-        ("verify", "a.toml", "out/asperities.csv", "out"),
+    loads = folder / "link.csv"
+    loads.symlink_to(tmp_path / "asperities.csv")
+    (folder / "asperities.csv").replace(tmp_path / "asperities.csv")
+    for name, *inputs, out, said in (
+        ("run", "a.toml", ".", "holds a.toml, an input; name another folder"),
+        ("export", "a.toml", ".", "holds a.toml, an input"),
+        ("export", "a.toml", "out", "out: holds results of `run`; name another folder"),
+        ("verify", "a.toml", "out/link.csv", "out", "out: holds link.csv, an input"),
     ):
-        ran = command(name, *inputs, "--out", out, "--force")
-        assert ran.refuses("an input; name another folder")
+        assert command(name, *inputs, "--out", out, "--force").refuses(said)
+    loads.unlink()
+    assert (folder / "history.csv").exists()
     ran = command(*second, "--force")
     expected = {"summary.json", "asperities.csv", "scene.toml", "files.json", "notes.txt"}
     assert (ran.status, {path.name for path in folder.iterdir()}) == (0, expected)
@@ -75,32 +80,23 @@ def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
     assert f"of the tip radius: {model}" in claimed.err
 
 
-def test_contact_at_the_rim_of_the_array(run: Any) -> None:
-    """A radius in the wrong unit, of a sphere or along one axis; a flat base has no such limit."""
-    said = "contact reaches the rim of the array, which ends at 0."
-    for radius, warns in (
-        ("1.0", False),
-        ("1e3", True),
-        ("[1.0, 2e3]", True),
-        ("[1.0, 2.0]", False),
-        ("inf", False),
-    ):
-        text = scene_text(WITHIN, radius=radius)
-        assert (said in run(text, "--force").err) == warns, radius
-    for within, warns in (("0.004", True), ("0.002", False)):  # 7 asperities, and one
-        few = scene_text(WITHIN.replace("0.0102", within), radius="1e3")
-        assert (said in run(few, "--force").err) == warns
-
-
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
-    """Every asperity touches; on a flat base that is meant. Corners of a square may be open."""
-    wide, few = (
+    """By contact at the rim, as with a radius in the wrong unit, or where every asperity touches.
+
+    On a flat base that is meant. Corners of a square may be open.
+    """
+    wide, few, seven, one = (
         cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
-        for within in (0.0102, 0.0045)
+        for within in (0.0102, 0.0045, 0.004, 0.002)
     )
+    rim = "contact reaches the rim of the array, which ends at 0."
     sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
     for array, base, control, told in (
+        *((wide, wrong, {"approach": 5e-5}, rim) for wrong in (1e3, (1.0, 2e3))),
+        (wide, (1.0, 2.0), {"approach": 2e-5}, ""),
+        (seven, 1e3, {"approach": 5e-5}, rim),
+        (one, 1e3, {"approach": 5e-5}, "asperities in contact: 1, fewer than 5"),
         (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch: th"),
         (wide, 1.0, {"approach": 5e-5}, ""),
         (wide, np.inf, {"approach": 1e-6}, ""),

@@ -18,7 +18,7 @@ import pytest
 from sweep_files import reported_to, same, swept, tables, toml
 
 import convexrough as cr
-from convexrough.sweeps.table import open_folder
+from convexrough.sweeps.folder import open_folder
 
 CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
 SCENES, PARTS = 64, 32

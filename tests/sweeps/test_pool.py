@@ -14,10 +14,11 @@ import pytest
 from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
 
 import convexrough as cr
-from convexrough.sweeps import sweep
+from convexrough.sweeps import plan
 from convexrough.sweeps.batch import Tables
+from convexrough.sweeps.plan import Plan, plan_of
 from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.sweep import Plan, plan_of, run
+from convexrough.sweeps.sweep import run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
@@ -62,8 +63,8 @@ def test_batches(most: int, influence: str, monkeypatch: pytest.MonkeyPatch) -> 
     measured = {"seeds": 10, "measure": ["contact", "load", "approach", "loss"]}
     contents = tables(solver={"influence": influence}, sweep=measured)
     whole = swept(contents)
-    monkeypatch.setattr(sweep, "LEAST_BATCHES", 1)
-    monkeypatch.setattr(sweep, "MOST_SCENES", most)
+    monkeypatch.setattr(plan, "LEAST_BATCHES", 1)
+    monkeypatch.setattr(plan, "MOST_SCENES", most)
     batches = swept(contents)
     assert batches.manifest["batch"] == most != whole.manifest["batch"]
     assert same(batches, whole)
@@ -76,6 +77,7 @@ def deadly(whole: Plan, worst: int) -> Plan:
 
 @pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
 def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
+    """It breaks the executor of a user, which is said."""
     contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
     whole = plan_of(contents, Path("sweep"))
     said = "the process that computed scenes 17 to 17 died twice"
@@ -85,15 +87,9 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
     with ThreadPoolExecutor(1) as here:
         table = run(whole, here, out=tmp_path / "a", resume=True)[0]
     assert same(table, swept(contents))
-
-
-@pytest.mark.sample(0)
-def test_an_executor_that_broke_is_said_to_be() -> None:
-    with (
-        ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
-        pytest.raises(cr.WorkerError, match="executor is broken"),
-    ):
-        run(deadly(PLAN, 3), mine)
+    broken = pytest.raises(cr.WorkerError, match="executor is broken")
+    with ProcessPoolExecutor(1, mp_context=SPAWN) as theirs, broken:
+        run(deadly(PLAN, 3), theirs)
 
 
 def test_threads_of_linear_algebra_do_not_matter() -> None:

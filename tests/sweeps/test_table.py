@@ -112,13 +112,19 @@ def failing(over: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def test_a_scene_that_fails_has_a_row_that_says_why() -> None:
+@pytest.mark.usefixtures("no_processes")
+def test_a_scene_that_fails_has_a_row_that_says_why(command: Any, tmp_path: Path) -> None:
+    """And the command says which failed, as its status does."""
     table = swept(failing({"normal.load": [1e-7, 1e-30, 3e-7]}))
     status, message, contact = numbers(table, "status", "message", "contact")
     assert status == ["certified", "failed"] * 3
     assert "tip_radius: found shape (61,), expected 19 values" in message[1]
     assert np.isnan(contact[1::2]).all()
     assert not np.isnan(contact[::2]).any()
+    (tmp_path / "a.toml").write_text(toml(failing({})))
+    status, _, err = command("sweep", "a.toml", "--workers", "1")
+    assert status == 4
+    assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")
 
 
 ELLIPSE = {"load": 3e-7, "load_amplitude": 5e-8, "force_amplitude": 4e-8, "chords": 6}
@@ -273,11 +279,3 @@ def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
     assert len(list((tmp_path / "c").glob("*.png"))) == 1
     assert f"not drawn: {len(written) - 3} more figures; cr.open_sweep(DIR).plot(" in out
-
-
-@pytest.mark.usefixtures("no_processes")
-def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(toml(failing({})))
-    status, _, err = command("sweep", "a.toml", "--workers", "1")
-    assert status == 4
-    assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")

@@ -10,7 +10,7 @@ from sweep_files import sweeping
 
 from convexrough.sweeps import batch, measures
 from convexrough.sweeps.batch import Columns, compute
-from convexrough.sweeps.sweep import plan_of
+from convexrough.sweeps.plan import plan_of
 
 #: Numbers that rows know, but for errors, which are bounds of their own.
 KNOWN = [f"normal.{name}" for name in measures.NORMAL if "error" not in name]

@@ -12,7 +12,8 @@ from scene_files import cells, put, scene_text
 from scenes import rough
 
 import convexrough as cr
-from convexrough.run.scene_file import read_scene, read_summits
+from convexrough.run.asperity_file import read_summits
+from convexrough.run.scene_file import read_scene
 from convexrough.tabular.table import Reading
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from convexrough.run.stage import Stage
-from convexrough.run.stages.constant_load import CycleStage, HistoryStage, ShearStage
+from convexrough.run.stages.constant_load import CycleStage as CycleStage
+from convexrough.run.stages.constant_load import HistoryStage
+from convexrough.run.stages.constant_load import ShearStage as ShearStage
 from convexrough.run.stages.gradient import GradientStage
-from convexrough.run.stages.normal import NormalStage
+from convexrough.run.stages.normal import NormalStage as NormalStage
 from convexrough.run.stages.path import PathStage, SteadyStage
 from convexrough.run.stages.shakedown import ShakedownStage
-
-__all__ = [
-    "STAGES",
-    "CycleStage",
-    "GradientStage",
-    "HistoryStage",
-    "NormalStage",
-    "PathStage",
-    "ShakedownStage",
-    "ShearStage",
-    "SteadyStage",
-]
 
 #: Stages by the names of their tables in a scene file, in the order of results.
 STAGES: dict[str, type[Stage]] = {

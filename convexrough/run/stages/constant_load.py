@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import cycles, loops
@@ -78,9 +79,7 @@ class ShearResult(Result):
         return {"shear": self.stacked(each)}
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import shear_figures  # matplotlib: only when it draws
-
-        return shear_figures(self.found)
+        return plots.shear_figures(self.found)
 
 
 class CycleStage(Stage):
@@ -217,11 +216,9 @@ class CycleResult(Result):
         return [*super().lines(), *([] if self.smooth else [said])]
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import cycle_figures, fretting_figures  # only when it draws
-
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
-        figures = cycle_figures(self.found, loops=self.loops)
-        return {**figures, **fretting_figures(widest)}
+        figures = plots.cycle_figures(self.found, loops=self.loops)
+        return {**figures, **plots.fretting_figures(widest)}
 
 
 def _curves(loop: Loop) -> Columns:

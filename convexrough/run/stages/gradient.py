@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.gradients.gradient import Holding
 from convexrough.gradients.objective import NUMBERS, gradient_of
-from convexrough.run.stage import Columns, Single, Stage, Summary, limit
+from convexrough.run.stage import Columns, Result, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
 
@@ -79,7 +80,7 @@ class GradientStage(Stage):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GradientResult(Single):
+class GradientResult(Result):
     """The result of [gradient]: the gradient, or the reason `none_because` why there is none."""
 
     stage: GradientStage
@@ -155,7 +156,5 @@ class GradientResult(Single):
         return [f"gradient of the {said['of']}{under}, {held}", *labelled(rows, 22)]
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import gradient_figures  # matplotlib: only when it draws
-
-        figures = [gradient_figures(it, of=LETTERS[self.stage.of]) for it in self.found]
+        figures = [plots.gradient_figures(it, of=LETTERS[self.stage.of]) for it in self.found]
         return figures[0] if figures else {}

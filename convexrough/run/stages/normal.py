@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from convexrough import plausibility
+from convexrough import plausibility, plots
 from convexrough.arrays import Array
 from convexrough.contact import Contact, closest_changes
 from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
-from convexrough.run.stage import Columns, Single, Stage, Summary, unit_of
+from convexrough.run.stage import Columns, Result, Stage, Summary, unit_of
 from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
@@ -54,7 +54,7 @@ class NormalStage(Stage):
         return NormalResult(self, contact, (contact,))
 
 
-class NormalResult(Single):
+class NormalResult(Result):
     """The result of [normal]: the pressed contact."""
 
     def rows(self) -> list[Summary]:
@@ -78,9 +78,7 @@ class NormalResult(Single):
         return plausibility.cautions(self.known[0], self.units)
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import press_figures  # matplotlib: only when it draws
-
-        return press_figures(self.contact)
+        return plots.press_figures(self.contact)
 
     def lines(self) -> list[str]:
         return describe(self.known[0], self.units)

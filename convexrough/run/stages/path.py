@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from convexrough import checks
+from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
@@ -21,7 +21,7 @@ from convexrough.run.stage import (
     MOST_PRINTED,
     STATUSES,
     Columns,
-    Single,
+    Result,
     Stage,
     Steps,
     Summary,
@@ -199,7 +199,7 @@ class SteadyStage(_Points):
             )
 
 
-class SteadyResult(Single):
+class SteadyResult(Result):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     stage: SteadyStage
@@ -247,11 +247,9 @@ class SteadyResult(Single):
         return said
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import phase_figures, steady_figures  # only when it draws
-
-        figures = dict(steady_figures(self.found[0]))
+        figures = dict(plots.steady_figures(self.found[0]))
         for losses in self.found[1:]:
-            figures |= phase_figures(losses)
+            figures |= plots.phase_figures(losses)
         return figures
 
 

@@ -7,10 +7,11 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
-from convexrough.run.stage import Columns, Single, Stage, Summary
+from convexrough.run.stage import Columns, Result, Stage, Summary
 from convexrough.run.values import NUMBER_OR_PAIR, Finite, Force, Mistake, Positive, expected
 
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
@@ -64,7 +65,7 @@ class ShakedownStage(Stage):
         return ShakedownResult(self, contact, (found,))
 
 
-class ShakedownResult(Single):
+class ShakedownResult(Result):
     """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
 
     stage: ShakedownStage
@@ -111,6 +112,4 @@ class ShakedownResult(Single):
         return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
 
     def figures(self) -> Mapping[str, Any]:
-        from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
-
-        return shakedown_figures(self.found[0])
+        return plots.shakedown_figures(self.found[0])

@@ -1,0 +1,89 @@
+"""Files of asperities, which the table [asperities] of a scene file names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough.arrays import Array
+from convexrough.errors import InputError, blamed_on
+from convexrough.scene.asperities import Asperities
+from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
+from convexrough.tabular.text import bare
+from convexrough.tabular.units import parsed
+
+#: Names of columns with results, which are ignored in a table of asperities.
+RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
+           "area", "contact")  # fmt: skip
+
+#: Relative rounding error up to which a last row counts as the means or sums of a table.
+ROUNDED = 1e-3
+
+
+def unknown(column: str) -> bool:
+    """True if a column may contain heights: its header is not a number, an index or a result."""
+    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
+
+
+def read_summits(
+    path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
+) -> Asperities:
+    """The asperities in a file with columns x and y, and perhaps height (or z) and tip_radius.
+
+    tip_radius : [length] one number or (n,); None if the file has a column tip_radius
+
+    Raises FileError, or InputError with the column or row, if the table is wrong.
+    """
+    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
+    columns = table.columns
+    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
+    if "height" not in columns and unread:
+        named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
+        raise InputError("columns", found=f"{', '.join(unread)}, but no height",
+                         expected=f"a column height; {named}", where=str(path))  # fmt: skip
+    for name, said in table.units.items():
+        if parsed(said) and not how.units.length:
+            expected = f'[units] length in the scene file, as "{said}"'
+            raise InputError(f"column {name}", found=f"{said}, and a scene without units",
+                             expected=expected, where=str(path))  # fmt: skip
+    for name, cells in table.others.items():
+        if bare(name).lower() in INDEX and is_permuted(cells):
+            found = f"{cells[0]:g}, {cells[1]:g}, ..."
+            expected = "the rows in increasing order, or no such column"
+            raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
+    if what := _summary_in_last_row([*columns.values()]):
+        raise InputError(table.rows[-1], found=f"the {what} of the other rows",
+                         expected="an asperity: remove this row", where=str(path))  # fmt: skip
+    given = columns.get("tip_radius")
+    if (given is None) == (tip_radius is None):
+        found = "neither" if given is None else "both"
+        expected = "either a column tip_radius or the key tip_radius in the scene file"
+        raise InputError("tip radii", found=found, expected=expected, where=str(path))
+    positions = np.column_stack((columns["x"], columns["y"]))
+    radii = tip_radius if given is None else given
+    assert radii is not None  # one of the two is given
+    with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
+        return Asperities(positions, radii, columns.get("height", 0.0))
+
+
+def _summary_in_last_row(columns: list[Array]) -> str:
+    """ "means" or "sums" if the last row contains those of the rows above; else ""."""
+    own = columns[2:]
+    if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
+        return ""  # the mean of a regular array is an asperity in its middle
+    for what, of in (("means", np.mean), ("sums", np.sum)):
+        if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
+            return what
+    return ""
+
+
+def is_permuted(cells: NDArray[Any]) -> bool:
+    """True if the cells are the numbers 0, 1, ... or 1, 2, ... in another order."""
+    if cells.dtype.kind != "f" or len(cells) < 2:
+        return False
+    ordered = np.sort(cells)
+    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
+    return bool(counts and (ordered != cells).any())

@@ -1,0 +1,191 @@
+"""The folder of a sweep: a manifest that never changes, and parts.
+
+The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
+named by its first scene. All parts except the last have the same number of rows, which the manifest
+states. So the contents of a part do not depend on the process that computes it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from convexrough.atomic import to_json, write_text
+from convexrough.errors import FileError, file_errors, needed
+from convexrough.run.results import SWEEP_MANIFEST, SWEEP_PARTS, refuse_others, remove_earlier
+from convexrough.sweeps.batch import Columns, different
+
+MANIFEST, PARTS = SWEEP_MANIFEST, SWEEP_PARTS
+
+#: What to do, in messages: the arguments in Python, and the options of the command.
+RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
+
+
+def part_from(manifest: Mapping[str, Any], first: int) -> range:
+    """The scenes of the part of a sweep's table that begins with scene `first`."""
+    return range(first, min(first + manifest["batch"], manifest["scenes"]))
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The folder of a sweep on disk."""
+
+    path: Path
+    manifest: Mapping[str, Any]
+
+    def parts(self) -> list[range]:
+        """The range of scenes of each part in the folder, in order; other files are ignored."""
+        with file_errors(self.path / PARTS, "be read"):
+            names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
+        firsts = sorted(int(name) for name in names if name.isdecimal())
+        return [part_from(self.manifest, first) for first in firsts]
+
+    def file(self, first: int) -> Path:
+        """The file of the part that begins with scene `first`."""
+        return self.path / PARTS / f"{first:012d}.parquet"
+
+    def write(self, columns: Columns) -> None:
+        """Write the columns of a part. An interruption leaves no incomplete part."""
+        pyarrow, parquet = arrow()
+        whole = BytesIO()
+        parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
+        write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+
+    def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
+        """Some columns of a part, by default all.
+
+        Raises FileError if the part is damaged, or if its scenes are not those that its name says.
+        """
+        pyarrow, parquet = arrow()
+        path = self.file(part.start)
+        wanted = list(self.manifest["columns"] if names is None else names)
+        try:
+            # Threads of pyarrow could outlive the interpreter and abort the process.
+            found = parquet.read_table(
+                path,
+                columns=list({"scene", *wanted}),
+                use_threads=False,
+                pre_buffer=False,
+                page_checksum_verification=True,
+            )
+        except (OSError, pyarrow.ArrowException) as error:
+            why = " ".join(str(error).split())
+            raise FileError(f"{path}: damaged ({why}); {RESUME} computes it again") from error
+        if not np.array_equal(found["scene"].to_numpy(), part):
+            raise FileError(f"{path}: has rows of other scenes; {RESUME} computes it again")
+        arrays = {name: found[name].to_numpy() for name in wanted}
+        return {  # pyarrow returns text as objects
+            name: values.astype(np.str_) if values.dtype == object else values
+            for name, values in arrays.items()
+        }
+
+    def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
+        """The parts of `wanted` that are still to be computed, and a message on what was found.
+
+        Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
+        """
+        known = {part.start for part in self.parts()}
+        there = [part for part in wanted if part.start in known]
+        count = sum(map(len, wanted))
+        if there and not resume:
+            raise FileError(
+                f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
+                f"{RESUME} computes the rest, {OVERWRITE} replaces them, {OUT} names another folder"
+            )
+        todo, damaged = [], 0
+        for part in wanted:
+            if part.start in known:
+                try:
+                    self.read(part)
+                    continue
+                except FileError:
+                    self.file(part.start).unlink()
+                    damaged += 1
+            todo.append(part)
+        mine = {self.file(part.start).name for part in todo}
+        left = 0
+        for path in (self.path / PARTS).glob(".*.unfinished"):
+            if path.name[1:].rsplit(".", 2)[0] in mine:
+                path.unlink(missing_ok=True)
+                left += 1
+        said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
+        said += f", {damaged:,} damaged parts removed" if damaged else ""
+        return todo, said + (f", {left:,} unfinished files removed" if left else "")
+
+
+def open_folder(path: Path) -> Folder:
+    """The folder of an existing sweep. Raises FileError if there is none."""
+    try:
+        with file_errors(path / MANIFEST, "be read"):
+            if not (path / MANIFEST).exists():
+                raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
+            manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+        if not isinstance(manifest, dict) or manifest.get("schema") != 2:
+            raise ValueError("not a sweep of this version")
+    except ValueError as error:
+        raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
+    return Folder(path, manifest)
+
+
+def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
+    """The folder of a sweep, created if it does not exist.
+
+    overwrite : remove an earlier sweep in the folder, and files written by `sweep --summary`; other
+        files stay
+
+    Raises FileError if the folder contains another sweep, a sweep begun with other versions of
+    packages, or files but no sweep, or if it cannot be written; ExtraError if pyarrow is not
+    installed.
+    """
+    arrow()
+    with file_errors(path, "hold results"):
+        if overwrite and (path / MANIFEST).exists():
+            earlier = open_folder(path)
+            refuse_others(path, "sweep")
+            remove_earlier(path)  # of `sweep --summary`
+            for part in earlier.parts():
+                earlier.file(part.start).unlink(missing_ok=True)
+            write_text(path / MANIFEST, to_json(manifest) + "\n")
+        if not (path / MANIFEST).exists():
+            path.mkdir(parents=True, exist_ok=True)
+            # Meanwhile another process may write the manifest of this sweep or of another sweep.
+            strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
+            orphans = any((path / PARTS).glob("*.parquet"))
+            if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
+                raise FileError(f"{path}: holds {strangers[0]}, but no sweep; {OUT} names another")
+            if not (path / MANIFEST).exists():
+                if orphans:  # the manifest, which is written before all parts, was removed
+                    raise FileError(
+                        f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they "
+                        f"are: restore it or remove {path / PARTS}; {OUT} names another folder"
+                    )
+                (path / PARTS).mkdir(exist_ok=True)
+                write_text(path / MANIFEST, to_json(manifest) + "\n")
+    folder = open_folder(path)
+    there = folder.manifest
+    if there["sweep"] != manifest["sweep"]:
+        raise FileError(
+            f"{path}: holds another sweep, {_named(there)}; this is {_named(manifest)}; "
+            f"{OVERWRITE} replaces it, {OUT} names another folder"
+        )
+    if other := different(there["versions"]):
+        raise FileError(f"{path}: was begun with {other}; rows could differ")
+    return folder
+
+
+def _named(manifest: Mapping[str, Any]) -> str:
+    return (
+        f"{manifest['scenes']:,} scenes of {manifest['source']} by version {manifest['version']}, "
+        f"hash {manifest['sweep'][:16]}"
+    )
+
+
+def arrow() -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet. Raises ExtraError if they are not installed."""
+    return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
