@@ -128,7 +128,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         draw_map(axes, scene.contact_points, layers, scale.length, room=room)
         slide = int((path.status[k] == "sliding").sum())
         touch = int((path.asperity_loads[k] > 0).sum())
-        axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
+        style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelbottom=False, labelleft=False)
     for axes in places.ravel()[len(chosen) :]:

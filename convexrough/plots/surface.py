@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -194,9 +191,9 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         axes.set(xlim=(-width, width), ylim=(-height, height))
         _label_places(axes, surface)
     draw_summits(axes, positions)
-    scale = bar(axes, image, "", above=True)
+    scale = bar(axes, image, "")
     highest = float(np.abs(surface.heights).max())
-    scale.ax.set_title(_count(scale.ax.yaxis, "$z$", surface.unit, highest), fontsize=TICK)
+    title(scale.ax, _count(scale.ax.yaxis, "$z$", surface.unit, highest), "center")
     handles.insert(0, disc_handle(SUMMIT, f"summits ({shown})"))
     legend_outside(figure, handles, "lower center", 3)
     return figure
@@ -281,17 +278,3 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
 
     axis.set_major_formatter(said)
     return f"{name}  [{literal(length.said)}]"
-
-
-def _draw_summits(summits: Summits, axes: Axes) -> None:
-    every = np.ones(len(summits), dtype=bool)
-    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
-
-
-#: The function that draws each kind of result.
-PICTURES: dict[type, Callable[..., Any]] = {
-    Surface: lambda it, axes: draw_surface(axes, it),
-    Summits: _draw_summits,
-    Provability: lambda it, axes: draw_provability(axes, it),
-}
