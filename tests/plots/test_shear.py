@@ -53,18 +53,16 @@ def past(name: str, shares: Any) -> cr.LoadPath:
 )  # fmt: skip
 def test_fit_to_print(name: str, shares: list[float]) -> None:
     name = f"{name} in units"
-    fits(plots.shear_figures(states(name, shares))["stick_slip"])
-    fits(plots.path_figures(past(name, shares))["history"])
     ends = limit(name) * np.array([np.abs(shares), np.minimum(shares, -np.abs(shares) / 9)])
-    for figure in plots.cycle_figures(cr.cycles(contact(name), *ends)).values():
-        fits(figure)
+    fits(*plots.shear_figures(states(name, shares)).values())
+    fits(*plots.path_figures(past(name, shares)).values())
+    fits(*plots.cycle_figures(cr.cycles(contact(name), *ends)).values())
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["one", "paper"])
 def test_figures_of_the_paper_fit_to_print(name: str) -> None:
-    for figure in paper_figures(contact(f"{name} in units")).values():
-        fits(figure)
+    fits(*paper_figures(contact(f"{name} in units")).values())
 
 
 def test_discs_have_the_radii_of_the_state() -> None:
