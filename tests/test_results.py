@@ -227,7 +227,9 @@ PUBLIC = [name for name in cr.__all__ if hasattr(getattr(cr, name), "__module__"
 MODULES = sorted(
     {getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"}
     | {getattr(cr.surface, name).__module__ for name in cr.surface.__all__}
+    | {getattr(plots, name).__module__ for name in plots.__all__}
     | {"convexrough.gallery.cases", "convexrough.gallery.any_size"}
+    | {"convexrough.fields", "convexrough.plottable"}
 )
 
 

@@ -75,7 +75,9 @@ def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
 def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
     """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is its resolution.
 
-    Raises InputError for another format, or a `dpi` out of range.
+    Raises InputError for another format, or a `dpi` that is not from 50 to 600.
+
+    >>> cr.plots.save(contact.plot().figure, folder / "pressure.png", dpi=100)
     """
     if form not in FORMATS:
         raise InputError("form", found=repr(form), expected=f"one of {', '.join(FORMATS)}")

@@ -36,6 +36,10 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
 
     "stick_slip" : contact discs with stick discs inside, sliding asperities, open ones; and
         contact and stick disc of the smooth sphere under the same forces
+
+    >>> states = [cr.shear(contact, force=part * contact.load) for part in (0.1, 0.25)]
+    >>> print(*cr.plots.shear_figures(states))
+    stick_slip
     """
     if not states:
         return Figures()

@@ -65,6 +65,10 @@ def surface_figures(
 
     maxima  : all summits of this surface;  summits : the summits left by pruning
     contact : the contact of the summits left by pruning
+
+    >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
+    >>> print(*cr.plots.surface_figures(scan, scan.summits(0.0), scan.summits(0.05)))
+    map histograms
     """
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
@@ -121,7 +125,14 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
     """The figure of contacts, crowding and model error against pruning; shaded if unreliable.
 
-    chosen : the pruning that a dotted line marks
+    chosen : the pruning that a dotted line marks;  unit : of the map's lengths, "" if unknown
+
+    >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
+    >>> def press(some):
+    ...     return cr.press(cr.Scene(1e4, some, cr.Material(1.0, 0.3)), load=10.0)
+    >>> curve = cr.surface.provability(summits, press, levels=[0.0, 0.1, 0.3])
+    >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
+    advised pruning: at least 0 %   ($Sz$ = 2.85)
     """
     figure = Figure(figsize=(SINGLE, 5.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1)

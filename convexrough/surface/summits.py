@@ -170,6 +170,10 @@ class Summits(Table, Asperities, Plottable):
         prune : least prominence, as a fraction of Sz
 
         Raises InputError for a weaker pruning, or if no summit is left.
+
+        >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(0.05)
+        >>> len(summits), len(summits.pruned(0.3))
+        (129, 16)
         """
         prune = checks.between("prune", prune, self.origin.prune, 1.0)
         keep = self.prominences >= prune * self.origin.max_height
