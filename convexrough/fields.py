@@ -27,7 +27,11 @@ BLOCK = 2**14
 
 
 def peak_pressures(contact: Contact) -> Array:
-    """(n,) [force / length^2] p0_i = 2 E* a_i / (pi R_i) with relative radii R_i, 0 where open."""
+    """(n,) [force / length^2] p0_i = 2 E* a_i / (pi R_i) with relative radii R_i, 0 where open.
+
+    >>> print(f"{cr.fields.peak_pressures(contact).max():.4f} E*")
+    0.0214 E*
+    """
     checks.instance("contact", contact, Contact)
     scene = contact.scene
     peaks: Array = hertz.peak_pressure(
@@ -41,6 +45,10 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 
     The sum is over discs that contain the point r. Their centres are the contact points of the
     scene: the summits, or in the "closest" geometry the points where the paraboloids first touch.
+
+    >>> line = np.column_stack((np.linspace(0.0, 0.005, 6), np.zeros(6)))
+    >>> print(cr.fields.pressure(contact, line).round(4))
+    [0.0214 0.     0.0128 0.0128 0.     0.0181]
     """
     checks.instance("contact", contact, Contact)
     touching, centres, radii = _discs(contact)
@@ -51,7 +59,11 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """(...) [length] sum of the normal displacements of both surfaces.
 
     The displacement of each surface is relative to distant points of its body. Each asperity
-    contributes the field of its Hertz pressure.
+    contributes the field of its Hertz pressure (Johnson 1985, 3.42).
+
+    >>> far = cr.fields.normal_displacement(contact, [1.0, 0.0])
+    >>> print(f"{far * np.pi / contact.load:.4f} / E*")  # as of a point force
+    1.0000 / E*
     """
     touching, centres, a = _discs(contact)
     R = contact.scene.relative_radii[touching]
@@ -66,6 +78,11 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
     At the distance r from its centre an asperity contributes f p0 sqrt(1 - r^2/a^2), with the
     coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is
     subtracted. A negative shear force has the opposite traction.
+
+    >>> state = cr.shear(contact, force=0.25 * contact.load)
+    >>> q, p = cr.fields.traction(state, [0.0, 0.0]), cr.fields.pressure(contact, [0.0, 0.0])
+    >>> print(f"{q / (0.5 * p):.3f}")  # below 1, because the centre sticks
+    0.094
     """
     centres, a, shares, peaks = _sheared(state)
     return _sum_over_discs(
@@ -84,6 +101,11 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the relative
     displacement of the bodies. This sum only approximates it: in `shear` the compliance between two
     asperities is a mean over all directions from one to the other.
+
+    >>> state = cr.shear(contact, force=0.25 * contact.load)
+    >>> at_centre = cr.fields.shear_displacement(state, [0.0, 0.0])
+    >>> print(f"{at_centre / state.displacement:.3f}")
+    1.003
     """
     centres, a, shares, peaks = _sheared(state)
     material = state.contact.scene.material
@@ -119,6 +141,9 @@ def cell_areas(points: Array) -> Array:
     points : (n, 2) [length]
 
     Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
+
+    >>> cr.fields.cell_areas(np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1.0]]))
+    array([ 1., nan, nan, nan, nan])
     """
     from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
 
@@ -149,6 +174,9 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 
     points : (..., 2) [length];  centres : (n, 2) [length];  radii : (n,) [length], positive
     peaks  : (n,) in the unit of the result
+
+    >>> cr.fields.superpose([[0.6, 0.0], [2.0, 0.0]], np.zeros((1, 2)), np.ones(1), np.ones(1))
+    array([0.8, 0. ])
     """
     return _sum_over_discs(
         points,

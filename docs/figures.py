@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, Patch
 from convexrough import press, shear
 from convexrough.paper import example
 from convexrough.paper.figures import paper_figures
+from convexrough.paper.states import PaperStates
 
 FOLDER = Path(__file__).parent / "figures"
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -84,7 +85,8 @@ def stick_zone() -> Figure:
 
 def drawings() -> dict[str, Callable[[Path], object]]:
     """What draws each file, by its name: given the path to write."""
-    paper = cache(lambda: paper_figures(example.results()[0].contact))
+    pressed = press(example.scene(), approach=example.APPROACH)
+    paper = cache(lambda: paper_figures(PaperStates(pressed)))
     design = cache(lambda: run_path(str(EXAMPLES / "design_a_damper.py"))["draw"])
     return {f"{name}.png": partial(_save, paper, stem) for name, stem in PAPER.items()} | {
         "once-differentiable.png": lambda path: once_differentiable().savefig(path, dpi=150),

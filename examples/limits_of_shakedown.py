@@ -20,13 +20,18 @@ Pairs = list[tuple[str, float, float]]
 FRICTION = 0.5
 
 
-def compare() -> Pairs:
-    """Return (quantity, computed value, reference value)."""
+def pressed() -> cr.Contact:
+    """The array of Dini and Hills (2009) with Poisson's ratio 0."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.0)
     scene = cr.Scene(1.0, asperities, material, friction=FRICTION, geometry="summit")
-    contact = cr.press(scene, approach=5e-5)
-    P, last = contact.load, 31  # an asperity of ring A, the last to touch
+    return cr.press(scene, approach=5e-5)
+
+
+def compare() -> Pairs:
+    """Return (quantity, computed value, reference value)."""
+    contact = pressed()
+    scene, P, last = contact.scene, contact.load, 31  # an asperity of ring A, the last to touch
     swing = FRICTION * P * np.array([1.0, -1.0])
 
     exact = cr.shakedown(scene, load=P, force_amplitudes=swing)
@@ -46,6 +51,13 @@ def compare() -> Pairs:
     # An ellipse about 0.9 P lowers L* by its factor times sqrt(0.1^2 + 0.2^2) times 0.9 P.
     ellipse = (1 - sigma / (0.9 * P)) / np.hypot(0.1, 0.2)
 
+    # On first loading to 0.6 f P ring A slides. Then only the range of the force matters, not its
+    # mean: while it is 1 % below the limit, no slip changes.
+    high = 0.6 * FRICTION * P
+    low = high - 0.99 * exact.factor * 2 * FRICTION * P
+    slips = cr.history(contact, forces=[high, low, high, low]).slips
+    moved = np.abs(np.diff(slips, axis=0)).max() / slips.max()
+
     # In a cycle 1 % above the limit ring A slides; 1 % below it no asperity does.
     above = cr.steady(scene, loads=[P, P], forces=1.01 * exact.factor * swing)
     below = cr.steady(scene, loads=[P, P], forces=0.99 * exact.factor * swing)
@@ -56,19 +68,19 @@ def compare() -> Pairs:
         ("vector friction at nu = 0", vector.factor, elastic.factor),
         ("sliding 1 % above", float((above.status == "sliding").sum()), 6),
         ("sliding 1 % below", float((below.status == "sliding").sum()), 0),
+        ("slip that goes on after first loading", float(moved), 0.0),
         ("ellipse, factor of ring A", over_both_amplitudes().factor, ellipse),
     ]
 
 
 def over_both_amplitudes() -> cr.Shakedown:
     """Shakedown of the same array if load and shear force vary, a quarter of a cycle apart."""
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.0), friction=FRICTION, geometry="summit")
-    P = 0.9 * cr.press(scene, approach=5e-5).load
+    contact = pressed()
+    P = 0.9 * contact.load
     p, q = cr.elliptic_path(
         load=0.0, load_amplitude=0.1 * P, force_amplitude=0.2 * FRICTION * P, friction=FRICTION
     )
-    return cr.shakedown(scene, load=P, load_amplitudes=p, force_amplitudes=q)
+    return cr.shakedown(contact.scene, load=P, load_amplitudes=p, force_amplitudes=q)
 
 
 if __name__ == "__main__":

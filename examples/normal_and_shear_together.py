@@ -11,6 +11,9 @@ phase_losses.png.
     python examples/normal_and_shear_together.py
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 import convexrough as cr
@@ -40,11 +43,32 @@ def one_sphere() -> Pairs:
     return [("one sphere, X by increments", float(path.displacements[-1]), float(rate @ weights))]
 
 
-def rough() -> Pairs:
-    """Three cycles between the same loads: a steep line, a gentle line, and an ellipse."""
+def array() -> tuple[cr.Scene, float]:
+    """The array of Dini and Hills (2009), and the mean load of its cycles."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
-    P = cr.press(scene, approach=4e-5).load
+    return scene, cr.press(scene, approach=4e-5).load
+
+
+def on_a_line(approach: Callable[[Any], Any], P: float, p: float, t: float) -> float:
+    """The loss on a straight path with the amplitudes p of P and t > p of Q / f, in closed form.
+
+    It has means of the approach D0 over loads.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+
+    def mean(low: float, high: float, panels: int = 12) -> float:
+        ends = np.linspace(low, high, panels + 1)
+        loads = ends[:-1, None] + (nodes + 1) / 2 * np.diff(ends)[:, None]
+        return float(np.mean(approach(loads) @ weights / 2))
+
+    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p) - approach(P - t)
+    return 4 * RATIO * FRICTION**2 * t * float(bracket)
+
+
+def rough() -> Pairs:
+    """Three cycles between the same loads: a steep line, a gentle line, and an ellipse."""
+    scene, P = array()
     p, t = 0.2 * P, 0.4 * P  # amplitudes of P and of Q / f
 
     in_phase = cr.steady(scene, loads=[P + p, P - p], forces=[FRICTION * t, -FRICTION * t])
@@ -56,17 +80,7 @@ def rough() -> Pairs:
     )
     behind = cr.steady(scene, loads=loads, forces=forces)
 
-    # The closed form for a straight path has means of D0.
-    def mean(low: float, high: float, panels: int = 12) -> float:
-        nodes, weights = np.polynomial.legendre.leggauss(4)
-        ends = np.linspace(low, high, panels + 1)
-        levels = ends[:-1, None] + (nodes + 1) / 2 * np.diff(ends)[:, None]
-        curve = [[cr.press(scene, load=level).approach for level in panel] for panel in levels]
-        return float(np.mean(np.array(curve) @ weights / 2))
-
-    still = cr.press(scene, load=P - t).approach
-    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p) - still
-    line = 4 * RATIO * FRICTION**2 * t * bracket
+    line = on_a_line(np.vectorize(lambda load: cr.press(scene, load=load).approach), P, p, t)
     return [
         ("line in phase, loss / closed form", in_phase.loss / line, 1.0),
         ("line that follows the load, loss", gentle.loss / in_phase.loss, 0.0),
@@ -76,9 +90,7 @@ def rough() -> Pairs:
 
 def against_phase() -> cr.PhaseLosses:
     """Losses of the cycle for several phases and two sizes, and those of a smooth sphere."""
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
-    P = cr.press(scene, approach=4e-5).load
+    scene, P = array()
     return cr.phase_losses(
         scene,
         load=P,
@@ -95,12 +107,7 @@ def phases() -> Pairs:
     losses = against_phase()
     P, p, t = losses.load, losses.load_amplitude, losses.force_amplitude / FRICTION
 
-    def mean(low: float, high: float) -> float:  # mean of D0 = (3 L / 4)^(2/3); V = (3/5) L D0
-        ends = np.array([low, high])
-        return float(np.diff(0.6 * ends * (0.75 * ends) ** (2 / 3))[0] / (high - low))
-
-    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p)
-    in_step = 4 * RATIO * FRICTION**2 * t * (bracket - (0.75 * (P - t)) ** (2 / 3))
+    in_step = on_a_line(lambda load: (0.75 * load) ** (2 / 3), P, p, t)
     whole = losses.factors == 1.0
     reach = [np.hypot(0.2, 0.4), (np.sqrt(0.2 + 0.08) + np.sqrt(0.2 - 0.08)) / 2]
     return [

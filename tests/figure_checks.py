@@ -25,15 +25,16 @@ def texts(figure: Figure) -> list[Text]:
     return [t for t in found + others if t.get_visible() and t.get_text().strip()]
 
 
-def fits(figure: Figure) -> None:
-    """Every text is of a size to print, inside the figure, and clear of every other."""
-    boxes = {text: text.get_window_extent() for text in texts(figure)}
-    for text, box in boxes.items():
-        assert 6 < float(text.get_fontsize()) < 10
-        assert figure.bbox.padded(1).contains(box.x0, box.y0), text
-        assert figure.bbox.padded(1).contains(box.x1, box.y1), text
-    for one, other in combinations(boxes, 2):
-        assert not boxes[one].overlaps(boxes[other]), (one, other)
+def fits(*figures: Figure) -> None:
+    """Every text is of a size to print, inside its figure, and clear of every other."""
+    for figure in figures:
+        boxes = {text: text.get_window_extent() for text in texts(figure)}
+        for text, box in boxes.items():
+            assert 6 < float(text.get_fontsize()) < 10
+            assert figure.bbox.padded(1).contains(box.x0, box.y0), text
+            assert figure.bbox.padded(1).contains(box.x1, box.y1), text
+        for one, other in combinations(boxes, 2):
+            assert not boxes[one].overlaps(boxes[other]), (one, other)
 
 
 def discs(axes: Any, label: str) -> int:

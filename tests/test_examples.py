@@ -13,7 +13,6 @@ FOLDER = Path(__file__).parent.parent / "examples"
 #: Relative tolerances: of the paper's rounded numbers, of quadrature, extrapolation and minima.
 TOLERANCES = {
     "papers_example": 1e-3,
-    "random_heights": 2e-4,
     "losing_contact": 1e-5,
     "continuum_limit": 1e-5,
     "limits_of_shakedown": 1e-7,

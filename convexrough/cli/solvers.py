@@ -225,12 +225,11 @@ def paper(output: Output) -> int:
 
     with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
         found = example.results()
-        contact = found[0].contact
-        comparison = example.compare(found)
-        states = PaperStates(contact)
+        states = PaperStates(found[0].contact)
+        comparison = example.compare(states)
         new.tables(figure_data(states))
         if not output.no_figures:
-            new.figures(paper_figures(contact, states))
+            new.figures(paper_figures(states))
         if output.html:
             new.text("slider.html", slider_page(found[0]))
         more = {"paper": comparison}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import convexrough as cr
-from convexrough.paper.states import lettered
+from convexrough.paper.states import READ_CROSSING, PaperStates
 from convexrough.run.stage import Result
 from convexrough.run.stages import CycleStage, NormalStage, ShearStage
 from convexrough.tabular.columns import aligned
@@ -43,25 +43,9 @@ def results() -> list[Result]:
     return [stage.compute(contact) for stage in stages]
 
 
-def crossover(contact: cr.Contact) -> float:
-    """The Q / (f P) above which the rough contact loses more per cycle than a smooth contact."""
-    from scipy.optimize import brentq  # 0.1 s to import: only when asked
-
-    limit = 0.5 * contact.load
-
-    def excess(part: float) -> float:
-        cycle = cr.cycle(contact, maximum=part * limit)
-        return cycle.loss_normalised - cycle.smooth_normalised
-
-    return float(brentq(excess, 0.2, 0.6, xtol=1e-12))
-
-
-def compare(found: list[Result]) -> dict[str, Any]:
+def compare(found: PaperStates) -> dict[str, Any]:
     """The paper's numbers (None if not published) and the computed numbers, by name."""
-    pressed, sheared, cycled = found
-    contact, named = pressed.contact, lettered(pressed.contact)
-    onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
-    half, cycle = sheared.found[-1], cycled.found[-1]
+    contact, named, half = found.contact, found.named, found.half
     sliding = sorted(name for name, ring in named.items() if (half.status[ring] == "sliding").any())
     return {
         "contacts": _pair(37, _count(contact.status, "contact")),
@@ -69,16 +53,16 @@ def compare(found: list[Result]) -> dict[str, Any]:
             name: {
                 **_pair(count, _count(contact.status[named[name]], "contact")),
                 "load": float(contact.loads[named[name]].mean()),
-                "first_slide": float(onsets[named[name]].min()),
+                "first_slide": float(found.onsets[named[name]].min()),
             }
             for name, count in RINGS.items()
         },
         "sliding_at_half": _pair(6, _count(half.status, "sliding")),
         "sliding_ring_at_half": _pair("A", "".join(sliding)),
-        "first_slide": _pair(None, float(np.nanmin(onsets))),
-        "crossover": _pair(0.37, crossover(contact)),
-        "loss_at_half": _pair(None, cycle.loss_normalised),
-        "smooth_loss_at_half": _pair(None, cycle.smooth_normalised),
+        "first_slide": _pair(None, float(np.nanmin(found.onsets))),
+        "crossover": _pair(READ_CROSSING, found.crossing),
+        "loss_at_half": _pair(None, found.steady.loss_normalised),
+        "smooth_loss_at_half": _pair(None, found.steady.smooth_normalised),
     }
 
 

@@ -12,28 +12,23 @@ from numpy.typing import NDArray
 
 from convexrough import checks, fields
 from convexrough.arrays import Array
-from convexrough.contact import Contact
 from convexrough.friction.loop import Loop
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
-from convexrough.paper.states import AMPLITUDES, SHARE, PaperStates
+from convexrough.paper.states import AMPLITUDES, READ_CROSSING, SHARE, PaperStates
 from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
-from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure, ring_colour, smooth_loop
+from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
 from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.press import pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
 from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
-from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 
-#: Amplitude Q / (f P) at which, by the paper, the curves of its Fig. 9 cross.
-READ_CROSSING = 0.37
 
-
-def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures:
-    """The figures of the paper's example, or of any contact with asperities in rings.
+def paper_figures(found: PaperStates) -> Figures:
+    """The figures of the paper's example, for asperities in at most 26 rings, without units.
 
     "fig3_pressure"   : contact pressure
     "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the force at
@@ -46,26 +41,15 @@ def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures
     "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and their crossing
 
     Rings have letters as in the paper: A is the outermost.
-
-    found : the states and paths of the figures, if already computed
     """
-    if not contact.loads.any():
-        return style.no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
-                          "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
-    scale = Scale(contact)
-    found = found or PaperStates(contact)
-    some = evenly_chosen(list(found.named), MOST_ASPERITIES)
-    firsts = [int(found.named[name][0]) for name in some]
-    pressure = contact.scene.units.pressure
-    f = checks.friction(contact.scene.friction)
-    traction = measure(f * scale.peak, pressure, "(fp_0)")
+    scale, loops = Scale(found.contact), ([found.steady], [*found.firsts.values()])
     return Figures(
         fig3_pressure=pressure_figure(scale),
         fig4_rings=_rings_figure(found, scale),
-        fig5_traction=_traction_figure(found.half, firsts[0], scale, traction),
-        fig6_section=_section_figure(found.half, scale, traction),
+        fig5_traction=_traction_figure(found, scale),
+        fig6_section=_section_figure(found, scale),
         fig7_asperities=_forces_figure(found, scale),
-        fig8_loops=loops_figure([found.steady], firsts, some, "ring", scale, [found.loop]),
+        fig8_loops=loops_figure(*loops, [*found.firsts], "ring", scale, [found.loop]),
         fig9_energy=_loss_figure(found, scale),
     )
 
@@ -84,7 +68,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
             x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
             chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
-    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
+    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides)}")
 
     rows = np.arange(len(named))
     start = np.array([onsets[ring].min() for ring in named.values()])
@@ -97,7 +81,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
-    limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
+    limit = f"$fP$ = {quantity(scale.limit, '')}"
     style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     style.title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
@@ -106,8 +90,15 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     return figure
 
 
-def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure) -> Figure:
-    contact = state.contact
+def _tractions(scale: Scale) -> tuple[float, Measure]:
+    """The coefficient of friction f, and the measure of tractions, f p0."""
+    f = checks.friction(scale.contact.scene.friction)
+    return f, measure(f * scale.peak, "", "(fp_0)")
+
+
+def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
+    state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
+    centre = next(iter(found.firsts.values()))
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     _draw_tractions(chart, state, scale, unit)
@@ -117,14 +108,13 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
     x = np.unique(np.concatenate((a * style.towards_rim(), c * style.towards_rim())))
     line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
-    if c > 0:
-        profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
-    fp = unit.of(checks.friction(contact.scene.friction) * fields.pressure(contact, line))
+    profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
+    fp = unit.of(f * fields.pressure(contact, line))
     profile.plot(x / a, fp, ls=DASHED, lw=1.2, color=SMOOTH, label="$fp$")
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
     style.title(profile, "central asperity")
-    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.units.length)})"
+    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, '')})"
     style.label(profile, across, unit.label("q"))
     style.legend_above(profile)
     return figure
@@ -147,8 +137,9 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
     draw_values(axes, scale, tractions, unit.short("q"), radii=np.where(touching, radii(s), 0.0))
 
 
-def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
-    contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
+def _section_figure(found: PaperStates, scale: Scale) -> Figure:
+    state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
+    sphere = smooth(contact.scene, load=contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()
     points, radii = contact.scene.contact_points, contact.contact_radii
@@ -157,7 +148,6 @@ def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
         style.abscissae(points, radii, edge), style.abscissae(points, state.stick_radii, edge)
     )
     line = np.column_stack((x, np.zeros_like(x)))
-    f = checks.friction(contact.scene.friction)
     fp, q = unit.of(f * fields.pressure(contact, line)), unit.of(fields.traction(state, line))
     across = scale.length.of(x)
     axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
@@ -180,8 +170,7 @@ def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
     """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
     figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
-    firsts = {name: int(ring[0]) for name, ring in found.named.items()}
-    path, share = found.path, found.fractions
+    firsts, path, share = found.firsts, found.path, found.fractions
     force = 100.0 * path.asperity_forces / found.limit
     moved = scale.displacement.of(path.asperity_displacements)
     own = moved - scale.displacement.of(path.slips)
@@ -236,11 +225,8 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     for axes in (whole, zoom):
         axes.plot(AMPLITUDES, rough, lw=1.3, color=ROUGH, label="asperities")
         axes.plot(AMPLITUDES, smooth, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
-    crossing = _cross(AMPLITUDES, rough, smooth)
-    middle = READ_CROSSING if crossing is None else crossing
-    window = np.clip(middle, 0.07, 0.93) + np.array([-0.07, 0.07])
-    inside = (window[0] <= AMPLITUDES) & (window[1] >= AMPLITUDES)
-    energies = np.concatenate((rough[inside], smooth[inside]))
+    window = found.crossing + np.array([-0.07, 0.07])
+    energies = np.array([np.interp(window, AMPLITUDES, each) for each in (rough, smooth)])
     margin = 0.04 * float(np.ptp(energies))
     low, high = float(energies.min()) - margin, float(energies.max()) + margin
     whole.set(xlim=(0.0, 1.0), ylim=(0.0, 1.04 * float(max(rough.max(), smooth.max()))))
@@ -249,25 +235,13 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     whole.add_patch(box)
     whole.annotate("zoom", (float(window[1]), high), xytext=(-2, 3), textcoords="offset points",
                    ha="right", va="bottom", fontsize=TICK)  # fmt: skip
-    if crossing is not None:
-        _mark_crossing(zoom, crossing, float(np.interp(crossing, AMPLITUDES, smooth)))
+    _mark_crossing(zoom, found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth)))
     style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
     style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
     whole.legend(loc="upper left", fontsize=TICK, frameon=False)
     style.title(whole, "energy lost per cycle")
     style.title(zoom, "zoom")
     return figure
-
-
-def _cross(amplitude: Array, rough: Array, smooth: Array) -> float | None:
-    """The first amplitude at which the two plotted curves cross; None if they do not."""
-    ratio = rough[1:] / smooth[1:] - 1.0
-    (before,) = np.nonzero(ratio[:-1] * ratio[1:] < 0)
-    if len(before) == 0:
-        return None
-    i = before[0]
-    part = ratio[i] / (ratio[i] - ratio[i + 1])
-    return float(amplitude[i + 1] + part * (amplitude[i + 2] - amplitude[i + 1]))
 
 
 def _mark_crossing(axes: Axes, crossing: float, height: float) -> None:
@@ -286,6 +260,7 @@ Columns = dict[str, NDArray[Any]]
 def figure_data(found: PaperStates) -> dict[str, Columns]:
     """The numbers behind the paper's Figs. 3 to 9: names of tables, with their columns."""
     contact, half, path, loop = found.contact, found.half, found.path, found.loop
+    f = checks.friction(contact.scene.friction)
     sphere = smooth(contact.scene, load=contact.load)
     x = np.linspace(-1.3, 1.3, 2001) * sphere.contact_radius
     line = np.column_stack((x, np.zeros_like(x)))
@@ -298,10 +273,9 @@ def figure_data(found: PaperStates) -> dict[str, Columns]:
 
     def of_each_ring(states: LoadPath | Loop) -> Columns:
         """Forces and displacements of the first asperity of each ring."""
-        firsts = {name: ring[0] for name, ring in found.named.items()}
         forces, moved = states.asperity_forces, states.asperity_displacements
-        columns = {f"force_{name}": forces[:, i] for name, i in firsts.items()}
-        return columns | {f"displacement_{name}": moved[:, i] for name, i in firsts.items()}
+        columns = {f"force_{name}": forces[:, i] for name, i in found.firsts.items()}
+        return columns | {f"displacement_{name}": moved[:, i] for name, i in found.firsts.items()}
 
     return {
         "fig3_pressure": {
@@ -326,12 +300,12 @@ def figure_data(found: PaperStates) -> dict[str, Columns]:
         },
         "fig5_centre": {
             "r": close,
-            "friction_limit": SHARE * fields.pressure(contact, radial),
+            "friction_limit": f * fields.pressure(contact, radial),
             "traction": fields.traction(half, radial),
         },
         "fig6_section": {
             "x": x,
-            "friction_limit": SHARE * fields.pressure(contact, line),
+            "friction_limit": f * fields.pressure(contact, line),
             "traction": fields.traction(half, line),
             "smooth_traction": sphere.traction(np.abs(x), half.force),
         },

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 import convexrough as cr
@@ -21,37 +23,47 @@ AMPLITUDES = np.union1d(
 )
 
 
+#: Amplitude Q / (f P) at which, by the paper, the curves of its Fig. 9 cross.
+READ_CROSSING = 0.37
+
+
 class PaperStates:
-    """The results that the paper's figures and their tables show, for a contact with friction.
+    """The results that the paper's figures, their tables and the comparison of numbers show.
 
     limit  : [force] friction limit f P
     named  : indices of touching asperities by the letter of their ring, from the axis outwards; the
-        outermost ring has the letter A
+        outermost ring has the letter A;  firsts : the first of each ring
     onsets : (n,) Q / (f P) at which each asperity starts to slide
     half   : state at half of the limit;  steady, loop : cycle between plus and minus half of the
         limit, and its loop
     path   : loading from rest through Q / (f P) = `fractions`, which include the onsets of all
         rings
-    cycles : steady cycles at `AMPLITUDES`
+    cycles : steady cycles at `AMPLITUDES`;  crossing : amplitude Q / (f P) above which the rough
+        contact loses more per cycle than a smooth one
     """
 
     def __init__(self, contact: cr.Contact) -> None:
         self.contact = contact
         self.limit = limit = checks.friction(contact.scene.friction) * contact.load
-        self.named = lettered(contact)
+        groups = rings(contact.scene.asperities.distances, contact.loads)
+        letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[len(groups) - 1 :: -1]
+        self.named: dict[str, Indices] = dict(zip(letters, groups, strict=True))
+        self.firsts = {name: int(ring[0]) for name, ring in self.named.items()}
         self.onsets: Array = cr.onset_of_sliding(contact) / limit
         self.half = cr.shear(contact, force=SHARE * limit)
         self.steady = cr.cycle(contact, maximum=SHARE * limit)
         self.loop = self.steady.loop(400)
-        firsts = [ring[0] for ring in self.named.values()]
-        self.fractions = np.minimum(np.union1d(FRACTIONS, self.onsets[firsts]), 1.0)
+        onsets = self.onsets[list(self.firsts.values())]
+        self.fractions = np.minimum(np.union1d(FRACTIONS, onsets), 1.0)
         self.path = cr.history(contact, forces=self.fractions * limit)
         self.cycles = cr.cycles(contact, AMPLITUDES * limit)
 
+    @cached_property
+    def crossing(self) -> float:
+        from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
-def lettered(contact: cr.Contact) -> dict[str, Indices]:
-    """Indices of touching asperities by ring, from the axis outwards; the outermost ring is A."""
-    groups = rings(contact.scene.asperities.distances, contact.loads)
-    several = -(-len(groups) // 26)
-    letters = [chr(ord("A") + k) * (turn + 1) for turn in range(several) for k in range(26)]
-    return dict(zip(reversed(letters[: len(groups)]), groups, strict=True))
+        def excess(part: float) -> float:
+            cycle = cr.cycle(self.contact, maximum=part * self.limit)
+            return cycle.loss_normalised - cycle.smooth_normalised
+
+        return float(brentq(excess, 0.2, 0.6, xtol=1e-12))

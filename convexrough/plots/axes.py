@@ -51,6 +51,10 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
     axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
 
     Raises InputError for anything else.
+
+    >>> axes = cr.plots.plot(cr.shear(contact, force=0.25 * contact.load))
+    >>> print(axes.get_title())
+    $Q/(fP)$ = 0.5: 6 of 37 slide
     """
     kinds = [kind for kind in type(result).__mro__ if kind.__module__.startswith("convexrough.")]
     where = next((PICTURES[it.__name__] for it in kinds if it.__name__ in PICTURES), None)
@@ -69,7 +73,11 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(result: object) -> str:
-    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses."""
+    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses.
+
+    >>> print(cr.plots.thumbnail(contact)[:36])
+    <img alt="Contact" src="data:image/p
+    """
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):

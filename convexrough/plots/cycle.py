@@ -45,6 +45,10 @@ def cycle_figures(
         only those whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest are drawn. Also
         loops of the asperities in the cycle of the widest range
     "loss" : energy against amplitude, for cycles of several ranges
+
+    >>> forces = 0.5 * contact.load * np.array([0.1, 0.3, 0.5])
+    >>> print(*cr.plots.cycle_figures(cr.cycles(contact, forces)))
+    hysteresis loss
     """
     if not cycles:
         return Figures()

@@ -34,6 +34,11 @@ def steady_figures(found: Cycle) -> Figures:
 
     "steady" : the path in the load plane, with the two lines that fix the point (L*, T*) below
         which the state never changes, and the status of each asperity in every later cycle
+
+    >>> P = contact.load
+    >>> found = cr.steady(scene, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
+    >>> print(*cr.plots.steady_figures(found))
+    steady
     """
     figure = Figure(figsize=(DOUBLE, 3.5), layout="constrained")
     plane, place = figure.subplots(1, 2)
@@ -52,6 +57,12 @@ def phase_figures(found: PhaseLosses) -> Figures:
     """The figure of losses at several phases and sizes.
 
     "phase_losses" : loss per cycle against the phase for each size, and for the smooth sphere
+
+    >>> P = contact.load
+    >>> found = cr.phase_losses(scene, load=P, load_amplitude=0.2 * P, force_amplitude=0.1 * P,
+    ...                         phases=[0.0, 1.5], chords=6)
+    >>> print(*cr.plots.phase_figures(found))
+    phase_losses
     """
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     draw_losses(figure.subplots(), found)

@@ -15,8 +15,15 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from convexrough.errors import InputError
 
-#: Formats of files, and the limits of their resolution [pixels per inch].
-FORMATS = ("png", "svg", "pdf")
+#: Formats of files, with options for matplotlib: a level of compression that takes two thirds of
+#: the usual time, for files that are 5 % larger; and no dates, so that files can be compared.
+FORMATS: dict[str, dict[str, Any]] = {
+    "png": {"pil_kwargs": {"compress_level": 3}},
+    "svg": {"metadata": {"Date": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+}
+
+#: Limits of the resolution [pixels per inch].
 LEAST_DPI, MOST_DPI = 50, 600
 
 #: Settings that keep text as text in SVG and PDF, and use fixed ids, so that files can be compared.
@@ -68,17 +75,18 @@ def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
 def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
     """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is its resolution.
 
-    Raises InputError for another format, or a `dpi` out of range.
+    Raises InputError for another format, or a `dpi` that is not from 50 to 600.
+
+    >>> cr.plots.save(contact.plot().figure, folder / "pressure.png", dpi=100)
     """
     if form not in FORMATS:
         raise InputError("form", found=repr(form), expected=f"one of {', '.join(FORMATS)}")
     if not LEAST_DPI <= dpi <= MOST_DPI:
         raise InputError("dpi", found=dpi, expected=f"from {LEAST_DPI} to {MOST_DPI}")
-    dates: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     canvas: Any = get_registered_canvas_class(form)(figure)
     before, figure.dpi = figure.dpi, dpi
     try:
         with rc_context(REAL_TEXT):  # `savefig` draws everything twice
-            getattr(canvas, f"print_{form}")(path, metadata=dates.get(form))
+            getattr(canvas, f"print_{form}")(path, **FORMATS[form])
     finally:
         figure.dpi = before

@@ -44,6 +44,10 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
         curve at some points
     "path_stick_slip" : at varying load: maps of the asperities that stick and that slide, at some
         of the points
+
+    >>> past = cr.history(contact, forces=0.5 * contact.load * np.array([0.6, -0.2, 0.3]))
+    >>> print(*cr.plots.path_figures(past))
+    history
     """
     if path.load_constant and not path.contact.loads.any():
         return style.no_contact("history")
@@ -128,7 +132,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         draw_map(axes, scene.contact_points, layers, scale.length, room=room)
         slide = int((path.status[k] == "sliding").sum())
         touch = int((path.asperity_loads[k] > 0).sum())
-        axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
+        style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelbottom=False, labelleft=False)
     for axes in places.ravel()[len(chosen) :]:
@@ -145,6 +149,10 @@ def between(path: LoadPath) -> LoadPath:
     The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
     path of varying load starts from a pressed contact. Figures call this function only if no such
     path is passed to them, because it may solve normal problems.
+
+    >>> past = cr.history(contact, forces=0.5 * contact.load * np.array([0.6, -0.2, 0.3]))
+    >>> len(cr.plots.between(past).forces)
+    120
     """
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)

@@ -27,6 +27,9 @@ def press_figures(contact: Contact) -> Figures:
         not in rows or if very many touch, the second plot shows the peak pressures of all
         asperities against the distance from the centre
     "loads"    : load of each touching asperity against its distance from the centre
+
+    >>> print(*cr.plots.press_figures(contact))
+    pressure loads
     """
     if not contact.loads.any():
         return style.no_contact("pressure", "loads")

@@ -29,6 +29,11 @@ def shakedown_figures(found: Shakedown) -> Figures:
     "shakedown_map" : number of asperities that slide or open in every cycle, against the amplitudes
         of load and shear; at constant load, against mean and amplitude of the shear force. Only for
         the kind "exact", and if more than one asperity has a factor
+
+    >>> swing = 0.5 * contact.load * np.array([1.0, -1.0])
+    >>> found = cr.shakedown(scene, loads=contact.load, force_amplitudes=swing)
+    >>> print(*cr.plots.shakedown_figures(found))
+    shakedown shakedown_map
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found)

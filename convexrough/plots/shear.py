@@ -22,7 +22,7 @@ from convexrough.plots.asperity_map import (
 )
 from convexrough.plots.measure import Scale, quantity
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, TICK
+from convexrough.plots.style import DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -36,6 +36,10 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
 
     "stick_slip" : contact discs with stick discs inside, sliding asperities, open ones; and
         contact and stick disc of the smooth sphere under the same forces
+
+    >>> states = [cr.shear(contact, force=part * contact.load) for part in (0.1, 0.25)]
+    >>> print(*cr.plots.shear_figures(states))
+    stick_slip
     """
     if not states:
         return Figures()
@@ -53,7 +57,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, state in zip(panels, shown, strict=False):
         draw_state(axes, state, scale)
-        axes.set_title(state_title(state, scale, narrow=columns == 4), fontsize=TICK)
+        style.title(axes, state_title(state, scale, narrow=columns == 4), "center")
         axes.set(xlabel="", ylabel="")
         if columns == 4:
             axes.xaxis.set_major_locator(style.round_ticks(4))
@@ -74,7 +78,7 @@ def draw_one_state(axes: Axes, state: State) -> None:
     """Draw the map of a state, with a title and a legend."""
     scale = Scale(state.contact)
     draw_state(axes, state, scale)
-    axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
+    style.title(axes, state_title(state, scale, narrow=False), "center")
     style.legend_below(axes, handles=legend_handles([state], scale))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -41,8 +41,8 @@ def label(axes: Axes, x: str, y: str) -> None:
         axis.get_offset_text().set_fontsize(TICK)
 
 
-def title(axes: Axes, text: str) -> None:
-    axes.set_title(text, fontsize=TICK, loc="left")
+def title(axes: Axes, text: str, loc: Literal["left", "center"] = "left") -> None:
+    axes.set_title(text, fontsize=TICK, loc=loc)
 
 
 def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
@@ -51,7 +51,7 @@ def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -
     found.ax.tick_params(labelsize=TICK)
     found.ax.yaxis.get_offset_text().set_fontsize(TICK)
     if above:
-        found.ax.set_title(name, fontsize=TICK)
+        title(found.ax, name, "center")
     else:
         found.set_label(name, fontsize=LABEL)
     return found

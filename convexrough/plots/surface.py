@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -68,6 +65,10 @@ def surface_figures(
 
     maxima  : all summits of this surface;  summits : the summits left by pruning
     contact : the contact of the summits left by pruning
+
+    >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
+    >>> print(*cr.plots.surface_figures(scan, scan.summits(0.0), scan.summits(0.05)))
+    map histograms
     """
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
@@ -124,7 +125,14 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
     """The figure of contacts, crowding and model error against pruning; shaded if unreliable.
 
-    chosen : the pruning that a dotted line marks
+    chosen : the pruning that a dotted line marks;  unit : of the map's lengths, "" if unknown
+
+    >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
+    >>> def press(some):
+    ...     return cr.press(cr.Scene(1e4, some, cr.Material(1.0, 0.3)), load=10.0)
+    >>> curve = cr.surface.provability(summits, press, levels=[0.0, 0.1, 0.3])
+    >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
+    advised pruning: at least 0 %   ($Sz$ = 2.85)
     """
     figure = Figure(figsize=(SINGLE, 5.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1)
@@ -194,9 +202,9 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         axes.set(xlim=(-width, width), ylim=(-height, height))
         _label_places(axes, surface)
     draw_summits(axes, positions)
-    scale = bar(axes, image, "", above=True)
+    scale = bar(axes, image, "")
     highest = float(np.abs(surface.heights).max())
-    scale.ax.set_title(_count(scale.ax.yaxis, "$z$", surface.unit, highest), fontsize=TICK)
+    title(scale.ax, _count(scale.ax.yaxis, "$z$", surface.unit, highest), "center")
     handles.insert(0, disc_handle(SUMMIT, f"summits ({shown})"))
     legend_outside(figure, handles, "lower center", 3)
     return figure
@@ -281,17 +289,3 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
 
     axis.set_major_formatter(said)
     return f"{name}  [{literal(length.said)}]"
-
-
-def _draw_summits(summits: Summits, axes: Axes) -> None:
-    every = np.ones(len(summits), dtype=bool)
-    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
-
-
-#: The function that draws each kind of result.
-PICTURES: dict[type, Callable[..., Any]] = {
-    Surface: lambda it, axes: draw_surface(axes, it),
-    Summits: _draw_summits,
-    Provability: lambda it, axes: draw_provability(axes, it),
-}

@@ -20,6 +20,10 @@ def fretting_figures(worn: Fretting) -> Figures:
 
     "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle and,
         at the largest force, the mean and the largest shear traction
+
+    >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
+    >>> print(*cr.plots.fretting_figures(worn))
+    fretting
     """
     if not worn.contact.loads.any():
         return style.no_contact("fretting")
@@ -65,6 +69,9 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     "gradient" : contact discs, coloured by (D0 / J) dJ / dz, with the approach D0, the
         differentiated number J and the height z of the asperity; open asperities are dots
     of : symbol of J, as a formula
+
+    >>> print(*cr.plots.gradient_figures(contact.gradient(load=1.0), of="P"))
+    gradient
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
     draw_gradient(figure.subplots(), gradient, of)

@@ -30,6 +30,9 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
 
     "verdict" : map of the proved statuses, with marks on wrongly claimed asperities and indices of
         the likeliest suspects; a second map for shear forces, if they are claimed
+
+    >>> print(*cr.plots.verdict_figures(cr.verify(scene, contact.loads, approach=5e-5)))
+    verdict
     """
     claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
     width = SINGLE if len(claims) == 1 else DOUBLE

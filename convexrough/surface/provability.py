@@ -47,6 +47,8 @@ class Provability(Table, Plottable):
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found
     approaches, loads : [length] approach and [force] load of each contact
+
+    An example is under `provability`.
     """
 
     _shown = ("trusted_from",)

@@ -28,9 +28,10 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: The unit of each column with a unit; {} stands for the unit of length.
+#: The unit of each column and statistic with a unit; {} stands for the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
-LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
+LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curvature"), "1/{}")
+LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 
 #: At most this many crowded pairs of summits are printed.
 MOST_LISTED = 10
@@ -130,12 +131,13 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
     """The columns of summits.csv, with units in their names; a scene file can read the file."""
-    unit, columns = summits.origin.unit, summits.columns()
-    named = {
-        f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
-        for name, values in columns.items()
-    }
-    return named | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
+    columns = {_in_unit(name, summits.unit): it for name, it in summits.columns().items()}
+    return columns | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
+
+
+def _in_unit(name: str, unit: str) -> str:
+    """A column's name, with the column's unit if it has one."""
+    return f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name
 
 
 def describe_surface(scanned: Scanned) -> list[str]:
@@ -175,7 +177,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         more = ", but see the warnings" if any(warnings_about(scanned)) else ""
         described += ["", *_describe_curve(scanned.curve, surface.unit, more)]
     if scanned.contact is not None:
-        described += _describe_crowded(scanned.contact)
+        described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
         table: list[Any] = [["the same approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
@@ -197,14 +199,11 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
-    maxima, left = scanned.maxima.statistics, scanned.summits.statistics
-    moments, unit = scanned.surface.moments, scanned.surface.unit
-    units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
-    names = ("density", "mean curvature", "mean height", "height std")
+    found = scanned.maxima.statistics, scanned.summits.statistics, scanned.surface.moments
     table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "by moments"]]
-    for field, name, each in zip(maxima._fields, names, units, strict=True):
-        values = (getattr(found, field) for found in (maxima, left, moments))
-        table.append([name + each, *values])
+    for name in found[0]._fields:
+        named = _in_unit(name, scanned.surface.unit).replace("_", " ")
+        table.append([named, *(getattr(each, name) for each in found)])
     return aligned(table, left=1, digits=4)
 
 
@@ -228,24 +227,22 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
     return [*aligned(table), "", *labelled([("advised pruning", said)])]
 
 
-def _describe_crowded(contact: Contact) -> list[str]:
+def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
-    lines = []
     if len(pairs):
-        lines.append(f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:")
+        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:"
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
             table.append([str(i), str(j), f"{value:.3g}", x[i], y[i]])
-        lines += [f"    {line}" for line in aligned(table)]
+        yield from (f"    {line}" for line in aligned(table))
         if (more := len(pairs) - MOST_LISTED) > 0:
-            lines.append(f"    and {more:,} more: --json has all")
+            yield f"    and {more:,} more: --json has all"
     strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
     if len(strained):
         named = ", ".join(map(str, strained[:MOST_LISTED]))
         rest = f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
-        lines.append(f"{'model error':<18}above {TOO_FAR:.0%} at summits {named}{rest}")
-    return lines
+        yield f"{'model error':<18}above {TOO_FAR:.0%} at summits {named}{rest}"
 
 
 def _near_holes(scanned: Scanned) -> Iterator[str]:
@@ -291,33 +288,32 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     if not first <= chosen:
         more = "no pruning is" if np.isnan(first) else f"--prune {first:g} is"
         yield f"the asperity model cannot be trusted at a pruning of {chosen:g}; {more} enough"
-    if contact is not None and not contact.loads.any():
+    if contact is None:
+        yield f"at a pruning of {chosen:g} no solution was found"
+        return
+    touching = contact.loads > 0
+    if not touching.any():
         yield (
             f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
             "larger approach, or a load"
         )
-    if contact is not None:
-        yield from contact.warnings
-        width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
-        if width > diameter:
-            yield (
-                f"the map is {width:.4g} {surface.unit} wide, and the sphere {diameter:.4g} "
-                f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
-            )
+    yield from contact.warnings
+    width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
+    if width > diameter:
+        yield (
+            f"the map is {width:.4g} {surface.unit} wide, and the sphere {diameter:.4g} "
+            f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
+        )
     if scanned.whole is not None:
-        less = 1.0 - scanned.whole.contact.load / scanned.whole.load
+        less = 1.0 - contact.load / scanned.whole.load
         if abs(less) > UNLIKE:
             yield (
                 f"the asperities carry {abs(less):.0%} {'less' if less > 0 else 'more'} than the "
                 "whole map at the same approach: the asperity model does not represent this map"
             )
-    if contact is None:
-        yield f"at a pruning of {chosen:g} no solution was found"
-    elif contact.loads.any():
-        points = contact.scene.contact_points[contact.loads > 0]
-        part = float((np.abs(points).max(axis=0) / np.array(surface.size) * 2).max())
-        if part > NEAR_EDGE:
-            yield (
-                f"contact reaches {part:.0%} of the way to the edge of the map: there may be more "
-                "contact beyond the edge"
-            )
+    reach = np.abs(contact.scene.contact_points[touching]).max(axis=0, initial=0.0)
+    if (part := float((reach / np.array(surface.size) * 2).max())) > NEAR_EDGE:
+        yield (
+            f"contact reaches {part:.0%} of the way to the edge of the map: there may be more "
+            "contact beyond the edge"
+        )

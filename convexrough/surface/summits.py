@@ -170,6 +170,10 @@ class Summits(Table, Asperities, Plottable):
         prune : least prominence, as a fraction of Sz
 
         Raises InputError for a weaker pruning, or if no summit is left.
+
+        >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(0.05)
+        >>> len(summits), len(summits.pruned(0.3))
+        (129, 16)
         """
         prune = checks.between("prune", prune, self.origin.prune, 1.0)
         keep = self.prominences >= prune * self.origin.max_height
@@ -184,21 +188,21 @@ class Summits(Table, Asperities, Plottable):
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about maxima. Only entries with `whole` True have a meaning.
+    """Paraboloids fitted about n maxima, without the others.
 
+    whole      : True for each maximum whose paraboloid curves downwards in every direction and has
+        its top within the fitted pixels; the n maxima are these
     offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first
     deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
-    whole      : (n,) True if the paraboloid curves downwards in every direction and its top is
-        within the fitted pixels
     """
 
+    whole: NDArray[np.bool_]
     offsets: Array
     heights: Array
     curvatures: Array
     deviations: Array
-    whole: NDArray[np.bool_]
 
 
 def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
@@ -212,24 +216,23 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
     terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
     around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
-    z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
+    fitted = np.linalg.pinv(terms) @ around.T
+    _, gu, gv, huu, huv, hvv = fitted
     determinant = huu * hvv - huv**2
-    whole = (determinant > 0) & (huu < 0)
-    solid = np.where(whole, determinant, 1.0)
+    solid = np.where(determinant > 0, determinant, np.inf)
     top = np.stack(((huv * gv - hvv * gu) / solid, (huv * gu - huu * gv) / solid))
-    whole &= (np.abs(top) <= reach).all(axis=0)
+    whole = (determinant > 0) & (huu < 0) & (np.abs(top) <= reach).all(axis=0)
 
-    dx, dy = pixel
+    z0, gu, gv, huu, huv, hvv = fitted[:, whole]
+    (u0, v0), (dx, dy) = top[:, whole], pixel
     hxx, hxy, hyy = huu / dx**2, huv / (dx * dy), hvv / dy**2
     middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
-    product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
-    larger = np.where(whole, middle + half, 1.0)
+    product = determinant[whole] / (dx * dy) ** 2
+    larger = middle + half
     smaller = np.minimum(product / larger, larger)  # avoids cancellation
-    curvatures = np.stack((larger, smaller), axis=1)
-    summits = z0 + (gu * top[0] + gv * top[1]) / 2
-    x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
+    summits = z0 + (gu * u0 + gv * v0) / 2
+    x, y = (right - u0[:, None]) * dx, (down - v0[:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
-    deviations = np.sqrt(np.mean((around - sphere) ** 2, axis=1))
-    return Tips(
-        np.stack((top[0] * dx, top[1] * dy), axis=1), summits, curvatures, deviations, whole
-    )
+    deviations = np.sqrt(np.mean((around[whole] - sphere) ** 2, axis=1))
+    offsets, curvatures = np.stack((u0 * dx, v0 * dy), 1), np.stack((larger, smaller), 1)
+    return Tips(whole, offsets, summits, curvatures, deviations)

@@ -92,28 +92,29 @@ class Surface(Record, Plottable):
         repeated: int | None = None,
         copied: float | None = None,
     ) -> None:
-        object.__setattr__(self, "heights", _checked(heights))
-        object.__setattr__(self, "pixel", checked_pixel(pixel))
+        grid, size = _checked(heights), checked_pixel(pixel)
         if not isinstance(unit, str):
             raise InputError("unit", found=repr(unit)[:60], expected='a name, such as "µm", or ""')
         named = known_unit("unit", unit)
-        object.__setattr__(self, "unit", named.name if named else "")
-        object.__setattr__(self, "removed", removed)
+        measured = known = grid
         if filled_pixels is not None:
             filled_pixels = frozen(np.array(filled_pixels))
-            if filled_pixels.dtype.kind != "b" or filled_pixels.shape != self.heights.shape:
+            if filled_pixels.dtype.kind != "b" or filled_pixels.shape != grid.shape:
                 found = f"an array of {filled_pixels.dtype}, of shape {filled_pixels.shape}"
-                expected = f"True or False for each height, of shape {self.heights.shape}"
+                expected = f"True or False for each height, of shape {grid.shape}"
                 raise InputError("filled_pixels", found=found, expected=expected)
-        object.__setattr__(self, "filled_pixels", filled_pixels)
-        object.__setattr__(self, "source", source)
-        known = self.heights if filled_pixels is None else self.heights[~filled_pixels]
-        there = holes.clipped(known) if clipped is None else clipped
-        object.__setattr__(self, "clipped", there)
-        alike = holes.repeated(known) if repeated is None else repeated
-        object.__setattr__(self, "repeated", alike)
-        same = holes.copied(self._measured) if copied is None else copied
-        object.__setattr__(self, "copied", same)
+            measured, known = np.where(filled_pixels, np.nan, grid), grid[~filled_pixels]
+        self.__dict__.update(
+            heights=grid,
+            pixel=size,
+            unit=named.name if named else "",
+            removed=removed,
+            filled_pixels=filled_pixels,
+            source=source,
+            clipped=holes.clipped(known) if clipped is None else clipped,
+            repeated=holes.repeated(known) if repeated is None else repeated,
+            copied=holes.copied(measured) if copied is None else copied,
+        )
 
     @property
     def filled(self) -> int:
@@ -300,7 +301,6 @@ class Surface(Record, Plottable):
         inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
         tried = pixels[prominent & inside]
         tips = fit_tips(self.heights, tried, self.pixel, fit)
-        whole = tips.whole
         origin = Origin(
             source=self.source,
             shape=shape,
@@ -317,26 +317,26 @@ class Surface(Record, Plottable):
             maxima=len(pixels),
             pruned=int(np.count_nonzero(~prominent)),
             at_edge=int(np.count_nonzero(prominent & ~inside)),
-            without_top=int(np.count_nonzero(~whole)),
+            without_top=int(np.count_nonzero(~tips.whole)),
         )
-        if not whole.any():
+        if not tips.whole.any():
             none = (
                 f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} "
                 f"at the edge, {origin.without_top:,} without a fitted maximum"
             )
             expected = "; ".join(("at least one", *self.warnings[:1]))
             raise InputError("summits", found=none, expected=expected)
-        middle = (tried - np.array([rows - 1, columns - 1]) / 2)[:, ::-1]
-        k1, k2 = tips.curvatures[whole].T
+        chosen, (k1, k2) = tried[tips.whole], tips.curvatures.T
+        middle = (chosen - np.array([rows - 1, columns - 1]) / 2)[:, ::-1]
         return Summits(
-            positions=(middle * self.pixel + tips.offsets)[whole],
+            positions=middle * self.pixel + tips.offsets,
             tip_radii=1 / np.sqrt(k1 * k2),
-            heights=tips.heights[whole],
-            prominences=self.hills.prominences[prominent & inside][whole],
+            heights=tips.heights,
+            prominences=self.hills.prominences[prominent & inside][tips.whole],
             largest_curvatures=k1,
             smallest_curvatures=k2,
-            deviations=tips.deviations[whole],
-            pixels=tried[whole],
+            deviations=tips.deviations,
+            pixels=chosen,
             origin=origin,
         )
 

@@ -21,7 +21,7 @@ from convexrough.normal.claims import Claim, tolerance
 from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.surface.reading import steps
+from convexrough.surface.height_grid import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare, unit
 from convexrough.verdict.placing import Placing, unused

@@ -19,8 +19,7 @@ NAMED = replace(PAPER, units=("µm", "mN"))
 def test_the_path_and_its_memory_are_drawn() -> None:
     path = follow("paper", ONE)
     figures = plots.path_figures(path)
-    for figure in figures.values():
-        fits(figure)
+    fits(*figures.values())
     plane, loop, cost = figures["path"].axes
     lines = {line.get_label(): line.get_xydata() for line in plane.lines}
     last = path.curves[-1]

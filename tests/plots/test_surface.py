@@ -27,8 +27,7 @@ def test_figures_fit(load: float) -> None:
     contact = press(summits, load)
     figures = surface_figures(MAP, MAXIMA, summits, curve, contact)
     assert set(figures) == {"map", "histograms", "provability"}
-    for figure in figures.values():
-        fits(figure)
+    fits(*figures.values())
     touching = int((contact.loads > 0).sum())
     chart = figures["map"].axes[0]
     assert discs(chart, "_contacts") == touching

@@ -169,10 +169,12 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
 ONE = {"pixel": 1.0}
 
+#: Two columns of coordinates and two of values; and a matrix whose rows are numbered.
+INDEXED = "".join(f"{i},{j},{i % 7 + j % 3},5\n" for i in range(9) for j in range(7))
+NUMBERED = "".join(f"{i},{line}\n" for i, line in enumerate(matrix(separator=",").split()))
 
 #: Heights of about 1000, with a comma between groups of three digits.
 THOUSANDS = "1,003;1,021;997;1,040\n" * 10 + "1,011;990;1,007;1,002\n" * 10
-
 
 #: Heights of which only the largest exceed 999, with a point between its groups of digits.
 FEW_THOUSANDS = "827;12;9;640\n" * 4 + "827;1.013;9;640\n"
@@ -199,103 +201,76 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
                     assert found.filled == (cells == mark).sum()
 
 
+#: Contents, in which @ is a matrix, with options, and what is said of them.
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("Height [nm]\n@", ONE, r"row 1: text: found 'Height \[nm\]', expected a co"),
+    ("@", {}, "pixel: found none, expected its size, which the file does not state"),
+    (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
+    (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
+    (matrix(np.ones((7, 9))), ONE, "found 1 everywhere, expected a rough surface"),
+    (matrix(1e9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
+    (matrix(1e-9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
+    (
+        "@",
+        ONE | {"unit": "nm", "height_unit": "um"},
+        "rms slope .* check height_unit, µm, and unit",
+    ),
+    ("@", {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
+    ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
+    ("# row col z\n0,0,1\n1,0,2\n", ONE, "columns: found row, col, z, expected a column"),
+    (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
+    ("@", {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
+    ("@", ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
+    ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
+    ("# Width: 9 µm\n# Height: 7 µm\n@", {"unit": "nm"}, "unit: found nm, expected "),
+    ("# Width: 9 µm\n# Height: 7 nm\n@", {}, "units: found µm and nm, expected one"),
+    ("# Width: 9,0 µm\n# Height: 7,0 µm\n@", {"unit": "mm"}, "found mm, expected µm"),
+    ("# Width: 9 by 9 µm\n# Height: 7 µm\n@", {}, "units: found by 9 µm and µm"),
+    ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found only a hei"),
+    ("# Width: 9 m\n# Height: 7 m\n@", {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
+    ("@" + matrix([HEIGHTS.mean(axis=0).round(3)]), ONE, "last row: found the means of"),
+    ("# Breite: 9 mm\n# Werte: nm\n@", {}, "comments: found # Breite: 9 mm, exp"),
+    ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit"),
+    ("# Pixel = 0.5\n@", ONE, "comments: found # Pixel = 0.5"),
+    ("# Value units: V\n@", ONE | {"unit": "m"}, "height_unit: found 'V'"),
+    (matrix().replace("\n", "\nx", 1), ONE, "row 2, column 1: found 'x"),
+    (2 * "# Width: 9 m\n# Height: 7 m\n@", {}, "rows: found lines without numbers"),
+    ("@\n@", ONE, "without numbers between rows 7 and 9, expected one map"),
+    ('"-0,1","0,2","0,1","0,4"\n' * 4, ONE, "row 1: found -0,1, expected decimal points, not c"),
+    ("@1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
+    ("a b c\n@", ONE, "columns: found a, b, c, expected a column 'x'"),
+    ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
+    ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
+    ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
+    ("Heights in nm\nx,y,z\n1,1,1\n2,2,2\n", {}, "comments: found Heights in nm, expected "),
+    ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
+    ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
+    ("x,y,z,valid\n0,0,1,1\n1,0,2,0\n0,1,3,1\n1,1,4,1\n", {}, "columns: found valid, e"),
+    ("x,y,z,gain\n0,0,1,1\n1,0,2,1\n0,1,3,1\n1,1,4,1\n", {}, "columns: found gain, e"),
+    ("x,y,z,id\n0,0,1,1\n1,0,2,0\n0,1,3,1\n1,1,4,1\n", {}, "columns: found id, e"),
+    ("x,y,z,ok\n0,0,1,1\n1,0,2,False\n0,1,3,1\n1,1,4,1\n", {}, "columns: found ok, e"),
+    ("", {}, "empty"),
+    ("x,y,z\n", {}, "rows: found none below the header"),
+    ("1 2 3 4\n", ONE, "shape"),
+    ("0 1 2 3 4 5 6 7 8\n@", ONE, "row 1: found numbers 0, 1, 2, ..."),
+    ("0 .2 .4 .6 .8 1 1.2 1.4 1.6\n@", ONE, "row 1: found numbers 0, 0.2, 0.4, ..., expected he"),
+    ("y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n", ONE, "row 1: found numbers 0.2, 0.4, "),
+    (NUMBERED, ONE, "column 1: found numbers 0, 1, 2, ..., expected heights alone: leave coord"),
+    (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
+    (THOUSANDS.replace(",", "."), ONE, "found 1.003, and 990 in row 11"),
+    (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
+    (FEW_THOUSANDS.replace(".", ","), ONE, "row 5: found 1,013, and 827 in row 1"),
+    ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
+    (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
+    (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
+    (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
+]
+
+
 @pytest.mark.sample(10)
-@pytest.mark.parametrize(
-    ("content", "options", "message"),
-    [
-        ("Height [nm]\n" + matrix(), ONE, r"row 1: text: found 'Height \[nm\]', expected a co"),
-        (matrix(), {}, "pixel: found none, expected its size, which the file does not state"),
-        (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
-        (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
-        (matrix(np.ones((7, 9))), ONE, "found 1 everywhere, expected a rough surface"),
-        (matrix(1e9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
-        (matrix(1e-9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
-        (
-            matrix(HEIGHTS),
-            ONE | {"unit": "nm", "height_unit": "um"},
-            "rms slope .* check height_unit, µm, and unit",
-        ),
-        (matrix(), {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
-        ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
-        ("# row col z\n0,0,1\n1,0,2\n", ONE, "columns: found row, col, z, expected a column"),
-        (
-            "".join(f"{i},{j},{i % 7 + j % 3},5\n" for i in range(9) for j in range(7)),
-            ONE,
-            "columns: found 4 columns without a header, two of which are coordinates",
-        ),
-        (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
-        (matrix(), ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
-        (matrix(), ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
-        ("# Width: 9 µm\n# Height: 7 µm\n" + matrix(), {"unit": "nm"}, "unit: found nm, expected "),
-        ("# Width: 9 µm\n# Height: 7 nm\n" + matrix(), {}, "units: found µm and nm, expected one"),
-        ("# Width: 9,0 µm\n# Height: 7,0 µm\n" + matrix(), {"unit": "mm"}, "found mm, expected µm"),
-        ("# Width: 9 by 9 µm\n# Height: 7 µm\n" + matrix(), {}, "units: found by 9 µm and µm"),
-        ("# Height: 7 µm\n" + matrix(), ONE | {"unit": "mm"}, "comments: found only a hei"),
-        ("# Width: 9 m\n# Height: 7 m\n" + matrix(), {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
-        (
-            matrix(np.vstack((HEIGHTS, HEIGHTS.mean(axis=0).round(3)))),
-            ONE,
-            "last row: found the means of",
-        ),
-        ("# Breite: 9 mm\n# Werte: nm\n" + matrix(), {}, "comments: found # Breite: 9 mm, exp"),
-        ("# z unit: nm\n" + matrix(), ONE | {"unit": "mm"}, "comments: found # z unit"),
-        ("# Pixel = 0.5\n" + matrix(), ONE, "comments: found # Pixel = 0.5"),
-        ("# Value units: V\n" + matrix(), ONE | {"unit": "m"}, "height_unit: found 'V'"),
-        (matrix().replace("\n", "\nx", 1), ONE, "row 2, column 1: found 'x"),
-        (2 * ("# Width: 9 m\n# Height: 7 m\n" + matrix()), {}, "rows: found lines without numbers"),
-        (matrix() + "\n" + matrix(), ONE, "without numbers between rows 7 and 9, expected one map"),
-        (
-            '"-0,1","0,2","0,1","0,4"\n' * 4,
-            ONE,
-            "row 1: found -0,1, expected decimal points, not commas",
-        ),
-        (matrix() + "1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
-        ("a b c\n" + matrix(), ONE, "columns: found a, b, c, expected a column 'x'"),
-        ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
-        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
-        ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
-        ("Heights in nm\nx,y,z\n1,1,1\n2,2,2\n", {}, "comments: found Heights in nm, expected "),
-        ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
-        ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
-        *(
-            (
-                f"x,y,z,{name}\n0,0,1,1\n1,0,2,{it}\n0,1,3,1\n1,1,4,1\n",
-                {},
-                f"columns: found {name}, e",
-            )
-            for name, it in (("valid", 0), ("gain", 1), ("id", 0), ("ok", "False"))
-        ),
-        ("", {}, "empty"),
-        ("x,y,z\n", {}, "rows: found none below the header"),
-        ("1 2 3 4\n", ONE, "shape"),
-        ("0 1 2 3 4 5 6 7 8\n" + matrix(), ONE, "row 1: found numbers 0, 1, 2, ..."),
-        (
-            "0 .2 .4 .6 .8 1 1.2 1.4 1.6\n" + matrix(),
-            {"pixel": 0.2},
-            "row 1: found numbers 0, 0.2, 0.4, ..., expected heights alone: leave coordinates",
-        ),
-        (
-            "y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n",
-            {"pixel": 0.2},
-            "row 1: found numbers 0.2, 0.4, 0.6, ..., expected heights alone",
-        ),
-        (
-            "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
-            ONE,
-            "column 1: found numbers 0, 1, 2, ...",
-        ),
-        (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
-        (THOUSANDS.replace(",", "."), ONE, "found 1.003, and 990 in row 11"),
-        (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
-        (FEW_THOUSANDS.replace(".", ","), ONE, "row 5: found 1,013, and 827 in row 1"),
-        ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
-        (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
-        (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
-        (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
-    ],
-)
+@pytest.mark.parametrize(("content", "options", "message"), WRONG)
 def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:
-    path = tmp_path / put(tmp_path, content, "map.txt")
+    path = tmp_path / put(tmp_path, content.replace("@", matrix()), "map.txt")
     with pytest.raises(cr.ConvexroughError, match=message) as caught:
         cr.surface.read(path, **options)
     assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())

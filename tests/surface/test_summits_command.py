@@ -40,6 +40,16 @@ def surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> cr.surface.Surfa
     return surface
 
 
+@pytest.fixture
+def find(command: Any) -> Any:
+    """`convexrough summits` with arguments, without figures, over earlier results."""
+    return lambda *arguments: command("summits", *arguments, "--no-figures", "--force")
+
+
+#: Options that press a sphere.
+PRESSED = ("--radius", "1e4", "--load", "10", "--modulus", "1")
+
+
 def rows(path: str) -> list[dict[str, str]]:
     with open(path, encoding="utf-8", newline="") as file:
         names, *cells = csv.reader(file)
@@ -55,29 +65,24 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
     assert outcome.out.endswith("\nwritten to scan-summits: summits.csv, summary.json\n")
     summits = cr.surface.read("scan.npz").summits()
     table = rows("scan-summits/summits.csv")
-    assert len(table) == len(summits)
-    for name, values in (("x", summits.x), ("y", summits.y), ("height", summits.heights),
-                         ("tip_radius", summits.tip_radii), ("deviation", summits.deviations),
-                         ("elliptic_load", summits.elliptic_loads),
-                         ("eccentricity", summits.eccentricities)):  # fmt: skip
+    for name, values in summits.columns().items():
         assert [float(row[name]) for row in table] == values.tolist()
     scene = cr.read_scene("scene.toml").scene
     np.testing.assert_array_equal(scene.asperities.positions, summits.positions)
     np.testing.assert_array_equal(scene.asperities.tip_radii, summits.tip_radii)
-    lines = outcome.out.splitlines()
-    assert (
-        f"summits           {len(summits):,}  (of {summits.origin.maxima:,} maxima" in outcome.out
-    )
+    counted = f"summits           {len(summits):,}  (of {summits.origin.maxima:,} maxima"
+    assert counted in outcome.out
     assert "removed           plane, slopes 0.01" in outcome.out
-    statistics = next(line for line in lines if line.startswith("density")).split()
-    found = cr.surface.read("scan.npz").summits(0.0).statistics.density
-    assert statistics[:3] == ["density", "[1/µm²]", f"{found:.4g}"]
-    assert statistics[4] == f"{cr.surface.read('scan.npz').moments.density:.4g}"
+    (line,) = re.findall("density .*", outcome.out)
+    found = cr.surface.read("scan.npz")
+    density = found.summits(0.0).statistics.density
+    assert line.split()[:3] == ["density", "[1/µm²]", f"{density:.4g}"]
+    assert line.split()[4] == f"{found.moments.density:.4g}"
 
 
 @pytest.mark.usefixtures("surface")
-def test_pressed_as_a_scene_says(command: Any) -> None:
-    outcome = command("summits", "scan.npz", "--scene", "scene.toml", "--json", "--no-figures")
+def test_pressed_as_a_scene_says(find: Any) -> None:
+    outcome = find("scan.npz", "--scene", "scene.toml", "--json")
     assert outcome.status == 0
     found = json.loads(outcome.out)
     file = cr.read_scene("scene.toml")  # of the table that was just written
@@ -89,59 +94,50 @@ def test_pressed_as_a_scene_says(command: Any) -> None:
     assert_allclose(chosen["crowding"], contact.crowding, rtol=1e-9)
     assert found["crowded"] == []
     first = found["trusted_from"]
-    trusted = [row["trusted"] for row in found["provability"] if row["prune"] >= first]
-    assert trusted
-    assert all(trusted)
+    assert {row["trusted"] for row in found["provability"] if row["prune"] >= first} == {True}
     assert rows("scan-summits/provability.csv")[0]["prune"] == "0.0"
     assert json.loads(Path("scan-summits/summary.json").read_text()) == found
-    said = command("summits", "scan.npz", "--radius", "1e4", "--load", "100", "--modulus", "1",
-                   "--json", "--no-figures", "--force")  # fmt: skip
-    assert json.loads(said.out) == found
+    assert json.loads(find("scan.npz", *PRESSED, "--load", "100", "--json").out) == found
 
 
 @pytest.mark.usefixtures("surface")
-def test_a_scene_in_another_unit(command: Any) -> None:
+def test_a_scene_in_another_unit(find: Any) -> None:
     """A map in µm for a scene in m: the table is in m, and the contact the same."""
     text = SCENE.format(radius=0.01, modulus=1e12, load=100.0, unit="m")
     Path("metres.toml").write_text(text)
-    options = ("--json", "--no-figures", "--force")
-    one = json.loads(command("summits", "scan.npz", "--scene", "scene.toml", *options).out)
-    small = [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")]
-    other = json.loads(command("summits", "scan.npz", "--scene", "metres.toml", *options).out)
-    assert_allclose(
-        [float(row["tip_radius"]) for row in rows("scan-summits/summits.csv")],
-        np.array(small) / 1e6,
-    )
+
+    def pressed(scene: str) -> tuple[Any, Any]:
+        found = json.loads(find("scan.npz", "--scene", scene, "--json").out)
+        table = rows("scan-summits/summits.csv")
+        return found, np.array([float(row["tip_radius"]) for row in table])
+
+    (one, radii), (other, smaller) = map(pressed, ("scene.toml", "metres.toml"))
+    assert_allclose(smaller, radii / 1e6)
     assert other["surface"]["unit"] == "m"
     for first, second in zip(one["provability"], other["provability"], strict=True):
         assert first["contacts"] == second["contacts"]
         assert_allclose(second["approach"], 1e-6 * first["approach"], rtol=1e-6)
     np.save("nameless.npy", cr.surface.read("scan.npz").heights)
-    nameless = command(
-        "summits", "nameless.npy", "--pixel", "1", "--scene", "metres.toml", *options
-    )
+    nameless = find("nameless.npy", "--pixel", "1", "--scene", "metres.toml")
     assert nameless.status == 2
     assert "expected a map with a unit, as metres.toml is in m: unit=" in nameless.err
     summits = cr.surface.read("scan.npz").summits(0.05)
     with pytest.raises(cr.InputError, match=r'in µm, expected m.*surface\.to_unit\("m"\)'):
         cr.read_scene("metres.toml", asperities=summits)
-    unnamed = text.replace("[units]", "").replace('length = "m"', "")
-    Path("unnamed.toml").write_text(unnamed)
-    refused = command("summits", "scan.npz", "--scene", "unnamed.toml", *options)
+    Path("unnamed.toml").write_text(text.replace("[units]", "").replace('length = "m"', ""))
+    refused = find("scan.npz", "--scene", "unnamed.toml")
     assert refused.status == 2
     assert "expected a unit of length in unnamed.toml" in refused.err
 
 
-def test_not_certified_is_exit_status_three(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("surface")
+def test_not_certified_is_exit_status_three(find: Any) -> None:
     """A ridge with two tops that are almost one."""
-    monkeypatch.chdir(tmp_path)
     x, y = np.mgrid[-32:33, -32:33]
     tops = -1e-5 * (np.minimum(abs(x), 6) ** 2 - 16.0) ** 2
     np.savez("scan.npz", heights=tops - x**2 / 1e6 - y**2 / 4e3, pixel=1.0, unit="µm")
-    outcome = command("summits", "scan.npz", "--prune", "0", "--radius", "1e4", "--approach", "3",
-                      "--detrend", "none", "--no-figures")  # fmt: skip
+    pressed = ("--radius", "1e4", "--approach", "3")
+    outcome = find("scan.npz", "--prune", "0", *pressed, "--detrend", "none")
     assert outcome.status == 3
     assert Path("scan-summits/summits.csv").exists()
     assert " none " in outcome.out
@@ -179,24 +175,21 @@ def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.usefixtures("surface")
-def test_a_scene_that_reads_another_table_is_named(command: Any) -> None:
-    options = ("--scene", "scene.toml", "--no-figures")
-    assert "reads" not in command("summits", "scan.npz", *options).err
-    said = command("summits", "scan.npz", *options, "--out", "other").err
+def test_a_scene_that_reads_another_table_is_named(find: Any) -> None:
+    assert "reads" not in find("scan.npz", "--scene", "scene.toml").err
+    said = find("scan.npz", "--scene", "scene.toml", "--out", "other").err
     table = Path("other", "summits.csv")
     assert f"scene.toml reads scan-summits/summits.csv, which is not {table}" in said
 
 
-def test_summits_on_filled_pixels_are_counted(command: Any, surface: cr.surface.Surface) -> None:
+def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Surface) -> None:
     heights = np.array(surface.heights)
     row, column = surface.summits().pixels[0]
     heights[row + 1 : row + 3, column] = np.nan
     np.savez("holes.npz", heights=heights, pixel=1.0, unit="µm")
-    pressed = ("--radius", "1e4", "--load", "10", "--modulus", "1", "--no-figures")
-    said = command("summits", "holes.npz", *pressed, "--fill").err
-    assert re.search(
-        r"1 summits are fitted to filled pixels.*: 1 of them touch, with \d+\.\d%", said
-    )
+    said = find("holes.npz", *PRESSED, "--fill").err
+    counted = r"1 summits are fitted to filled pixels.*: 1 of them touch, with \d+\.\d%"
+    assert re.search(counted, said)
 
 
 @pytest.mark.sample(8)
@@ -238,55 +231,50 @@ def test_wrong_input(command: Any, arguments: tuple[str, ...], message: str) -> 
     assert {path.name for path in Path().iterdir()} == before
 
 
-def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.Surface) -> None:
+def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surface) -> None:
     y, x = np.mgrid[:256, :256] - 127.5
     np.savez("ball.npz", heights=surface.heights - (x**2 + y**2) / 4000, pixel=1.0, unit="µm")
-    pressed = ("--radius", "1e4", "--load", "10", "--modulus", "1", "--no-figures")
-    ran = command("summits", "ball.npz", *pressed, "--whole")
+    pressed = ("ball.npz", *PRESSED, "--whole")
+    ran = find(*pressed)
     assert "of the variance of the heights: " in ran.err
     assert "--detrend sphere, removes it" in ran.err
     assert "the same approach  asperities  whole map  difference" in ran.out
-    mended = ("--detrend", "sphere", "--force", "--whole")
-    said = command("summits", "ball.npz", *pressed, *mended).out
-    assert re.search(
-        r"pressing radius +10000; the removed form, 1\d+\.\d+, is not in it: toge", said
-    )
-    mended = (*mended, "--json")
-    ran = command("summits", "ball.npz", *pressed, *mended)
+    said = find(*pressed, "--detrend", "sphere").out
+    form = r"pressing radius +10000; the removed form, 1\d+\.\d+, is not in it: toge"
+    assert re.search(form, said)
+    ran = find(*pressed, "--detrend", "sphere", "--json")
     assert "variance" not in ran.err
     found = json.loads(ran.out)["whole"]
     assert found["load"]["asperities"] == pytest.approx(10.0)
     assert 0.7 < found["load"]["asperities"] / found["load"]["whole"] < 1.0
     assert found["resolution"] < 0.01
-    assert "--whole needs --scene or --radius" in command("summits", "ball.npz", "--whole").err
+    assert "--whole needs --scene or --radius" in find("ball.npz", "--whole").err
 
 
-def test_a_tilt_that_leaves_no_summit_is_named(command: Any, surface: cr.surface.Surface) -> None:
+def test_a_tilt_that_leaves_no_summit_is_named(find: Any, surface: cr.surface.Surface) -> None:
     tilted = surface.heights + np.arange(256)
     np.savez("tilt.npz", heights=tilted, pixel=1.0, unit="µm")
-    refused = command("summits", "tilt.npz", "--detrend", "none")
+    refused = find("tilt.npz", "--detrend", "none")
     assert refused.status == 2
     assert "; a plane, slopes " in refused.err
     assert "--detrend plane, removes it" in refused.err
     for form in ("plane", "sphere"):
-        found = command("summits", "tilt.npz", "--detrend", form, "--no-figures", "--force")
+        found = find("tilt.npz", "--detrend", form)
         assert (found.status, "variance" in found.err) == (0, False)
 
 
-def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surface.Surface) -> None:
+def test_a_map_in_micrometres_called_millimetres(find: Any, surface: cr.surface.Surface) -> None:
     """Its slopes are right; only the base shows the mistake."""
     np.save("map.npy", surface.heights)
     Path("mm.toml").write_text(SCENE.format(radius=10.0, modulus=1e5, load=1.0, unit="mm"))
     for unit, wrong in (("mm", True), ("µm", False)):
-        options = ("--pixel", "1", "--unit", unit, "--no-figures", "--force")
-        said = command("summits", "map.npy", "--scene", "mm.toml", *options).err
+        said = find("map.npy", "--scene", "mm.toml", "--pixel", "1", "--unit", unit).err
         assert ("the map is 256 mm wide, and the sphere 20 mm: check the units" in said) == wrong
         assert ("asperities in contact: 1, fewer than 5" in said) == wrong
 
 
 @pytest.mark.usefixtures("surface")
-def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
-    asked = ("summits", "scan.npz", "--radius", "1e4", "--approach", "-100", "--no-figures")
-    outcome = command(*asked)
+def test_where_nothing_touches_nothing_is_to_be_trusted(find: Any) -> None:
+    outcome = find("scan.npz", "--radius", "1e4", "--approach", "-100")
     assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
     assert "advised pruning   none, because nothing touches" in outcome.out

@@ -1,0 +1,165 @@
+"""Maps in text files: a matrix of heights, or columns x, y and height.
+
+Comments above a matrix may state the width and height with a unit, and the unit of the values.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.errors import InputError
+from convexrough.surface.height_grid import HeightGrid, on_grid
+from convexrough.surface.map_arrays import SCALES
+from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
+from convexrough.tabular.text import COMMENT, TextTable, bare, read_text_table
+from convexrough.tabular.units import in_text, parsed
+
+#: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
+_SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
+_COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
+_LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+
+#: Words that announce a scale.
+_SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
+
+#: A table of at most this many columns is not a map if two of them are coordinates of a grid.
+MOST_COLUMNS = 6
+
+
+def text_map(path: Path) -> HeightGrid:
+    """The map in a text file. A file with three columns is read as x, y and height.
+
+    Raises FileError if the file is not text, and InputError with row and column if it contains no
+    map.
+    """
+    known = ("x", "y", "height", *COLUMNS["height"].also)
+    table = read_text_table(path, known, _COMMENT, is_map=True)
+    width = len(table.rows[0].cells) if table.rows else 0
+    read = _matrix if table.header is None and width != 3 else _list
+    unclear = next(filter(_unclear, table.comments), "")
+    return read(path, table, width)._replace(unclear=unclear, sheet=table.style.sheet)
+
+
+def _unclear(comment: str) -> bool:
+    """True for a comment that seems to state a scale, such as "# Breite: 50 µm" or "# z in nm"."""
+    if _SAID.fullmatch(comment):
+        return False
+    _, marked, value = comment.replace("=", ":").rpartition(":")
+    length = _LENGTH.fullmatch(value.strip())
+    unit = parsed(length[2] if length else value.strip())
+    if marked and unit and unit.kind == "length":
+        return True
+    if any(not (unit := parsed(each)) or unit.kind == "length" for each in in_text(comment)):
+        return True
+    return bool(re.search(r"\d", comment) and _SCALE.search(comment))
+
+
+def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
+    """The matrix of heights, with the pixel and the units that the comments state."""
+    _refuse_gaps([row.number for row in table.rows])
+    heights = matrix(path, table)
+    for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
+        sides = [len(np.unique(each)) for each in (one, other)]
+        if min(sides) > 2 and sides[0] * sides[1] == len(heights) > width:
+            found = f"{width} columns without a header, two of which are coordinates"
+            raise InputError("columns", found=found, expected="their names above them: x, y, z")
+    if min(heights.shape) > 2:
+        for place, lines in (("row", heights), ("column", heights.T)):
+            if _even(lines[0, 1:]) and not _even(lines[1, 1:]):
+                raise _not_heights(f"{place} 1", lines[0][~np.isnan(lines[0])])
+            off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
+            if (np.abs(off) < 0.01 * spread).all():
+                found = f"the means of the {'columns' if place == 'row' else 'rows'}"
+                raise InputError(f"last {place}", found=found, expected="heights alone")
+    return _said(table.comments, heights)
+
+
+def _refuse_gaps(rows: Sequence[int]) -> None:
+    """Raise InputError if lines without numbers interrupt the rows, as between two maps."""
+    apart = np.diff(rows)
+    if len(gaps := np.flatnonzero(apart > min(apart, default=1))):
+        before, after = rows[gaps[0]], rows[gaps[0] + 1]
+        found = f"lines without numbers between rows {before} and {after}"
+        expected = "one map in a file: remove comments and empty lines between its rows"
+        raise InputError("rows", found=found, expected=expected)
+
+
+def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
+    """The error for a row or column of coordinates or counts (`line`) in place of heights."""
+    said = ", ".join(f"{each:g}" for each in line[:3])
+    expected = "heights alone: leave coordinates and numbers of rows and columns out, with pandas "
+    expected += "by header=False, index=False"
+    return InputError(place, found=f"numbers {said}, ...", expected=expected)
+
+
+def _even(line: Array) -> bool:
+    """True for more than four numbers at equal distances, up to rounding to six digits."""
+    steps, size = np.diff(line), float(np.abs(line).max())
+    return bool(
+        len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
+    )
+
+
+def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
+    """The matrix `heights`, with the pixel and the units that the comments state."""
+    said = {}
+    for found in filter(None, map(_SAID.fullmatch, comments)):
+        said[found[1].lower().rstrip("s")] = found[2]
+    sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
+    value_unit = said.get("value unit", "")
+    if sizes == [None, None]:
+        return HeightGrid(heights, height_unit=value_unit)
+    if None in sizes:
+        only = "only a width" if sizes[0] else "only a height"
+        raise InputError("comments", found=only, expected="a width and a height, or neither")
+    (width, unit_x), (height, unit_y) = (size.groups() for size in sizes if size)
+    if unit_x != unit_y:
+        raise InputError("units", found=f"{unit_x} and {unit_y}", expected="one along x and y")
+    rows, columns = heights.shape
+    across, upwards = (float(each.replace(",", ".")) for each in (width, height))
+    return HeightGrid(heights, (across / columns, upwards / rows), unit_x, value_unit)
+
+
+def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
+    """The map from columns x, y and height, in any order; missing points of the grid are holes.
+
+    Other columns could be a mask or a factor. They are an error, except an index.
+    """
+    names, number = cells.header.cells if cells.header else [], cells.style.number
+    if names and all(number(name.replace(",", ".")) is not None for name in names):
+        expected = "decimal points, not commas in quotes"
+        raise InputError("row 1", found=names[0], expected=expected)
+    first = [number(name) for name in names] if width > 3 else []
+    if len(first) > 3 and None not in first[1:]:
+        raise _not_heights("row 1", [each for each in first if each is not None])
+    if cells.header and len(names) < 3 < width:
+        expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
+        found = repr(cells.header.text[:60])
+        raise InputError(f"row {cells.header.number}: text", found=found, expected=expected)
+    table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
+                       holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
+    if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:
+        expected = "x, y, height and at most an index: delete other columns; nan marks holes"
+        raise InputError("columns", found=", ".join(others), expected=expected)
+    x, y, z = (table.columns[name] for name in ("x", "y", "height"))
+    units = [table.units.get(name, "") for name in ("x", "y", "height")]
+    if units[0] != units[1]:
+        found = f"{units[0] or 'none'} and {units[1] or 'none'}"
+        raise InputError("units", found=found, expected="one along x and y")
+    return HeightGrid(*on_grid(x, y, z), units[0], units[2])
+
+
+def _is_label(name: str, cells: NDArray[Any]) -> bool:
+    """True for an index, and for the same text in every row, which cannot change heights."""
+    count = len(np.unique(cells))
+    if bare(name).lower() in INDEX:
+        return count == len(cells)
+    return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)
