@@ -335,7 +335,7 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
 
     Other columns could be a mask or a factor. They are an error, except an index.
     """
-    table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
+    table = read_table(path, required=("x", "y", "height"), unnamed=(["x", "y", "height"],),
                        holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
     if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:
         expected = "x, y, height and at most an index: delete other columns; nan marks holes"

@@ -165,8 +165,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         path,
         required=(name,),
         optional=("x", "y", *CLAIMS),
-        instead={"load": ("pressure", "area")},
-        unnamed=((name,), ("x", "y", name)),
+        instead=("pressure", "area") if name == "load" else (),
+        unnamed=([name], ["x", "y", name]),
         line=0 if how.missing_open else len(scene),
         how=how,
     )
