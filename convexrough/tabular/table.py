@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from shlex import quote
 from typing import Any, NamedTuple
@@ -215,8 +216,8 @@ def read_table(
         for each in missing
         if each not in how.columns
     ]
-    measured = (name for name in optional if COLUMNS[name].kind)
-    mistakes += _lookalikes(source, places, [*missing, *measured])
+    measured = (name for name in optional if COLUMNS[name].kind and name not in places)
+    mistakes += _lookalikes(left, [*missing, *measured])
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
@@ -297,41 +298,40 @@ def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[st
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
+    """The factors of the columns, by name, and mistakes in their units."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
-    first: dict[str, tuple[str, Unit]] = {}
-    for name in names:
-        kind, said, place = COLUMNS[name].kind, units.get(name, ""), f"column {name}"
-        scene = how.units.unit(kind)
-        if name in how.scales and (scene is None or not said):
+    first: dict[str, tuple[str, Unit]] = {}  # of each quantity, the first column with a unit
+    for name in (name for name in names if name in units):
+        kind, said, place = COLUMNS[name].kind, units[name], f"column {name}"
+        scene, given = how.units.unit(kind), how.scales.get(name)
+        if given is not None and scene is None:
             continue
-        ways = [f"--scale {name}={{}}"] if how.scalable and name not in how.shared else []
+        way = f"--scale {name}=" if how.scalable and name not in how.shared else ""
         try:
             found = known_unit(place, said, kind)
         except InputError as error:
-            if (scene is None and "a unit of" not in str(error.found)) or name in how.scales:
-                continue  # text in brackets need not be a unit
-            taken = f", or {ways[0].format('1')} to take the numbers as they are" if ways else ""
-            mistakes.append(f"{error}{taken}")
-            continue
-        other, wanted = first.setdefault(kind, (name, found)) if found else ("", None)
-        if found is None or wanted is None:
-            continue
+            if given is None and (scene or "a unit of" in str(error.found)):
+                taken = f", or {way}1 to take the numbers as they are" if way else ""
+                mistakes.append(f"{error}{taken}")
+            continue  # text in brackets need not be a unit
+        assert found is not None
+        other, wanted = first.setdefault(kind, (name, found))
         if scene is None:
             if how.alike and found.size != wanted.size:
                 mistakes.append(f"{place}: found {said}, expected {units[other]}, as {other}")
             continue
         factor = found.into(scene)
-        given = how.scales.get(name)
-        if given is not None and abs(abs(given) / factor - 1) > SAME:
-            mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as 1 "
-                            f"{said} is {factor:.15g} {scene.name}")  # fmt: skip
-        elif given is None and factor != 1 and how.convert:
+        equal = f"1 {said} is {factor:.15g} {scene.name}"
+        if given is not None:
+            if abs(abs(given) / factor - 1) > SAME:
+                mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as "
+                                f"{equal}")  # fmt: skip
+        elif factor != 1 and how.convert:
             factors[name] = factor
-        elif given is None and factor != 1:
-            ways = [each.format(f"{factor:.15g}") for each in ways]
-            advice = " or ".join([*ways, "convert = true in [units] of the scene"])
+        elif factor != 1:
+            advice = f"{way}{factor:.15g} or " if way else ""
             mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
-                            f"1 {said} is {factor:.15g} {scene.name}: {advice}")  # fmt: skip
+                            f"{equal}: {advice}convert = true in [units] of the scene")  # fmt: skip
     for name in names:
         there = first.get(COLUMNS[name].kind)
         if there and there[0] in factors and name not in units and name not in how.scales:
@@ -450,16 +450,14 @@ def _places(
     return places, mistakes
 
 
-def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str]) -> Iterator[str]:
+def _lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
     """Mistakes: columns that are not read, with names similar to one that is missing."""
     from difflib import SequenceMatcher  # only when a column is missing
 
-    for i, name in enumerate(source.header or []):
-        for each in (each for each in wanted if each not in places and i not in places.values()):
-            alike = SequenceMatcher(None, bare(name).lower(), each).ratio()
-            if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
-                expected = f'a known column; did you mean "{each}"?'
-                yield f"columns: found {bare(name)!r}, expected {expected}"
+    for name, each in product(unread, missing):
+        alike = SequenceMatcher(None, name.lower(), each).ratio()
+        if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
+            yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
 
 
 def _named(source: _Source) -> str:

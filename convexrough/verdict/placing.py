@@ -119,10 +119,12 @@ class Placing:
         distances, owners = self._nearest(self.points)
         far = loaded & (distances > REACH * self._apart[owners])
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
+        moved = ""
         if loaded.any() and not self._fits(self.points[most]):
-            if moved := self._misread(loaded) or self._about_shifted(loaded, values):
-                self.mistakes.append(f"positions: {moved}")
-                return owners
+            moved = self._misread(loaded) or self._about_shifted(loaded, values)
+        if moved:
+            self.mistakes.append(f"positions: {moved}")
+            return owners
         for i in np.flatnonzero(far):
             place = self.points[i].tolist()
             found = f"a load at {place}, {distances[i]:g} from the nearest asperity"
