@@ -144,7 +144,7 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
         expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
         found = repr(cells.header.text[:60])
         raise InputError(f"row {cells.header.number}: text", found=found, expected=expected)
-    table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
+    table = read_table(path, required=("x", "y", "height"), unnamed=(["x", "y", "height"],),
                        holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
     if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:
         expected = "x, y, height and at most an index: delete other columns; nan marks holes"

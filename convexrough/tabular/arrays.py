@@ -95,13 +95,9 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     Raises FileError if the package for such files is missing or no columns are found; OSError; and
     ValueError, or another error of corrupted files, if the file is corrupted or lengths differ.
     """
-    named = named_arrays(path)
-    (first, values), *others = named.items() or [("", np.zeros(0))]
-    alone = values.ndim > 1 and min(values.shape) > 1 if isinstance(values, np.ndarray) else False
-    columns_in_it = not first or first.startswith("arr_")
-    if alone:  # x, y and load in one array, or values of pixels
-        columns_in_it |= first.lower() not in known or len(values[0]) <= 3
-    if not others and columns_in_it:
+    named = named_arrays(path) or {"": np.zeros(0)}
+    first, values = next(iter(named.items()))
+    if len(named) == 1 and _is_table(first, values, known):
         columns = _table(np.asarray(values))
     else:
         arrays = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
@@ -115,6 +111,14 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     if len(lengths) > 1:
         raise ValueError(f"arrays of lengths {sorted(lengths)}")
     return {name: values for name, values in columns.items() if len(values) in lengths}
+
+
+def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
+    """True if the only array of a file holds columns, such as x, y and load, not one quantity."""
+    if not name or name.startswith("arr_"):
+        return True
+    is_matrix = isinstance(values, np.ndarray) and values.ndim > 1 and min(values.shape) > 1
+    return is_matrix and (name.lower() not in known or len(values[0]) <= 3)
 
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from shlex import quote
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,15 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, TextTable, bare, read_text_table, unit
+from convexrough.tabular.text import (
+    HOLES,
+    PERHAPS_GROUPED,
+    Style,
+    TextTable,
+    bare,
+    read_text_table,
+    unit,
+)
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, in_text, known_unit, parsed
 
 
@@ -143,17 +150,17 @@ class ReadTable(NamedTuple):
 
 
 class _Source(NamedTuple):
-    """Cells of a file by column. Without a header, columns are named by numbers from 1."""
+    """Cells of a file by column. Without a header, columns are named by numbers from 1.
+
+    lines : text of each row, "" in files of arrays;  mistakes : messages on rows that are left out
+    """
 
     header: list[str] | None
     columns: list[Sequence[Any]]
     rows: list[str]
     lines: list[str]
-    style: str
-    decimal: str
-    number: Callable[[Any], float | None]
-    numbers: Callable[[Sequence[Any]], Array | None]
-    mistakes: list[str]
+    style: Style
+    mistakes: Sequence[str] = ()
     comments: Sequence[str] = ()
 
 
@@ -162,9 +169,9 @@ def read_table(
     *,
     required: Sequence[str],
     optional: Sequence[str] = (),
-    instead: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    instead: Sequence[str] = (),
     holes: Sequence[str] = (),
-    unnamed: Sequence[Sequence[str]] = (),
+    unnamed: Sequence[list[str]] = (),
     line: int = 0,
     how: Reading = AS_IT_IS,
     table: TextTable | None = None,
@@ -172,8 +179,8 @@ def read_table(
     """Columns of a file by known names. The numbers of other columns are not checked.
 
     required, optional : names of columns, all of them in `COLUMNS`
-    instead : for a required column, the columns that are read in its place if the file lacks it but
-        has the first of them
+    instead : columns that are read in place of the only required one, if the file lacks that one
+        but has the first of these
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
     line : a file that is one line without a header is read as one column if it has exactly this
@@ -182,52 +189,49 @@ def read_table(
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
-    wanted = [*required, *optional, *(each for names in instead.values() for each in names)]
-    wanted += ["index"] if "index" in how.columns else []
+    wanted = [*required, *optional, *instead, *(["index"] if "index" in how.columns else [])]
     called = [each.lower() for each in how.columns.values()]
-    known = [*wanted, *INDEX[:-1], *called]
     with reading(path):
-        sheet = [*required, *(names[0] for names in instead.values()), *called]
+        sheet, known = [*required, *instead[:1], *called], [*wanted, *INDEX[:-1], *called]
         source = _source(path, known, sheet) if table is None else _text_source(table)
     alone = source.header is None and len(source.rows) == 1 and not how.columns
     if unnamed and alone and (len(source.columns) > 3 or len(source.columns) == line):
         source = _upright(source)
     places, mistakes = _places(source, wanted, how, unnamed)
     index = places.pop("index", None)
-    for name, others in instead.items():
-        if name not in places and others[0] in places:
-            required = [each for each in required if each != name]
-        else:
-            places = {each: place for each, place in places.items() if each not in others}
+    if instead and instead[0] in places and required[0] not in places:
+        required = ()
+    else:
+        places = {name: place for name, place in places.items() if name not in instead}
     missing = [name for name in required if name not in places]
-    pixels = instead if how.scalable and {"x", "y"} <= places.keys() else {}
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
     other = others[0] if short else "NAME" if source.header else "NUMBER"
+    pixels = instead and {"x", "y"} <= places.keys()
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
         + (f"; --column {each}={other} names another" if how.scalable else "")
-        + (f", --column {instead[each][0]}={other} that of pixels" if each in pixels else "")
+        + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
         for each in missing
         if each not in how.columns
     ]
-    measured = (name for name in optional if COLUMNS[name].kind)
-    mistakes += _lookalikes(source, places, [*missing, *measured])
+    measured = (name for name in optional if COLUMNS[name].kind and name not in places)
+    mistakes += _lookalikes(left, [*missing, *measured])
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
-    names = [*(source.header or map(str, range(1, len(source.columns) + 1)))]
-    units = {name: said for name, place in places.items() if (said := unit(names[place]))}
+    names = source.header or [str(i + 1) for i in range(len(source.columns))]
+    units = {name: found for name, place in places.items() if (found := unit(names[place]))}
     factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
-    mistakes += wrong
+    rest = [i for i in range(len(names)) if i not in (index, *places.values())]
+    texts = [("comments", text) for text in (source.comments if table is None else ())]
+    for i in (i for i in rest if "unit" in names[i].lower()):
+        said = dict.fromkeys(map(str, source.columns[i]))
+        texts += [(f"column {names[i]}", each) for each in said]
     without = [name for name in places if name not in (*units, *how.scales)]
-    mistakes += _units_in(source.comments if table is None else (), without, how)
-    for i, name in enumerate(names):
-        if "unit" in name.lower() and i not in places.values():
-            texts = [*dict.fromkeys(map(str, source.columns[i]))]
-            mistakes += _units_in(texts, without, how, f"column {name}")
+    mistakes += [*wrong, *_units_in(texts, without, how)]
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -235,11 +239,10 @@ def read_table(
             read[name] = np.array([str(cell) for cell in cells])
         else:
             numbers = _numbers(name, cells, source, mistakes, name in holes)
-            mistakes += _thousands([cells], [numbers], source)
+            mistakes += _thousands([cells], source)
             read[name] = numbers * factors.get(name, 1.0)
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
-    rest = [i for i in range(len(names)) if i not in (index, *places.values())]
     unread = {names[i]: _numbers_or_text(source, i) for i in rest}
     if index is not None:
         unread["index"] = _numbers_or_text(source, index)
@@ -248,7 +251,7 @@ def read_table(
         source.rows,
         source.lines,
         units,
-        source.style,
+        str(source.style),
         {name: names[place] or str(place + 1) for name, place in places.items()},
         unread,
         factors,
@@ -261,33 +264,30 @@ def matrix(path: Path, table: TextTable) -> Array:
     columns = [
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
-    mistakes += _thousands(source.columns, columns, source)
+    mistakes += _thousands(source.columns, source)
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
     return np.column_stack(columns)
 
 
-def _thousands(
-    columns: Sequence[Sequence[Any]], numbers: Sequence[Array], source: _Source
-) -> Iterator[str]:
+def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[str]:
     """A mistake if cells such as 1.013 beside 827 seem to have thousands separators.
 
     They seem to if every cell is such a cell or a whole number, and if at least one whole number
     has three digits or `SURELY_GROUPED` cells are of this form. But 999 often marks a hole.
     """
-    if not source.decimal:
-        return  # numbers, not text
-    for cells, values in zip(columns, numbers, strict=True):
-        parts = np.flatnonzero(np.floor(values) < values).tolist()
-        if not all(PERHAPS_GROUPED.fullmatch(cells[i]) for i in parts):
-            return  # as soon as one cell has another form
-    if not any(source.decimal in "\n".join(cells) for cells in columns):
+    mark = source.style.decimal
+    if not mark or not any(mark in "\n".join(cells) for cells in columns):
         return
-    every = [each for cells in columns for each in zip(cells, source.rows, strict=True)]
-    grouped = [each for each in every if PERHAPS_GROUPED.fullmatch(each[0])]
-    whole = [each for each in every if _WHOLE.fullmatch(each[0])]
-    if len(grouped) + len(whole) < sum(cell.lower() not in HOLES for cell, _ in every):
-        return
+    grouped, whole = list[tuple[str, str]](), list[tuple[str, str]]()
+    for cells in columns:
+        for cell, row in zip(cells, source.rows, strict=True):
+            if PERHAPS_GROUPED.fullmatch(cell):
+                grouped.append((cell, row))
+            elif _WHOLE.fullmatch(cell):
+                whole.append((cell, row))
+            elif cell.lower() not in HOLES:
+                return
     sign = _WHOLE if len(grouped) >= SURELY_GROUPED else _HUNDREDS
     if grouped and (shown := next((each for each in whole if sign.fullmatch(each[0])), None)):
         found = f"found {grouped[0][0]}, and {shown[0]} in {shown[1]}"
@@ -298,41 +298,40 @@ def _thousands(
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
+    """The factors of the columns, by name, and mistakes in their units."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
-    first: dict[str, tuple[str, Unit]] = {}
-    for name in names:
-        kind, said, place = COLUMNS[name].kind, units.get(name, ""), f"column {name}"
-        scene = how.units.unit(kind)
-        if name in how.scales and (scene is None or not said):
+    first: dict[str, tuple[str, Unit]] = {}  # of each quantity, the first column with a unit
+    for name in (name for name in names if name in units):
+        kind, said, place = COLUMNS[name].kind, units[name], f"column {name}"
+        scene, given = how.units.unit(kind), how.scales.get(name)
+        if given is not None and scene is None:
             continue
-        ways = [f"--scale {name}={{}}"] if how.scalable and name not in how.shared else []
+        way = f"--scale {name}=" if how.scalable and name not in how.shared else ""
         try:
             found = known_unit(place, said, kind)
         except InputError as error:
-            if (scene is None and "a unit of" not in str(error.found)) or name in how.scales:
-                continue  # text in brackets need not be a unit
-            taken = f", or {ways[0].format('1')} to take the numbers as they are" if ways else ""
-            mistakes.append(f"{error}{taken}")
-            continue
-        other, wanted = first.setdefault(kind, (name, found)) if found else ("", None)
-        if found is None or wanted is None:
-            continue
+            if given is None and (scene or "a unit of" in str(error.found)):
+                taken = f", or {way}1 to take the numbers as they are" if way else ""
+                mistakes.append(f"{error}{taken}")
+            continue  # text in brackets need not be a unit
+        assert found is not None
+        other, wanted = first.setdefault(kind, (name, found))
         if scene is None:
             if how.alike and found.size != wanted.size:
                 mistakes.append(f"{place}: found {said}, expected {units[other]}, as {other}")
             continue
         factor = found.into(scene)
-        given = how.scales.get(name)
-        if given is not None and abs(abs(given) / factor - 1) > SAME:
-            mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as 1 "
-                            f"{said} is {factor:.15g} {scene.name}")  # fmt: skip
-        elif given is None and factor != 1 and how.convert:
+        equal = f"1 {said} is {factor:.15g} {scene.name}"
+        if given is not None:
+            if abs(abs(given) / factor - 1) > SAME:
+                mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as "
+                                f"{equal}")  # fmt: skip
+        elif factor != 1 and how.convert:
             factors[name] = factor
-        elif given is None and factor != 1:
-            ways = [each.format(f"{factor:.15g}") for each in ways]
-            advice = " or ".join([*ways, "convert = true in [units] of the scene"])
+        elif factor != 1:
+            advice = f"{way}{factor:.15g} or " if way else ""
             mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
-                            f"1 {said} is {factor:.15g} {scene.name}: {advice}")  # fmt: skip
+                            f"{equal}: {advice}convert = true in [units] of the scene")  # fmt: skip
     for name in names:
         there = first.get(COLUMNS[name].kind)
         if there and there[0] in factors and name not in units and name not in how.scales:
@@ -340,47 +339,37 @@ def _factors(
     return factors, mistakes
 
 
-def _units_in(
-    texts: Sequence[str], names: Sequence[str], how: Reading, place: str = "comments"
-) -> Iterator[str]:
-    """A mistake for each text, at this place of a file, that names another unit than the scene's.
+def _units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
+    """A mistake for each text of `said` that names another unit than the scene's.
 
+    said  : pairs of the place in the file and the text
     names : columns that have no unit in the header, so that the text may be about them
     """
     kinds = {COLUMNS[name].kind for name in names}
-    for text in texts:
-        for said in in_text(text):
-            found = parsed(said)
+    for place, text in said:
+        for name in in_text(text):
+            found = parsed(name)
             kind = found.kind if found else "length"
             scene = how.units.unit(kind)
             if kind in kinds and not (found and scene and found.size == scene.size):
-                expected = f"units in the header, as NAME [{said}], or no such {place.split()[0]}"
+                expected = f"units in the header, as NAME [{name}], or no such {place.split()[0]}"
                 yield f"{place}: found {_cut(text)!r}, expected {expected}"
                 break
 
 
 def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     cells = source.columns[place]
-    numbers = source.numbers(cells)
+    numbers = source.style.numbers(cells)
     return np.array([str(cell) for cell in cells]) if numbers is None else numbers
 
 
 def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
-    if path.suffix.lower() in ARRAYS:
-        arrays = read_arrays(path, known)
-        count = len(next(iter(arrays.values()), []))
-        return _Source(
-            header=None if "1" in arrays else list(arrays),
-            columns=list(arrays.values()),
-            rows=[f"entry {i}" for i in range(count)],
-            lines=[""] * count,
-            style="",
-            decimal="",
-            number=_as_number,
-            numbers=_as_numbers,
-            mistakes=[],
-        )
-    return _text_source(read_text_table(path, known, required=sheet))
+    if path.suffix.lower() not in ARRAYS:
+        return _text_source(read_text_table(path, known, required=sheet))
+    arrays = read_arrays(path, known)
+    count = len(next(iter(arrays.values()), []))
+    rows, header = [f"entry {i}" for i in range(count)], None if "1" in arrays else list(arrays)
+    return _Source(header, list(arrays.values()), rows, [""] * count, Style("", ""))
 
 
 def _text_source(table: TextTable) -> _Source:
@@ -399,16 +388,13 @@ def _text_source(table: TextTable) -> _Source:
         found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
-        header=header,
-        columns=[[row.cells[i] for row in whole] for i in range(width)],
-        rows=[f"row {row.number}" for row in whole],
-        lines=[row.text for row in whole],
-        style=str(style) if style.sheet or width > 1 or style.decimal == "," else "",
-        decimal=style.decimal,
-        number=style.number,
-        numbers=style.numbers,
-        mistakes=mistakes,
-        comments=table.comments,
+        header,
+        [[row.cells[i] for row in whole] for i in range(width)],
+        [f"row {row.number}" for row in whole],
+        [row.text for row in whole],
+        style if width > 1 or style.decimal == "," else style._replace(separator=""),
+        mistakes,
+        table.comments,
     )
 
 
@@ -430,56 +416,48 @@ def _upright(source: _Source) -> _Source:
 
 
 def _places(
-    source: _Source,
-    wanted: Sequence[str],
-    how: Reading,
-    unnamed: Sequence[Sequence[str]],
+    source: _Source, wanted: Sequence[str], how: Reading, unnamed: Sequence[list[str]]
 ) -> tuple[dict[str, int], list[str]]:
-    columns = how.columns
-    names = source.header
-    if names is None:
-        nameless = [""] * len(source.columns)
-        names = next((list(each) for each in unnamed if len(each) == len(nameless)), nameless)
-        names = nameless if columns else names
+    """The number of the column of each wanted name that the file has, and mistakes."""
+    names = source.header or [""] * len(source.columns)
+    if source.header is None and not how.columns:
+        names = next((each for each in unnamed if len(each) == len(names)), names)
     bared = [bare(name) for name in names]
     lowered = [each.lower() for each in bared]
     places: dict[str, int] = {}
     mistakes: list[str] = []
     for name in wanted:
-        called = columns.get(name, name)
-        alike = [each for each in bared if each.lower() in (name, *COLUMNS[name].also)]
-        if name not in columns and len(alike) > 1 and bared.count(name) < 2:
-            choice = f": --column {name}={alike[0]}" if how.scalable else ""
-            found = " and ".join(map(repr, alike))
-            mistakes.append(f"columns: found {found}, expected one of them{choice}")
-        for known, it in ((names, called), (bared, called), (lowered, called.lower())):
-            if count := known.count(it):
-                places[name] = known.index(it)
-                if count > 1:
-                    mistakes.append(f"columns: found {called!r} twice, expected once")
-                break
-        else:
-            if name not in columns:
-                if others := [each for each in COLUMNS[name].also if each in lowered]:
-                    places[name] = lowered.index(others[0])
-                continue
-            if called.isdecimal() and 1 <= int(called[:9]) <= len(names):
-                places[name] = int(called) - 1
-            else:
+        called = how.columns.get(name)
+        if called is None:
+            alike = [i for i, each in enumerate(lowered) if each in (name, *COLUMNS[name].also)]
+        else:  # the header as it is, else without its unit, else in any case
+            ways = ((names, called), (bared, called), (lowered, called.lower()))
+            found = ([i for i, each in enumerate(known) if each == it] for known, it in ways)
+            alike = next(filter(None, found), [])
+            if not alike and called.isdecimal() and 1 <= int(called[:9]) <= len(names):
+                alike = [int(called) - 1]
+            if not alike:
                 mistakes.append(f"columns: found {_named(source)}, expected a column {called!r}")
+        if alike:
+            places[name] = alike[0]
+        if len(alike) > 1:
+            choice = f": --column {name}={bared[alike[0]]}" if how.scalable else ""
+            several = [*dict.fromkeys(bared[i] for i in alike)]
+            found_them, expected = " and ".join(map(repr, several)), f"one of them{choice}"
+            if called is not None or len(several) < len(alike):
+                found_them, expected = f"{called or several[0]!r} twice", "once"
+            mistakes.append(f"columns: found {found_them}, expected {expected}")
     return places, mistakes
 
 
-def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str]) -> Iterator[str]:
+def _lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
     """Mistakes: columns that are not read, with names similar to one that is missing."""
     from difflib import SequenceMatcher  # only when a column is missing
 
-    for i, name in enumerate(source.header or []):
-        for each in (each for each in wanted if each not in places and i not in places.values()):
-            alike = SequenceMatcher(None, bare(name).lower(), each).ratio()
-            if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
-                expected = f'a known column; did you mean "{each}"?'
-                yield f"columns: found {bare(name)!r}, expected {expected}"
+    for name, each in product(unread, missing):
+        alike = SequenceMatcher(None, name.lower(), each).ratio()
+        if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
+            yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
 
 
 def _named(source: _Source) -> str:
@@ -487,7 +465,7 @@ def _named(source: _Source) -> str:
         columns, rows = len(source.columns), len(source.rows)
         turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
         return f"no header and {columns} columns{turned}"
-    return _cut(", ".join(source.header)) + in_sheet(source.style)
+    return _cut(", ".join(source.header)) + in_sheet(str(source.style))
 
 
 def in_sheet(style: str) -> str:
@@ -501,44 +479,34 @@ def _numbers(
     """The numbers of a column; wrong cells are added to `mistakes`."""
     if holes:
         cells = ["nan" if str(cell).lower() in HOLES else cell for cell in cells]
-    positive = COLUMNS.get(name, Column()).positive
-    if (plain := source.numbers(cells)) is not None:
-        sizes = np.abs(plain)
-        fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
-        fine |= np.isnan(plain) & holes
-        if (fine & (plain > 0) if positive else fine).all():
-            return plain
-    if not any(map(str, cells)):
+    check = checks.positive if COLUMNS.get(name, Column()).positive else checks.finite
+    style = source.style
+    numbers = style.numbers(cells)
+    if numbers is None and not any(map(str, cells)):
         saved = "formulas are empty until a spreadsheet program saves their values"
         mistakes.append(f"column {name}: found only empty cells, expected numbers; {saved}")
         return np.full(len(cells), np.nan)
-    check = checks.positive if positive else checks.finite
-    numbers = np.full(len(cells), np.nan)
-    for i, cell in enumerate(cells):
-        number = source.number(cell)
-        if holes and (cell == "nan" or (number is not None and math.isnan(number))):
-            continue
-        place = f"{source.rows[i]}, column {name}"
+    if numbers is None:
+        found = map(style.number, cells)
+        numbers = np.array([np.inf if number is None else number for number in found])
+    sizes = np.abs(numbers)
+    fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
+    fine &= (numbers > 0) | (check is checks.finite)
+    fine |= np.isnan(numbers) & holes
+    for i in np.flatnonzero(~fine).tolist():
+        cell, place = cells[i], f"{source.rows[i]}, column {name}"
         try:
-            if number is None:
-                comma = source.number(str(cell).replace(",", ".", 1)) is not None
-                expected = "a decimal point, not a comma" if comma else "a finite number"
-                if PERHAPS_GROUPED.fullmatch(str(cell)):
-                    expected += ", and no thousands separators"
-                raise InputError(place, found=_cut(repr(cell)), expected=expected)
-            numbers[i] = check(place, number)
+            if (number := style.number(cell)) is not None:
+                check(place, number)
+                continue
+            comma = style.number(str(cell).replace(",", ".", 1)) is not None
+            expected = "a decimal point, not a comma" if comma else "a finite number"
+            if PERHAPS_GROUPED.fullmatch(str(cell)):
+                expected += ", and no thousands separators"
+            raise InputError(place, found=_cut(repr(cell)), expected=expected)
         except InputError as error:
             mistakes.append(_shown(str(error), source.lines[i]))
     return numbers
-
-
-def _as_number(cell: Any) -> float | None:
-    return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else None
-
-
-def _as_numbers(cells: Sequence[Any]) -> Array | None:
-    kinds = {type(cell) for cell in cells}
-    return np.array(cells, dtype=np.float64) if kinds <= {int, float} else None
 
 
 def _shown(mistake: str, line: str) -> str:

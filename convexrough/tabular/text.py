@@ -59,6 +59,8 @@ _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
 )
+#: What stands between the words of a comment that may be a header.
+_APART = re.compile(r"\s*[,;\s]\s*")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
 #: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.
 _RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
@@ -76,7 +78,11 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells, the decimal mark and, for a workbook, the name of the sheet."""
+    """The separator of cells, the decimal mark and, for a workbook, the name of the sheet.
+
+    In a column alone the separator is "". In a file of arrays the decimal mark is "", too: cells
+    are numbers.
+    """
 
     separator: str
     decimal: str
@@ -85,21 +91,28 @@ class Style(NamedTuple):
     def __str__(self) -> str:
         if self.sheet:
             return f"sheet {self.sheet}"
+        if not self.separator:
+            return ""
         names = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
         comma = ", decimal comma" if self.decimal == "," else ""
         return f"separated by {names.get(self.separator, repr(self.separator))}{comma}"
 
     def split(self, line: str) -> list[str]:
         """The cells of a line. Raises csv.Error for unclosed quotes."""
+        if '"' not in line and self.separator == " ":
+            return line.split()
         if '"' not in line:  # three times as fast as csv
-            return _split(line, self.separator)
+            return [cell.strip() for cell in line.split(self.separator)] if line else []
         if self.separator == " ":
             line = " ".join(line.split())
         reader = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
         return [cell.strip() for cell in next(reader, [])]
 
-    def number(self, cell: str) -> float | None:
+    def number(self, cell: Any) -> float | None:
         """The number in a cell, with E or Fortran's D exponent; None if it is not a number."""
+        if not self.decimal:
+            is_number = isinstance(cell, (int, float)) and not isinstance(cell, bool)
+            return float(cell) if is_number else None
         if len(cell) > LONGEST_NUMBER:
             return None
         text = cell.replace("\N{MINUS SIGN}", "-")
@@ -110,8 +123,12 @@ class Style(NamedTuple):
             return float(f"{mantissa}e{exponent or bare or 0}")
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
-    def numbers(self, cells: Sequence[str]) -> Array | None:
+    def numbers(self, cells: Sequence[Any]) -> Array | None:
         """The numbers in cells; None if any cell is not a number. Plain numbers are read faster."""
+        if not self.decimal:
+            return (
+                np.array(cells, dtype=np.float64) if {*map(type, cells)} <= {int, float} else None
+            )
         joined = "\n".join(cells)
         if "_" not in joined and (self.decimal == "." or "." not in joined):
             with suppress(ValueError):
@@ -122,12 +139,6 @@ class Style(NamedTuple):
 
 #: Styles in order of preference, for files that allow several.
 STYLES = [Style(*pair) for pair in (",.", ";.", ";,", "\t.", "\t,", " .", " ,")]
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if separator == " ":
-        return line.split()
-    return [cell.strip() for cell in line.split(separator)] if line else []
 
 
 class TextRow(NamedTuple):
@@ -201,7 +212,7 @@ def read_text_table(
         elif comment.match(inner):
             comments.append(inner)
             said = inner.lstrip("#% ")
-            if not units and _are_units(cells := re.split(r"\s*[,;\s]\s*", said)):
+            if not units and _are_units(cells := _APART.split(said)):
                 units = cells
             else:
                 title = title if lines else said
@@ -212,12 +223,9 @@ def read_text_table(
     if not lines:
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
-    marked = (text for _, text in islice(lines, SAMPLE, None) if "," in text or "." in text)
-    sample = [text for _, text in lines[:SAMPLE]]
-    style = _sniffed([*sample, *islice(marked, LATER)], styles)
+    style = _sniffed([text for _, text in lines], styles)
     _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
-    read = (_row(number, text, style) for number, text in lines)
-    every = list(read)
+    every = [_row(number, text, style) for number, text in lines]
     filled = [row for row in every if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
     rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
@@ -227,7 +235,7 @@ def read_text_table(
         comments += [row.text for row in above if row.number < header.number]
         if len(units) == len(header.cells) and not any(map(unit, header.cells)):
             header = header._replace(cells=_with_units(header.cells, units))
-    if header is None and len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
+    elif len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
 
@@ -240,26 +248,29 @@ def _headed(
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
 
-    if _numeric(rows[0].cells, style):
-        width = len(rows[0].cells)
-        for named in (_header(title, style), re.split(r"\s*[,;\s]\s*", title.strip())):
+    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
+    width = len(rows[first].cells) if first < len(rows) else 0
+    if first == 0:
+        for named in (_header(title, style), _APART.split(title.strip())):
             count = wanted(named) + sum(name.lower() in PLACES for name in named)
             if len(named) == width and (count >= 2 or 2 * count >= width):
                 return TextRow(0, title, named), rows
         return None, rows
-    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
-    width = len(rows[first].cells) if first < len(rows) else 0
     place = max(
         range(len(headers)), key=lambda i: (wanted(headers[i]), len(headers[i]) == width, -i)
     )
-    header, line, rows = headers[place], rows[place], rows[place + 1 :]
-    if style.separator == " ":
-        header, rows = _listed(header, line, rows, style)
+    line, names, rows = rows[place], headers[place], rows[place + 1 :]
+    if style.separator == " " and rows:
+        first = first - place - 1 if width else 0
+        width = len(rows[first].cells)
+        apart = re.split(r"\s{2,}", line.text.strip())
+        names = apart if len(apart) == width < len(names) else names
+        rows = _unlisted(line, rows, first, style)
     below = rows[0].cells if rows else []
-    if _are_units(below) and len(below) <= len(header):
-        header, rows = _with_units(header, below), rows[1:]
-    return line._replace(cells=header), rows
+    if _are_units(below) and len(below) <= len(names):
+        names, rows = _with_units(names, below), rows[1:]
+    return line._replace(cells=names), rows
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -278,28 +289,26 @@ def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
     return [*named, *names[len(named) :]]
 
 
-def _listed(
-    header: list[str], line: TextRow, rows: list[TextRow], style: Style
-) -> tuple[list[str], list[TextRow]]:
-    """Names and rows of a finite-element listing, without titles and repeated header lines."""
-    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
-    width = len(rows[first].cells) if rows else 0
-    apart = re.split(r"\s{2,}", line.text.strip())
-    header = apart if len(apart) == width < len(header) else header
+def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) -> list[TextRow]:
+    """The rows of a finite-element listing without titles, repeated headers and last lines.
+
+    first : number of the first row of the table, of those in `rows`
+    """
+    width = len(rows[first].cells)
 
     def title(row: TextRow) -> bool:
         return len(row.cells) != width and (not row.cells or style.number(row.cells[0]) is None)
 
     kept = [row for row in rows[:first] if not title(row)]
     for row in rows[first:]:
-        if row.cells != line.cells:
+        if row.cells != header.cells:
             kept.append(row)
         else:
             while kept and title(kept[-1]):
                 kept.pop()
     while kept and kept[-1].cells and re.fullmatch(r"[A-Za-z*]+[:=]?", kept[-1].cells[0]):
         kept.pop()
-    return header, kept
+    return kept
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -333,36 +342,32 @@ def _sheet_lines(
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
-        pages = [
-            (page.title, [["" if cell is None else _plain(cell) for cell in row]
-                          for row in page.iter_rows(values_only=True)])
+        pages = {
+            page.title: [["" if cell is None else _plain(cell) for cell in row]
+                         for row in page.iter_rows(values_only=True)]
             for page in book.worksheets
-        ]  # fmt: skip
+        }  # fmt: skip
 
-    aside: list[str] = []
-    if is_map and len(pages) > 1:
-        maps = [page for page in pages if _holds_map(page[1])]
-        if len(maps) != 1:
-            named = " and ".join(f'"{name}"' for name, _ in maps or pages)
-            found = f"maps in the sheets {named}" if maps else f"no map in the sheets {named}"
-            expected = "one sheet with three or more rows of numbers; delete other such sheets"
-            raise FileError(f"{path}: found {found}, expected {expected}")
-        aside = [" ".join(row) for page in pages if page is not maps[0] for row in page[1]]
-        pages = maps
-
-    def there(page: list[list[str]]) -> tuple[int, bool]:
-        names = {bare(cell).lower() for row in page[:SAMPLE] for cell in row}
+    def value(rows: list[list[str]]) -> tuple[int, bool]:
+        names = {bare(cell).lower() for row in rows[:SAMPLE] for cell in row}
         return len(names & {*required}), not names.isdisjoint(known)
 
-    counts = [there(rows) for _, rows in pages]
-    best = counts.index(max(counts))
-    also = [
-        i for i, count in enumerate(counts) if i != best and count == counts[best] != (0, False)
-    ]
-    others = [f'"{pages[i][0]}"' for i in also]
-    (first, rows) = pages[best]
-    name = f'"{first}"' + (f", not {' or '.join(others)}" if others else "")
-    return name, enumerate(map("\t".join, rows), 1), aside
+    values = {name: value(rows) for name, rows in pages.items()}
+    best, *others = [name for name in pages if values[name] == max(values.values())]
+    if values[best] == (0, False):
+        others = []
+    aside: list[str] = []
+    if is_map and len(pages) > 1:
+        best, *others = [name for name, rows in pages.items() if _holds_map(rows)] or ["", *pages]
+        if others:
+            named = " and ".join(f'"{name}"' for name in (best, *others) if name)
+            found = f"{'maps' if best else 'no map'} in the sheets {named}"
+            expected = "one sheet with three or more rows of numbers; delete other such sheets"
+            raise FileError(f"{path}: found {found}, expected {expected}")
+        aside = [" ".join(row) for name in pages if name != best for row in pages[name]]
+    also = " or ".join(f'"{name}"' for name in others)
+    name = f'"{best}"' + (f", not {also}" if also else "")
+    return name, enumerate(map("\t".join, pages[best]), 1), aside
 
 
 def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
@@ -397,15 +402,18 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
 
 def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     """The style in which most lines have the same number of cells and most cells are numbers."""
+    marked = (line for line in islice(lines, SAMPLE, None) if "," in line or "." in line)
+    sample = [*lines[:SAMPLE], *islice(marked, LATER)]
 
     def score(style: Style) -> float:
-        rows = [_row(0, line, style) for line in lines]
+        rows = [_row(0, line, style) for line in sample]
         body = rows[1:] or rows
-        width, _ = Counter(len(_stripped(row.cells)) for row in body).most_common(1)[0]
-        equal = sum(len(_stripped(row.cells)) == width for row in rows) / len(rows)
+        widths = [_width(row.cells) for row in rows]
+        width, _ = Counter(widths[1:] or widths).most_common(1)[0]
         cells = [cell for row in body for cell in row.cells if cell]
         numbers = sum(style.number(cell) is not None for cell in cells)
         doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0].cells, style)
+        equal = widths.count(width) / len(rows)
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)
 
     return max(styles, key=score)
@@ -447,32 +455,25 @@ def _numeric(cells: Sequence[str], style: Style) -> bool:
     )
 
 
-def _stripped(cells: list[str]) -> list[str]:
-    """The cells without empty ones at the end, which trailing separators cause."""
-    end = len(cells)
-    while end and not cells[end - 1]:
-        end -= 1
-    return cells[:end]
+def _width(cells: Sequence[str]) -> int:
+    """The number of cells without empty ones at the end, which trailing separators cause."""
+    return next((i for i in range(len(cells), 0, -1) if cells[i - 1]), 0)
 
 
 def _trimmed(
     header: TextRow | None, rows: list[TextRow], style: Style
 ) -> tuple[TextRow | None, list[TextRow]]:
     """Header and rows without empty cells at the end; the column of R's row numbers is named ""."""
-    if header is None:
-        width = max((len(_stripped(row.cells)) for row in rows), default=0)
-    else:
-        names = _stripped(header.cells)
-        width = len(names)
-        longer = [row.cells for row in rows if len(_stripped(row.cells)) == width + 1]
-        if style.separator in " \t" and longer and len(longer) == len(rows):
-            count = {style.number(cells[0]) for cells in longer}
+    widths = [_width(row.cells) for row in rows]
+    width = max(widths, default=0)
+    if header:
+        names = header.cells[: _width(header.cells)]
+        if style.separator in " \t" and {*widths} == {len(names) + 1}:
+            count = {style.number(row.cells[0]) for row in rows}
             if count in ({*range(len(rows))}, {*range(1, len(rows) + 1)}):
-                names, width = ["", *names], width + 1
-        header = header._replace(cells=names)
+                names = ["", *names]
+        header, width = header._replace(cells=names), len(names)
     return header, [
-        row
-        if len(row.cells) <= width
-        else row._replace(cells=[*row.cells[:width], *_stripped(row.cells[width:])])
-        for row in rows
+        row if len(row.cells) <= width else row._replace(cells=row.cells[: max(width, own)])
+        for row, own in zip(rows, widths, strict=True)
     ]

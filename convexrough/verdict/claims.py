@@ -165,8 +165,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         path,
         required=(name,),
         optional=("x", "y", *CLAIMS),
-        instead={"load": ("pressure", "area")},
-        unnamed=((name,), ("x", "y", name)),
+        instead=("pressure", "area") if name == "load" else (),
+        unnamed=([name], ["x", "y", name]),
         line=0 if how.missing_open else len(scene),
         how=how,
     )
@@ -184,8 +184,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     read = name if name in columns else "pressure"
     areas = _areas(path, table, len(scene)) if read == "pressure" else 1.0
     values = columns[read] * areas * (how.sign if name == "load" else 1)
-    place = Placing(scene, table, read, how.tolerance, how.missing_open)
-    owners = place.nearest(values) if summed else place.owners()
+    place = Placing(scene, table, read, how.tolerance, how.missing_open, summed)
+    owners = place.owners(values)
     forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
 
     def mistake(i: int, what: str) -> str:

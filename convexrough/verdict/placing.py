@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import permutations
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from convexrough.scene.scene import Scene
 from convexrough.tabular.table import INDEX, ReadTable, in_sheet
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import rounded_up
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 #: Default of the largest error of a position in a file, as a fraction of the smallest spacing.
 POSITION_TOLERANCE = 1e-2
@@ -43,6 +46,9 @@ FEW_FAR = 0.1
 #: this asperity from its nearest neighbour. At 1 a node may be an asperity that the scene lacks.
 REACH = 0.9
 
+#: What positions should be, in the message for shifted ones.
+ON_THE_AXIS = "expected x, y relative to the sphere's axis"
+
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
@@ -54,19 +60,17 @@ BY_CHANCE = 0.25
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
-#: A function that returns True if points (m, 2) are at asperities.
-Fits = Callable[[Array], bool]
-
 
 @dataclass
 class Placing:
     """The assignment of the rows of a table to asperities.
 
-    how : how rows were assigned, in words
-    mistakes : sentences on what is wrong with the rows
     column : the name of the column of loads, pressures or forces
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : True if asperities without a row are open
+    summed : True if rows are nodes or pixels, each of which belongs to the nearest asperity
+    how    : how rows were assigned, in words
+    mistakes : sentences on what is wrong with the rows
     """
 
     scene: Scene
@@ -74,13 +78,9 @@ class Placing:
     column: str
     tolerance: float | None
     missing_open: bool
+    summed: bool
     how: str = "in the scene's order"
     mistakes: list[str] = field(default_factory=list)
-
-    @cached_property
-    def positions(self) -> Array:
-        """(n, 2) [length] positions of the asperities."""
-        return self.scene.asperities.positions
 
     @cached_property
     def points(self) -> Array | None:
@@ -88,20 +88,19 @@ class Placing:
         columns = self.table.columns
         return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
-    def owners(self) -> Indices:
-        """(m,) the index of the asperity of each row; messages on errors go to `mistakes`."""
-        if self.points is not None:
-            found, by = self._matched(self.points), True
-        else:
-            found, by = self._numbered_or_in_order()
+    def owners(self, values: Array) -> Indices:
+        """(m,) the index of the asperity of each row; messages on errors go to `mistakes`.
+
+        values : (m,) the loads or forces of the rows
+        """
+        if self.summed:
+            return self._nearest_to_each(values)
+        found, by = self._numbered_or_in_order() if self.points is None else (self._matched(), True)
         count, rows = len(self.scene), len(self.table.rows)
         if rows == count or (rows < count and (by or self.mistakes) and self.missing_open):
             return found
-        if rows == count + 1 and (total := self._total()):
-            self.mistakes = [total]
-            return found
-        if several := self._several_tables():
-            self.mistakes = [several]
+        if said := (self._total() if rows == count + 1 else "") or self._several_tables():
+            self.mistakes = [said]
             return found
         advice = "" if by else unused(self.table)
         if rows < count and (by or self._indices()):
@@ -113,45 +112,31 @@ class Placing:
         self.mistakes.insert(0, f"rows: found {rows}{where}, {expected}")
         return found
 
-    def nearest(self, values: Array) -> Indices:
+    def _nearest_to_each(self, values: Array) -> Indices:
         """(m,) the asperity nearest to each node or pixel, even if it is far (see `mistakes`)."""
         assert self.points is not None
-        places, loaded = self.scene.contact_points, values != 0
-        distances, owners = _nearest(places, self.points)
-        apart = np.full(len(self.scene), self.scene.sphere_radius)
-        if len(self.scene) > 1:
-            apart = nearest_distances(self.positions)
-        far = loaded & (distances > REACH * apart[owners])
-
-        def fits(points: Array) -> bool:
-            """True if all points are near asperities, of which there are several.
-
-            The points must also be nearer than random points would be.
-            """
-            near, their = _nearest(places, points)
-            parts = near / apart[their]
-            return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
-
+        loaded = values != 0
+        distances, owners = self._nearest(self.points)
+        far = loaded & (distances > REACH * self._apart[owners])
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
-        if loaded.any() and not fits(self.points[most]):
-            moved = self._misread(loaded, fits) or self._about_shifted(loaded, values, fits)
-            if moved:
-                self.mistakes.append(f"positions: {moved}")
-                return owners
+        moved = ""
+        if loaded.any() and not self._fits(self.points[most]):
+            moved = self._misread(loaded) or self._about_shifted(loaded, values)
+        if moved:
+            self.mistakes.append(f"positions: {moved}")
+            return owners
         for i in np.flatnonzero(far):
-            found = (
-                f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
-            )
-            limit = f"{REACH * apart[owners[i]]:.3g}, {REACH:g} of that asperity's distance"
+            place = self.points[i].tolist()
+            found = f"a load at {place}, {distances[i]:g} from the nearest asperity"
+            limit = f"{REACH * self._apart[owners[i]]:.3g}, {REACH:g} of that asperity's distance"
             self._refuse(i, found, f"at most {limit} from its neighbour")
         if self.column == "pressure":
             self._refuse_repeated(self.points @ [1, 1j], loaded, "each node or pixel once")
         elif any(bare(name).lower() in INDEX for name in self.table.others):
             cells = *self.table.columns.values(), *self.table.others.values()
-            firsts = dict[tuple[object, ...], int]()
-            rows = enumerate(zip(*(each.tolist() for each in cells), strict=True))
-            same = np.array([firsts.setdefault(row, i) for i, row in rows])
-            self._refuse_repeated(same, loaded, "each node once")
+            rows = [*zip(*(each.tolist() for each in cells), strict=True)]
+            first = {row: i for i, row in reversed([*enumerate(rows)])}
+            self._refuse_repeated(np.array([first[row] for row in rows]), loaded, "each node once")
         self.how = f"{len(owners):,} nodes summed at their nearest asperities"
         return owners
 
@@ -180,9 +165,9 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            if cells.dtype.kind != "f" or (cells >= 2**53).any():
+            if cells.dtype.kind != "f":
                 continue
-            if not ((cells >= 0) & (cells % 1 == 0)).all():
+            if not ((cells >= 0) & (cells < 2**53) & (np.floor(cells) == cells)).all():
                 continue
             index = cells.astype(np.intp)
             if bare(name).lower() in INDEX:
@@ -225,7 +210,11 @@ class Placing:
 
     def _unread_positions(self) -> Iterator[str]:
         """A message if unread columns are Cartesian or polar positions in another order."""
-        numbers = {bare(name): it for name, it in self.table.others.items() if it.dtype.kind == "f"}
+        numbers = {
+            bare(name): cells
+            for name, cells in self.table.others.items()
+            if cells.dtype.kind == "f" and np.isfinite(cells).all()
+        }
         for (a, one), (b, other) in permutations([*numbers.items()][:MOST_UNREAD], 2):
             for what, points in {
                 "polar coordinates (in radians)": _polar(one, other),
@@ -234,7 +223,7 @@ class Placing:
             }.items():
                 if not self._fits(points):
                     continue
-                if (_nearest(self.positions, points)[1] != np.arange(len(points))).any():
+                if (self._nearest(points)[1] != np.arange(len(points))).any():
                     named = f"--column x={quote(a)} --column y={quote(b)}"
                     expected = named if what == "positions" else "columns x and y"
                     found = f"found {what} in another order than the scene's"
@@ -263,11 +252,30 @@ class Placing:
     # By position
 
     @cached_property
+    def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree  # takes 0.1 s to import
+
+        return cKDTree(
+            self.scene.contact_points if self.summed else self.scene.asperities.positions
+        )
+
+    def _nearest(self, points: Array) -> tuple[Array, Indices]:
+        """(m,) [length], (m,) the distance of the nearest asperity to each point, and its index."""
+        distances, owners = self._tree.query(points)
+        return np.asarray(distances), np.asarray(owners)
+
+    @cached_property
+    def _apart(self) -> Array:
+        """(n,) [length] the distance of each asperity from its neighbour, if it has any."""
+        if len(self.scene) == 1:
+            return np.array([self.scene.sphere_radius])
+        return nearest_distances(self.scene.asperities.positions)
+
+    @cached_property
     def _spacing(self) -> float:
         """[length] the smallest distance of two asperities; the tip radius if there is only one."""
-        if len(self.positions) == 1:
-            return float(self.scene.asperities.tip_radii[0])
-        return float(nearest_distances(self.positions).min())
+        alone = len(self.scene) == 1
+        return float(self.scene.asperities.tip_radii[0] if alone else self._apart.min())
 
     @cached_property
     def _allowed(self) -> float:
@@ -279,21 +287,28 @@ class Placing:
         return POSITION_TOLERANCE * self._spacing if given is None else given
 
     def _fits(self, points: Array) -> bool:
-        """True if each point is at an asperity, and no two points are at the same one."""
-        distances, owners = _nearest(self.positions, points)
-        return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
+        """True if each point is at an asperity, and no two points are at the same one.
 
-    def _matched(self, points: Array) -> Indices:
+        Nodes only have to be near asperities, nearer than random points, and not all near the same.
+        """
+        distances, owners = self._nearest(points)
+        if not self.summed:
+            return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
+        parts = distances / self._apart[owners]
+        return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(owners) > 0)
+
+    def _matched(self) -> Indices:
         """(m,) the asperity at each point; `mistakes` names points at none or at a taken one."""
-        allowed = self._allowed
-        distances, owners = _nearest(self.positions, points)
+        assert self.points is not None
+        points, allowed = self.points, self._allowed
+        distances, owners = self._nearest(points)
         far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
         most = float(distances.max())
         self.how = f"matched by position (largest distance {most:.2g})"
-        doubtful = far.any() if len(points) == len(self.positions) else far.mean() > 0.5
+        doubtful = far.any() if len(points) == len(self.scene) else far.mean() > 0.5
         if doubtful or not alone:
             every = np.ones(len(points), dtype=np.bool_)
-            if moved := self._misread(every, self._fits) or self._shifted(points):
+            if moved := self._misread(every) or self._shifted(points):
                 self.mistakes.append(f"positions: {moved}")
                 return owners
         if far.any() and alone and float(rounded_up(most)) <= self._spacing / 2:
@@ -307,9 +322,9 @@ class Placing:
         self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
-    def _misread(self, rows: NDArray[np.bool_], fits: Fits) -> str:
+    def _misread(self, rows: NDArray[np.bool_]) -> str:
         """A message that names the columns, signs or units with which the rows fit; else ""."""
-        return next((said for said, points in self._readings(rows) if fits(points)), "")
+        return next((said for said, points in self._readings(rows) if self._fits(points)), "")
 
     def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
         """Other ways to interpret x and y: for each the message, and the points (m, 2)."""
@@ -345,29 +360,27 @@ class Placing:
 
     def _shifted(self, points: Array) -> str:
         """A message with the shift after which all points fit; "" if there is none."""
-        tried: Sequence[Any] = self.positions[:MOST_TRIED] - points[0]
-        if len(points) == len(self.positions):
-            tried = [self.positions.mean(axis=0) - points.mean(axis=0)]
+        positions = self.scene.asperities.positions
+        tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
+        if len(points) == len(positions):
+            tried = [positions.mean(axis=0) - points.mean(axis=0)]
         for shift in tried:
             if self._fits(points[:20] + shift) and self._fits(points + shift):
                 digit = 0.1 * min(self._allowed, float(np.abs(shift).max()))
                 by = _pair(np.round(-shift / digit) * digit)
-                expected = f"expected x, y relative to the sphere's axis, to {self._allowed:.3g}"
-                return f"all are shifted by {by}, {expected}"
+                return f"all are shifted by {by}, {ON_THE_AXIS}, to {self._allowed:.3g}"
         return ""
 
-    def _about_shifted(self, rows: NDArray[np.bool_], values: Array, fits: Fits) -> str:
+    def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> str:
         """A message with the approximate shift after which loaded nodes fit, or ""."""
         assert self.points is not None
         points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
         shift = np.average(points, axis=0, weights=weights)
         for _ in range(REFINEMENTS):  # the weighted mean vector from the nearest asperities
-            near = places[_nearest(places, points - shift)[1]]
+            near = places[self._nearest(points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
-        expected = "expected x, y relative to the sphere's axis"
-        return (
-            f"all are shifted by about {_pair(shift)}, {expected}" if fits(points - shift) else ""
-        )
+        fits = self._fits(points - shift)
+        return f"all are shifted by about {_pair(shift)}, {ON_THE_AXIS}" if fits else ""
 
     def _refuse(self, row: Any, found: str, expected: str) -> None:
         self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
@@ -398,10 +411,3 @@ def _pair(point: Array) -> str:
 
 def _polar(radii: Array, angles: Array) -> Array:
     return np.column_stack((radii * np.cos(angles), radii * np.sin(angles)))
-
-
-def _nearest(positions: Array, points: Array) -> tuple[Array, Indices]:
-    from scipy.spatial import cKDTree  # takes 0.1 s to import
-
-    distances, owners = cKDTree(positions).query(points)
-    return np.asarray(distances), np.asarray(owners)
