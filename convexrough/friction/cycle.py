@@ -1,12 +1,8 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
-The path is a closed curve of the load P and the shear force Q. With the coefficient of friction f,
-let T = Q / f, and let m+ and m- be the smallest P + T and P - T along the path. The layers of a
-contact are the parts by which it grows as the normal load rises. The memory curve
-(docs/theory/paths.md) gives, as a function of a normal load s, the shear force, divided by f, that
-all layers up to the load s carry. From the second cycle on, it passes at every moment through the
-point (L*, T*) with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below L* the curve no longer changes.
-Above L* it repeats in each cycle and does not depend on the start of the path.
+The path is a closed curve of the load P and the shear force Q; f is the coefficient of friction,
+and T = Q / f. docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from
+the second cycle on the memory curve does not change below it and is periodic above it.
 docs/theory/losses.md derives the loss.
 """
 
@@ -87,12 +83,10 @@ class Cycle(Table, Plottable):
     displacement_amplitude : [length] half the range of the displacement of one body relative to the
         other, at the points of the path
     displacement_error : [length] proved bound on the error of the displacement amplitude
-    order            : "proved": no indentation falls as the load rises from L* to the highest P, so
-        loss and statuses are proved; "proved for one step": statuses hold for the result of one
-        general step per segment (docs/theory/without-order.md), and no loss is proved; "fails":
-        nothing is proved, and general steps give the results. If the normal solution at the highest
-        P is not proved, `order` is "fails" as well, but then the results come from the memory
-        curve, not from general steps
+    order            : what is proved about order from L* to the highest P (docs/theory/states.md,
+        "Order"). "proved": loss and statuses are proved; "proved for one step": statuses hold for
+        one general step per segment, and no loss is proved; "fails": nothing is proved, and general
+        steps give the results, unless the normal solution at the highest P is not proved
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding

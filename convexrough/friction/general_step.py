@@ -1,23 +1,18 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
-Shear forces are divided by the coefficient of friction f, tangential displacements by c_t f with
-Mindlin's ratio c_t. Each asperity i has its own memory curve (docs/theory/paths.md): its
-deflection, the tangential displacement that its own shear force causes, as a function of its
-indentation. In a straight step the load and the shear force change linearly, to P and T. First the
-normal solution at P is computed. Then Newton's method solves (1) of docs/theory/without-order.md,
-"The general step", for eta_i and x: the displacements of the asperities and of the bodies in the
-step.
+docs/theory/without-order.md, "The general step", derives it. Shear forces are divided by the
+coefficient of friction f, tangential displacements by c_t f with Mindlin's ratio c_t. Each asperity
+has its own memory curve: its deflection, which its own shear force causes, as a function of its
+indentation. Newton's method solves (1) of that page for eta_i and x, the displacements of the
+asperities and of the bodies in the step.
 
-For the curves of asperities, one formula replaces "Changes of the curve" in paths.md.
-During a straight step the slip front (the point down to which slip replaces the old curve) only
-moves down, and the part of a curve above the present indentation is dropped. So the new curve
-depends only on the old curve and on the end (s1, t1) of the step. Cut the old curve at the smaller
-of the old and the new indentation, and let h be its heights. If the asperity slips, the new curve
-ends in a line of slope c = +1 or -1 from the front L to (s1, t1), with
+The curves of asperities change as in docs/theory/paths.md, "Changes of the curve". If an asperity
+slips at the end (s1, t1) of the step, the front L on the old curve, cut at the smaller of the old
+and the new indentation, solves
 
     L - c h(L) = s1 - c t1,
 
-whose left side does not decrease with L.
+with the sign c of the slip and the heights h of this curve. The left side does not decrease.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """The energy that slip dissipates: at each asperity, in the whole contact, and along a path.
 
 docs/theory/losses.md derives the formulas. Losses are divided by c_t f^2, with the coefficient of
-friction f and Mindlin's ratio c_t. The slip front is the load level above which slip has changed
-the memory curve (docs/theory/paths.md). While the total load is P and the front falls through the
+friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
 level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
-L, and c the direction of slip, 1 or -1. B is the sum over asperities of B_i(P, L), which (2) of
-docs/theory/losses.md defines. By (1) of that page, B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)],
-with the approach D0 and its integral V over the load. All of this assumes order: no indentation
-falls as the load rises.
+L, and c the direction of slip, 1 or -1. B is the sum of the B_i(P, L) of (2) on that page. All of
+this assumes order: no indentation falls as the load rises.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """Friction states as weighted sums of solutions under normal load.
 
-The weights are the changes of slope of the memory curve, which stores the state
-(docs/theory/paths.md). Equation (1) of that page gives the shear forces Q_i of the asperities and
-the displacement X of the bodies. With the indentations n_i in place of the approach D0, the sum for
-X gives the own deflection of asperity i, which its own force causes, plus its drift. The drift is
-the displacement of the asperity relative to the opposite surface. Where an asperity is open, n_i is
-minus its gap. Equation (1) of docs/theory/states.md is the special case of first loading.
+The weights are the changes of slope of the memory curve. Equation (1) of docs/theory/paths.md gives
+the shear forces Q_i of the asperities and the displacement X of the bodies, and the sum below it
+the own deflection plus drift of an asperity. Equation (1) of docs/theory/states.md is the special
+case of first loading.
 """
 
 from __future__ import annotations

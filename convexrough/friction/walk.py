@@ -1,17 +1,10 @@
 """Paths of load P and shear force Q, followed from one straight segment to the next.
 
 With the coefficient of friction f, the points of a path are (P, T) with T = Q / f. The memory curve
-stores the friction state (docs/theory/paths.md). It is a polygonal line. Its height at a load s is
-the shear force, divided by f, that the layers of the contact up to s carry; the layer at s is the
-contact force and area that are added as the load grows from s to s + ds. A level is a total load,
-or the normal solution at this load. Forces and displacements are sums over the vertices of the
-memory curve. The slip front is the level down to which slip has reached. The loss along a straight
-segment of the path is a sum over pieces; on each piece the front falls through one straight part of
-the memory curve (`curve.Piece`).
-
-Order holds if no indentation falls as the load rises. If order fails, the memory curve does not
-apply. Then `general_step` computes the states step by step (docs/theory/without-order.md), without
-proofs.
+stores the friction state; docs/theory/paths.md defines it, its layers and the slip front, and shows
+that forces and displacements are sums over its vertices. The loss along a segment is a sum over the
+pieces of the segment (`curve.Piece`). If order fails (`friction.order`), the memory curve does not
+apply. Then `general_step` computes the states, without proofs.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
 
-docs/theory/gradients.md, "Along a path", explains the method. The path is compared with a shifted
-path, on which some loads P_k, or some T_k = Q_k / f, differ by at most SHIFT. Q_k is a shear force,
-f the coefficient of friction. The arithmetic is exact. Let L be a load level of the shifted path, l
-the corresponding level of the original path, and S = dD0/dL. To first order in the shift
-
-    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l).
+docs/theory/gradients.md, "Along a path", explains the method. The path is compared, in exact
+arithmetic, with a shifted path, on which some loads P_k, or some T_k = Q_k / f, differ by at most
+SHIFT. Q_k is a shear force, f the coefficient of friction. V and D0 at the levels of the shifted
+path are expanded about those of the original path, with S = dD0/dL.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """How offsets d, coefficients k of Hertz's law and the compliance matrix A depend on a scene.
 
-Derivatives are computed, as balls (numbers with error bounds), from
+The derivatives of docs/theory/gradients.md, "Derivatives by the data of a scene", as balls (numbers
+with error bounds). They follow from
 
     d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
     A_ij = 1 / (pi E* |c_i - c_j|).
 
 An asperity has the summit r = (x, y) at the height z and the tip radius rho. The pressed body has a
-curvature 1/R along each axis, x and y; in k, 1/R is the mean of both. The effective curvatures
-b = (bx, by) and the contact points c depend on the geometry. In "summit", b = 1/R and c = r. In
-"closest", b = 1 / (R + rho) and c = r / (1 + rho/R) (docs/theory/gradients.md, "Derivatives by the
-data of a scene").
+curvature 1/R along each axis; in k, 1/R is the mean of both. In the geometry "summit" the effective
+curvatures are b = 1/R and the contact points c = r. In "closest" they are b = 1 / (R + rho) and
+c = r / (1 + rho/R).
 """
 
 from __future__ import annotations

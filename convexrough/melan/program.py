@@ -1,17 +1,10 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-The points of a path of shear forces are t0 + lambda t_v. The elastic forces e_iv at t_v are the
-shear forces of asperities that all stick. Melan's program asks for the largest lambda that admits
-constant residual forces r_i with the sum t0 such that |r_i + lambda e_iv| is at most the load P_i,
-for all asperities i and points v. This module computes a lower bound on lambda from given r_i, and
-from given slips the upper bound (3) of docs/theory/shakedown.md. A solver, which need not be
-accurate, finds the r_i and the slips.
-
-The elastic shares Y are the elastic forces per unit of total force. They make all displacements
-(H + B) Y equal, and their sum is 1. H = diag(1/(2 E* a)) has the compliances of the asperities,
-with the contact modulus E* and the contact radii a; B is the full tangential kernel. The bounds
-include the errors of the loads and of Y. All shear forces are divided by the coefficient of
-friction.
+docs/theory/shakedown.md, "Melan's program", states the program (2), in which the points of a path
+of shear forces are t0 + lambda t_v, and derives both bounds on lambda: the lower one from residual
+forces, the upper one, (3), from slips. A solver, which need not be accurate, finds residual forces
+and slips. The section "Elastic shares" derives the elastic forces and bounds on their errors. All
+shear forces are divided by the coefficient of friction.
 """
 
 from __future__ import annotations

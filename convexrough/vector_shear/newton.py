@@ -1,12 +1,12 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-docs/theory/vector-friction.md, "Newton's method", describes the method. The unknown eta_i is the
-sum of deflection and slip of asperity i. With the forces q, their total T, the kernel B and the
-rigid displacement X, all in scaled units, `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", describes the method, and `vector_shear.problem`
+the symbols in scaled units; eta_i is the sum of deflection and slip of asperity i. `convex.newton`
+solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-The derivative of each asperity is the matrix dq_i/deta_i = W_i W_i' (2, 2). A step solves
+With the derivatives dq_i/deta_i = W_i W_i' (2, 2), a step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
 """

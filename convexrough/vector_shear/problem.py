@@ -1,19 +1,14 @@
 """The friction problem of the loaded asperities, with vectors of shear forces.
 
-docs/theory/vector-friction.md derives the equations.
+docs/theory/vector-friction.md derives the equations. Here forces are in units of the coefficient of
+friction f, displacements in units of c_t f and energies in units of c_t f^2, with Mindlin's ratio
+c_t. In these units the deflection of an asperity with the load P by the shear force u is
 
-Forces are in units of the coefficient of friction f, displacements in units of c_t f and energies
-in units of c_t f^2, with Poisson's ratio nu and Mindlin's ratio c_t = (2 - nu) / (2 (1 - nu)). An
-asperity with the load P and the shear force u has the deflection
-own(u) = threshold [1 - (1 - u / P)^(2/3)], where threshold = k P^(2/3) and k is Hertz's
-coefficient. An asperity that must take up a displacement longer than threshold slides. Let A be the
-compliance operator and bias = nu / (2 - nu). By (1) of the page above, the tangential kernel is
+    own(u) = threshold [1 - (1 - u / P)^(2/3)],    threshold = k P^(2/3),
 
-    B_ij = A_ij [(1 - bias) I + 2 bias d d'],
-
-where d is the unit vector from j to i. Q is the shear force on the contact, and T = Q / f. The
-forces q_i on the asperities add up to T, and |q_i| <= P_i. With the rigid displacement X, forces
-and slips satisfy
+with Hertz's coefficient k; the kernel (1) of the page is B_ij = A_ij [(1 - bias) I + 2 bias d d'],
+with bias = nu / (2 - nu), Poisson's ratio nu and the unit vector d from j to i; and the forces q_i,
+|q_i| <= P_i, with the sum T = Q / f, the slips and the rigid displacement X satisfy
 
     X = own(q_i) + (B q)_i + slip_i,
 
