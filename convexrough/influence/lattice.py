@@ -34,7 +34,7 @@ from convexrough.influence.coupling import (
 )
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced
+from convexrough.influence.sliced import LARGE, MANY, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
@@ -303,13 +303,24 @@ class LatticeInfluence:
         least = self.lattice.cached(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
+    @property
+    def least_slices(self) -> int:
+        """The number of slices that a press needs."""
+        return SLICES + int(self.sites > LARGE)
+
+    @property
+    def sites(self) -> int:
+        """The number of sites of the box."""
+        return math.prod(self.box.shape)
+
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
 
-        slices : number of parts of 10 to 18 bits into which loads and kernel are divided; default
-            3, and 4 on a large box (docs/theory/operators-lattice.md, "Slices")
+        slices : number of parts of 10 to 18 bits into which loads and kernel are divided
+            (docs/theory/operators-lattice.md, "Slices"); default 3, and 4 for more than `MANY`
+            sites, because friction takes differences of sums
         """
-        slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
+        slices = slices or SLICES + int(self.sites > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))

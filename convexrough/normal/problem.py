@@ -31,6 +31,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.shells import shells
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.normal.load_control import approach_bound, highest_approach
@@ -222,14 +223,18 @@ class NormalProblem:
     def pressed_product(self, loads: Pair) -> Ball:
         """(n,) A P for loads P >= 0, precise enough for a press.
 
-        With a stored matrix of more than `ALL_SHARP` rows, only displacements of loaded asperities
-        have thirty digits, so that the product takes less time than the press.
+        On large lattices it has fewer digits than `product`. With a stored matrix of more than
+        `ALL_SHARP` rows, only displacements of loaded asperities have thirty digits, so that the
+        product takes less time than the press.
         """
+        if isinstance(self.influence, LatticeInfluence):
+            sums = self.influence.sums(loads, self.influence.least_slices)
+            return sums * self.exact.scale
         if len(self) <= ALL_SHARP or not isinstance(self.influence, DenseInfluence):
             return self.product(loads)
         found, some, every = self.plain_product(loads), loads.high.nonzero()[0], self.influence.sums
-        sums = MatrixSums(every.points.at(some), every.point_error)
-        exact = sums(loads.at(some)) * self.exact.scale
+        matrix = MatrixSums(every.points.at(some), every.point_error)
+        exact = matrix(loads.at(some)) * self.exact.scale
         for whole, part in zip((*found.mid, found.radius), (*exact.mid, exact.radius), strict=True):
             whole[some] = part
         return found

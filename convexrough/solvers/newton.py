@@ -167,7 +167,8 @@ class Newton:
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            trial = trial_of(problem, loads) if self._refines(problem) else None
+            refines = self._refines(problem)
+            trial = trial_of(problem, loads, problem.pressed_product) if refines else None
             if len(near) == len(problem):
                 return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
