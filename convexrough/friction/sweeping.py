@@ -101,7 +101,7 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
                 break
             near = np.column_stack((swept.neighbours(left, count), worst))
             weights = swept.weights(left, near, moments)
-            rates[left], failed = swept.rates(left, near, weights, moments is around)
+            rates[left], failed = swept.rates(left, near, weights, least[left])
             todo = ~(rates[left] > least[left])
             left, worst = left[todo], np.column_stack((worst, failed))[todo]
         if not (rates[support] > 0).all():
@@ -225,26 +225,23 @@ class _Swept:
         return weights
 
     def rates(
-        self, which: Indices, near: Indices, weights: Array, balanced: bool
+        self, which: Indices, near: Indices, weights: Array, least: Array
     ) -> tuple[Array, Indices]:
-        """(m,) bounds 1 - q_i (-inf where all weights are 0), and the k that determine q_i.
-
-        balanced : True if the moments all around the asperities are 0
-        """
+        """(m,) bounds 1 - q_i, and the k that determine q_i; -inf where not above `least` (m,)."""
         rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
         known = np.flatnonzero(weights.any(axis=1))
         mine, near = which[known], near[known]
         weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
-        seen = self.neighbours(mine, NEAR * near.shape[1] if balanced else 1)
-        gains = self.gains(mine, near, weights, seen[:, -1]) if balanced else np.zeros(len(mine))
-        far, q = gains > 0, np.empty(len(known))
+        seen = self.neighbours(mine, NEAR * near.shape[1])
         cost = near.shape[1] * seen.shape[1]
-        ratios = _in_parts(self._ratios, cost, mine[far], near[far], weights[far], seen[far])
-        least = ratios.argmin(axis=1)
-        q[far] = 1.0 / np.minimum(ratios[np.arange(len(least)), least], 1.0 + gains[far])
-        worst[known[far]] = seen[far][np.arange(len(least)), least]
-        q[~far], worst[known[~far]] = self._everywhere(mine[~far], near[~far], weights[~far])
-        rates[known] = 1.0 - (1.0 + self.lost) * q
+        ratios = _in_parts(self._ratios, cost, mine, near, weights, seen)
+        rows, smallest = np.arange(len(known)), ratios.argmin(axis=1)
+        q, worst[known] = 1.0 / ratios[rows, smallest], seen[rows, smallest]
+        gains, stretched = self.gains(mine, near, weights, seen[:, -1]), 1.0 + self.lost
+        left = np.flatnonzero((gains == 0) & (1.0 - stretched * q > least[known]))
+        q = np.where(gains > 0, np.maximum(q, 1.0 / (1.0 + gains)), np.inf)
+        q[left], worst[known[left]] = self._everywhere(mine[left], near[left], weights[left])
+        rates[known] = 1.0 - stretched * q
         return rates, worst
 
     def gains(self, which: Indices, near: Indices, weights: Array, last: Indices) -> Array:
