@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arithmetic.balls import TINY
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
@@ -74,9 +75,9 @@ NEAR = 9
 #: weights are negative.
 SEARCHES = 15
 
-#: DIRECTIONS: number of directions in which the extent of the support is computed. NUMBERS: about
-#: the number of float64 numbers that are in memory at once.
-DIRECTIONS, NUMBERS = 256, 2**20
+#: DIRECTIONS: number of directions in which the extent of the support is computed. ROWS: number of
+#: asperities that are treated together. NUMBERS: about the number of float64 numbers in an array.
+DIRECTIONS, ROWS, NUMBERS = 256, 2**14, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> Array:
@@ -99,9 +100,12 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
         for count, moments in TRIES:
             if len(left) == 0 or (count > MORE and len(left) > FEW):
                 break
-            near = np.column_stack((swept.neighbours(left, count), worst))
-            weights = swept.weights(left, near, moments)
-            rates[left], failed = swept.rates(left, near, weights, least[left])
+            failed = np.empty(len(left), dtype=np.intp)
+            for some in threads.chunks(len(left), ROWS):
+                which = left[some]
+                near = np.column_stack((swept.neighbours(which, count), worst[some]))
+                weights = swept.weights(which, near, moments)
+                rates[which], failed[some] = swept.rates(which, near, weights, least[which])
             todo = ~(rates[left] > least[left])
             left, worst = left[todo], np.column_stack((worst, failed))[todo]
         if not (rates[support] > 0).all():
