@@ -60,13 +60,11 @@ MOST_PRINTED = 20
 class Stage(FileTable):
     """A table of the scene file with checked keys, which requests a result of a pressed contact.
 
-    name       : name of the table
-    frictional : True if it needs the table [friction]
-    numbers    : names of the numbers in a row of its result
+    name    : name of the table
+    numbers : names of the numbers in a row of its result
     """
 
     name: ClassVar[str]
-    frictional: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -102,6 +100,11 @@ class Stage(FileTable):
         extent = array_extent(contact.scene, load)
         if extent is not None and extent < CUT_OFF:
             yield f"under the loads of {name} {at_the_rim(extent)}"
+
+    @classmethod
+    def sheared_by(cls, keys: Any) -> str:
+        """What needs the table [friction] if the stage has these keys; "" if nothing does."""
+        return f"[{cls.name}]"
 
     def compute(self, contact: Contact) -> Result:
         """The result of this stage for a pressed contact. Raises InputError and SolverError."""
