@@ -119,6 +119,11 @@ def limit(contact: Contact) -> float:
     return checks.friction(contact.scene.friction) * contact.load
 
 
+def same(*names: str) -> dict[str, str]:
+    """Headings of printed columns that are the names of the numbers."""
+    return {name: name for name in names}
+
+
 def number(found: Any, name: str) -> Any:
     """If `name` is a status, the number of asperities with it; otherwise the attribute `name`.
 

@@ -17,7 +17,7 @@ from convexrough.friction.cycle import Loop, cycles, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
-from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit, same
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -60,11 +60,7 @@ class ShearResult(Result):
     stage: ShearStage
     printed: ClassVar[Mapping[str, str]] = {
         "fraction": "Q/(fP)",
-        "force": "force",
-        "displacement": "displacement",
-        "sliding": "sliding",
-        "partial": "partial",
-        "undecided": "undecided",
+        **same("force", "displacement", "sliding", "partial", "undecided"),
     }
 
     def proved_forces(self) -> Iterator[float]:
@@ -251,8 +247,4 @@ class HistoryResult(Steps):
     """The result of [history]: the state after each force."""
 
     stage: HistoryStage
-    printed: ClassVar[Mapping[str, str]] = {
-        "fraction": "Q/(fP)",
-        "displacement": "displacement",
-        "loss": "loss",
-    }
+    printed: ClassVar[Mapping[str, str]] = {"fraction": "Q/(fP)", **same("displacement", "loss")}
