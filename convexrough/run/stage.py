@@ -261,12 +261,17 @@ class Result(Record):
         return self.printed
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """Draw the main figure of the last object in `found`; return the axes."""
+        """Draw the main figure of the last object in `found`; return the axes.
+
+        Raises InputError if there is none, as where no gradient exists.
+        """
+        checks.some(self.name, self.found)
         axes = self.found[-1].plot(axes, **options)
         return axes
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The first table as a pandas DataFrame."""
+        """The first table as a pandas DataFrame. Raises InputError if there is none."""
+        checks.some(self.name, self.found)
         return frames.of_rows(next(iter(self.tables().values())))
 
 

@@ -196,3 +196,8 @@ def test_where_there_is_none(run: Any) -> None:
     assert summary["cycle"][0]["loss"] > 0
     assert Path("out/cycle.csv").exists()
     assert not Path("out/gradient.csv").exists()
+    file = cr.read_scene("a.toml")
+    (*_, result) = file.compute(file.press())
+    for form in (result.plot, result.to_dataframe):
+        with pytest.raises(cr.InputError, match="gradient: found none, expected at least one"):
+            form()
