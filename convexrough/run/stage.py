@@ -230,7 +230,10 @@ class Result(Record):
         return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
     def figures(self) -> Mapping[str, Figure]:
-        """The figures to write, by the file name without its ending."""
+        """The figures to write, by the file name without its ending.
+
+        `plots` imports matplotlib when it draws the first one.
+        """
         return {}
 
     def lines(self) -> list[str]:
