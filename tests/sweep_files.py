@@ -3,16 +3,14 @@
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import convexrough as cr
-from convexrough.progress import logged
 from convexrough.run.scene_file import Task
 from convexrough.sweeps.batch import Tables
 
@@ -81,13 +79,6 @@ def _equal(one: Any, other: Any) -> bool:
     if one.dtype.kind == "U":  # as wide as its longest
         return one.tolist() == other.tolist()
     return one.dtype == other.dtype and one.tobytes() == other.tobytes()
-
-
-@contextmanager
-def reported_to(call: Callable[[str], None]) -> Iterator[None]:
-    """Call with all that is said while work goes on, as it is said."""
-    with logged(lambda record: call(record.getMessage())):
-        yield
 
 
 def numbers(table: cr.SweepTable, *names: str) -> list[Any]:

@@ -20,6 +20,8 @@ assert not heavy & {*sys.modules}
 cr.testing.assert_certified, cr.compare.compare
 scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
 repr(cr.press(scene, approach=1e-4))
+file = cr.read_scene(cr.__path__[0] + "/run/new_scene.toml")
+file.compute(file.press())
 assert not {"pandas", "xarray", "matplotlib"} & {*sys.modules}
 cr.plots.press_figures
 assert "matplotlib.pyplot" not in sys.modules

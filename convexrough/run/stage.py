@@ -60,13 +60,11 @@ MOST_PRINTED = 20
 class Stage(FileTable):
     """A table of the scene file with checked keys, which requests a result of a pressed contact.
 
-    name       : name of the table
-    frictional : True if it needs the table [friction]
-    numbers    : names of the numbers in a row of its result
+    name    : name of the table
+    numbers : names of the numbers in a row of its result
     """
 
     name: ClassVar[str]
-    frictional: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -103,6 +101,11 @@ class Stage(FileTable):
         if extent is not None and extent < CUT_OFF:
             yield f"under the loads of {name} {at_the_rim(extent)}"
 
+    @classmethod
+    def sheared_by(cls, keys: Any) -> str:
+        """What needs the table [friction] if the stage has these keys; "" if nothing does."""
+        return f"[{cls.name}]"
+
     def compute(self, contact: Contact) -> Result:
         """The result of this stage for a pressed contact. Raises InputError and SolverError."""
         raise NotImplementedError
@@ -114,6 +117,11 @@ class Stage(FileTable):
 def limit(contact: Contact) -> float:
     """[force] the friction limit: the coefficient of friction times the total load."""
     return checks.friction(contact.scene.friction) * contact.load
+
+
+def same(*names: str) -> dict[str, str]:
+    """Headings of printed columns that are the names of the numbers."""
+    return {name: name for name in names}
 
 
 def number(found: Any, name: str) -> Any:
@@ -222,7 +230,10 @@ class Result(Record):
         return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
     def figures(self) -> Mapping[str, Figure]:
-        """The figures to write, by the file name without its ending."""
+        """The figures to write, by the file name without its ending.
+
+        `plots` imports matplotlib when it draws the first one.
+        """
         return {}
 
     def lines(self) -> list[str]:
@@ -253,12 +264,17 @@ class Result(Record):
         return self.printed
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """Draw the main figure of the last object in `found`; return the axes."""
+        """Draw the main figure of the last object in `found`; return the axes.
+
+        Raises InputError if there is none, as where no gradient exists.
+        """
+        checks.some(self.name, self.found)
         axes = self.found[-1].plot(axes, **options)
         return axes
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The first table as a pandas DataFrame."""
+        """The first table as a pandas DataFrame. Raises InputError if there is none."""
+        checks.some(self.name, self.found)
         return frames.of_rows(next(iter(self.tables().values())))
 
 

@@ -209,13 +209,9 @@ class Study(FileTable):
                 what = f"[{name}]: unknown table" if a_table else f"{name}: in no table"
                 yield name, f"{what}, {nearest(name, cls.model_fields)}"
         if "friction" not in keys:
-            needing = [name for name in STAGES if name in keys and STAGES[name].frictional]
-            asked = keys.get("gradient")
-            of = asked.get("of") if isinstance(asked, dict) else None
-            if needing:
-                yield "friction", f"missing table, needed with [{needing[0]}]"
-            elif of in ("loss", "displacement"):
-                yield "friction", f"missing table, needed with the {of} of [gradient]"
+            found = (STAGES[name].sheared_by(keys[name]) for name in STAGES if name in keys)
+            if sheared_by := next(filter(None, found), ""):
+                yield "friction", f"missing table, needed with {sheared_by}"
         yield from _unbounded(*(keys.get(name) for name in ("asperities", "normal", "sphere")))
 
     def mistakes_within(self) -> Iterator[Mistake]:

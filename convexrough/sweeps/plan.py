@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError, MistakesError, SceneFileError
+from convexrough.errors import InputError, MistakesError, SceneFileError, blamed_on
 from convexrough.run.scene_file import Task, digest, read_text, tables_of
 from convexrough.run.stage import Stage
 from convexrough.run.stages import CycleStage, NormalStage, ShearStage
@@ -195,17 +195,16 @@ def _planned(
     of the last of them.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
-    for number in range(tried):
-        try:
-            asked = ask(number)
-            contact = asked.press()
-            columns = chosen(contact, asked.stages, measures)
-            break
-        except FAILURES as error:
-            if number == tried - 1:
-                if isinstance(error, InputError) and not error.where:
-                    raise error.located(str(said["source"])) from error
-                raise
+    with blamed_on(said["source"], unless_known=True):
+        for number in range(tried):
+            try:
+                asked = ask(number)
+                contact = asked.press()
+                columns = chosen(contact, asked.stages, measures)
+                break
+            except FAILURES:
+                if number == tried - 1:
+                    raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
     text = json.dumps(contents, sort_keys=True, default=repr)

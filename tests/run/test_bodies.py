@@ -1,20 +1,40 @@
-"""Scene files of two bodies, and of bases that are no sphere: what is read, refused and said."""
+"""Scene files: how wide arrays are, two bodies, and bases that are no sphere."""
 
 import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from scene_files import FRICTION, TWO_BODIES, WITHIN, scene_text
+from scene_files import FRICTION, HEXAGONAL, TWO_BODIES, WITHIN, scene_text
 
 import convexrough as cr
 
-INF = float("inf")
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize("pattern", ["hexagonal", "square"])
+@pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])
+@pytest.mark.parametrize("rough", ["", "height_std = 4e-6\ntip_radius_cv = 0.3\nseed = 5"])
+def test_the_default_within_loses_no_asperity(
+    read: Any, geometry: str, pattern: str, normal: str, rough: str
+) -> None:
+    text = HEXAGONAL.replace("hexagonal", pattern).replace("summit", geometry) + f"{rough}\n"
+    file = read(text, normal)
+    generous = read(text + "within = 0.05", normal)
+    n = len(file.scene)
+    assert n < len(generous.scene) / 4
+    same = cr.press(file.scene, approach=file.approach, load=file.load)
+    far = cr.press(generous.scene, approach=file.approach, load=file.load)
+    assert same.certificate.holds
+    assert far.certificate.holds
+    assert np.allclose(far.loads[:n], same.loads, rtol=1e-12, atol=0)
+    assert not far.loads[n:].any()
 
 
 def test_bases_and_bodies(read: Any) -> None:
-    radii = {"inf": INF, "[1.0, 2]": (1.0, 2.0), "[inf, 0.5]": (INF, 0.5), "[2.0, 2.0]": 2.0}
-    for radius, expected in (radii | {"[inf, inf]": INF}).items():
+    radii = {"inf": np.inf, "[1.0, 2]": (1.0, 2.0), "[inf, 0.5]": (np.inf, 0.5), "[2.0, 2.0]": 2.0}
+    for radius, expected in (radii | {"[inf, inf]": np.inf}).items():
         assert read(WITHIN, radius=radius).scene.sphere_radius == expected
     steel, soft = cr.Material.from_youngs(210e3, 0.3, 8e3), cr.Material.from_youngs(70e3, 0.33)
     assert read(WITHIN, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)

@@ -58,6 +58,8 @@ MISTAKES = [
     (scene_text(more="[frictoin]"), '[frictoin]: unknown table, did you mean "friction"?'),
     (scene_text(more="[shear]\nfractions = [0.1]"),
      "[friction]: missing table, needed with [shear]"),
+    (scene_text(more="[gradient]\nof = 'loss'\nfraction = 0.1"),
+     "[friction]: missing table, needed with the loss of [gradient]"),
     (scene_text(more="[solver]\nname = 'newtn'"),
      "[solver] name: found 'newtn', expected one of"),
     # stages

@@ -1,4 +1,4 @@
-"""A folder of results: what stays of earlier runs, where results are from, loops on request."""
+"""Results on disk: complete files and folders, earlier runs, where results are from; warnings."""
 
 import hashlib
 import json
@@ -6,9 +6,54 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from scene_files import FRICTION, HEXAGONAL, scene_text
 
 import convexrough as cr
+from convexrough.atomic import replacing
+from convexrough.run.results import MANIFEST, results_folder
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "result.csv"
+    path.write_text("old")
+
+    def write(error: Exception | None) -> None:
+        with replacing(path) as temporary:
+            temporary.write_text("new")
+            if error:
+                raise error
+
+    with pytest.raises(RuntimeError):
+        write(RuntimeError())
+    with pytest.raises(cr.FileError, match=r"result\.csv: cannot be written: No space left"):
+        write(OSError(28, "No space left on device"))
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
+    write(None)
+    assert path.read_text() == "new"
+    assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
+
+
+def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+
+    def write(error: BaseException | None, text: str, *, force: bool = False) -> None:
+        with results_folder(folder, force=force) as new:
+            new.text("one.csv", text)
+            assert not folder.exists() or (folder / "one.csv").read_text() == "1"
+            if error is not None:
+                raise error
+
+    with pytest.raises(cr.FileError, match="b: cannot hold results: No space"):
+        write(OSError(28, "No space left on device"), "half")
+    assert not list(tmp_path.iterdir())  # the parent folder is removed, too
+    write(None, "1")
+    assert json.loads((folder / MANIFEST).read_text())["files"] == ["one.csv"]
+    with pytest.raises(KeyboardInterrupt):
+        write(KeyboardInterrupt(), "2", force=True)
+    assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
+    assert (folder / "one.csv").read_text() == "1"
 
 
 def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:

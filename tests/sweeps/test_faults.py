@@ -3,6 +3,7 @@
 One kill in every run of the tests; with --full, 30 of the command and 30 of its workers.
 """
 
+import logging
 import os
 import random
 import shutil
@@ -15,9 +16,10 @@ from pathlib import Path
 
 import psutil
 import pytest
-from sweep_files import reported_to, same, swept, tables, toml
+from sweep_files import same, swept, tables, toml
 
 import convexrough as cr
+from convexrough.progress import logged
 from convexrough.sweeps.folder import open_folder
 
 CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
@@ -108,18 +110,18 @@ def test_workers_are_killed_at_any_moment(
     chance = random.Random(request.config.option.seed)
     left = kills(request)
 
-    def kill(news: str) -> None:
+    def kill(record: logging.LogRecord) -> None:
         nonlocal left
         workers = []
         for each in psutil.Process().children():
             with suppress(psutil.NoSuchProcess):  # it may just have ended
                 workers += [each] if "spawn_main" in " ".join(each.cmdline()) else []
-        if left and workers and "of 64 scenes" in news:
+        if left and workers and "of 64 scenes" in record.getMessage():
             chance.choice(workers).kill()
             left -= 1
 
     while True:
-        with suppress(cr.WorkerError), reported_to(kill):
+        with suppress(cr.WorkerError), logged(kill):
             cr.sweep(file / "a.toml", workers=1, out=file / "a-sweep", resume=True)
         if rows(file) == SCENES and left:
             shutil.rmtree(file / "a-sweep")
@@ -165,12 +167,13 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> Non
 FULL = """
 import resource
 import convexrough as cr
-from sweep_files import reported_to, swept
-def fill(news):
-    if "of 64 scenes" in news:
+from convexrough.progress import logged
+from sweep_files import swept
+def fill(record):
+    if "of 64 scenes" in record.getMessage():
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
 try:
-    with reported_to(fill):
+    with logged(fill):
         swept("a.toml", out="a-sweep")
 except cr.FileError as error:
     print(error)

@@ -1,5 +1,6 @@
 """The same table whoever computes it: processes, threads, Dask, in any order and any batches."""
 
+import logging
 import multiprocessing
 import os
 import random
@@ -11,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sweep_files import Deadly, reported_to, same, sweeping, swept, tables
+from sweep_files import Deadly, same, sweeping, swept, tables
 
 import convexrough as cr
+from convexrough.progress import logged
 from convexrough.sweeps import plan
 from convexrough.sweeps.batch import Tables
 from convexrough.sweeps.plan import Plan, plan_of
@@ -129,13 +131,13 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
     plan = plan_of(contents, Path("sweep"))
     killed: list[int] = []
 
-    def kill(news: str) -> None:
-        if "of 64 scenes" in news and not killed:
+    def kill(record: logging.LogRecord) -> None:
+        if "of 64 scenes" in record.getMessage() and not killed:
             killed.append(random.choice(workers))
             os.kill(killed[0], signal.SIGKILL)
 
     workers = [each.pid for each in cluster.workers.values()]
-    with dask(cluster.scheduler_address) as engine, reported_to(kill):
+    with dask(cluster.scheduler_address) as engine, logged(kill):
         table = run(plan, engine, out=tmp_path / "a")[0]
     assert killed
     assert same(table, swept(contents))

@@ -18,7 +18,7 @@ from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.loop import Loop
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
-from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit, same
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -61,11 +61,7 @@ class ShearResult(Result):
     stage: ShearStage
     printed: ClassVar[Mapping[str, str]] = {
         "fraction": "Q/(fP)",
-        "force": "force",
-        "displacement": "displacement",
-        "sliding": "sliding",
-        "partial": "partial",
-        "undecided": "undecided",
+        **same("force", "displacement", "sliding", "partial", "undecided"),
     }
 
     def proved_forces(self) -> Iterator[float]:
@@ -252,8 +248,4 @@ class HistoryResult(Steps):
     """The result of [history]: the state after each force."""
 
     stage: HistoryStage
-    printed: ClassVar[Mapping[str, str]] = {
-        "fraction": "Q/(fP)",
-        "displacement": "displacement",
-        "loss": "loss",
-    }
+    printed: ClassVar[Mapping[str, str]] = {"fraction": "Q/(fP)", **same("displacement", "loss")}

@@ -40,7 +40,6 @@ class GradientStage(Stage):
     """
 
     name = "gradient"
-    frictional = False
 
     of: Annotated[str, expected(f"one of: {', '.join(LETTERS)}", LETTERS.__contains__)]
     fraction: Share | None = None
@@ -54,6 +53,11 @@ class GradientStage(Stage):
     def sheared(self) -> bool:
         """True if the result depends on a shear force."""
         return NUMBERS[self.of] == "force"
+
+    @classmethod
+    def sheared_by(cls, keys: Any) -> str:
+        of = keys.get("of") if isinstance(keys, dict) else None
+        return f"the {of} of [gradient]" if of in ("loss", "displacement") else ""
 
     def mistakes_within(self) -> Iterator[Mistake]:
         if self.sheared and self.fraction is None:

@@ -44,11 +44,14 @@ class NormalStage(Stage):
     """The prescribed quantity: the approach of the two bodies [length] or the load [force]."""
 
     name = "normal"
-    frictional = False
     alternatives = ("approach", "load")
 
     approach: Finite | None = None
     load: Positive | None = None
+
+    @classmethod
+    def sheared_by(cls, keys: Any) -> str:
+        return ""
 
     def compute(self, contact: Contact) -> NormalResult:
         return NormalResult(self, contact, (contact,))

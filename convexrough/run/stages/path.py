@@ -27,6 +27,7 @@ from convexrough.run.stage import (
     Summary,
     numbers_of,
     plain,
+    same,
 )
 from convexrough.run.values import (
     FileTable,
@@ -130,11 +131,7 @@ class PathResult(Steps):
     printed: ClassVar[Mapping[str, str]] = {
         "load": "P",
         "force": "Q",
-        "displacement": "displacement",
-        "loss": "loss",
-        "stuck": "stuck",
-        "partial": "partial",
-        "sliding": "sliding",
+        **same("displacement", "loss", "stuck", "partial", "sliding"),
     }
 
     def lines(self) -> list[str]:
@@ -207,9 +204,7 @@ class SteadyResult(Result):
         "level": "stuck below load",
         "loss": "loss",
         "loss_error": "error",
-        "partial": "partial",
-        "sliding": "sliding",
-        "intermittent": "intermittent",
+        **same("partial", "sliding", "intermittent"),
     }
 
     def rows(self) -> list[Summary]:
@@ -240,8 +235,7 @@ class SteadyResult(Result):
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
         for losses in self.found[1:]:
-            printed = {"phase": "phase", "factor": "factor", "loss": "loss"}
-            printed |= {"smooth": "smooth sphere"}
+            printed = {**same("phase", "factor", "loss"), "smooth": "smooth sphere"}
             rows, title = rows_of(_by_phase(losses)), "loss against phase"
             said += ["", *self.printed_table("phase_losses", rows, printed, title, MOST_PRINTED)]
         return said
