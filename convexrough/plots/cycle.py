@@ -16,7 +16,7 @@ from convexrough.friction.cycle import loops as steady_loops
 from convexrough.plots import style
 from convexrough.plots.load_plane import draw_closed
 from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
@@ -98,8 +98,7 @@ def loops_figure(
         which `cycles` are drawn
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
+    figure, (whole, upright, single) = panels(DOUBLE, 3.0, 1, 3, width_ratios=[1, 1, 1.1])
     x, q = scale.displacement, scale.force
     for cycle, loop in zip(cycles, loops, strict=True):
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
@@ -143,7 +142,7 @@ def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     draw_loop(axes, scale, loop.displacements, loop.forces)
     if scale.sphere is not None:
         draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
-    axes.legend(fontsize=TICK, frameon=False, loc="upper left")
+    style.legend_inside(axes)
     return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
@@ -209,8 +208,7 @@ def _range(cycle: Cycle, scale: Scale) -> str:
 
 def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     """The figure of energy against amplitude; `cycles` are in order of amplitude."""
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    figure, (loss, ratio) = panels(DOUBLE, 3.0, 1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]
     amplitude = np.array([each.force_amplitude for each in some])
     rough = np.array([each.loss for each in some])
@@ -228,7 +226,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     style.few_ticks(loss.xaxis)
     style.few_ticks(loss.yaxis)
     style.label(loss, "amplitude of " + q.label("Q"), w.label("W"))
-    loss.legend(loc="upper left", fontsize=TICK, frameon=False)
+    style.legend_inside(loss)
     style.title(loss, "energy lost per cycle")
     if scale.sphere is None:
         style.say_nothing(ratio, "no smooth reference")

@@ -13,7 +13,7 @@ from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
 from convexrough.plots.measure import Scale, literal, measure, quantity
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -134,8 +134,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
     advised pruning: at least 0 %   ($Sz$ = 2.85)
     """
-    figure = Figure(figsize=(SINGLE, 5.0), layout="constrained")
-    upper, middle, lower = figure.subplots(3, 1)
+    figure, (upper, middle, lower) = panels(SINGLE, 5.0, 3, 1)
     draw_provability(upper, curve)
     upper.legend(fontsize=TICK - 1, frameon=False, loc="lower left", handlelength=1.6)
     for axes, values, limit, name in (
@@ -184,8 +183,7 @@ def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> 
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
-    figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(SINGLE + 0.9, 4.1)
     image = draw_surface(axes, surface)
     positions, handles, shown = summits.positions, [], f"{len(summits):,}"
     if contact is not None and contact.loads.any():
@@ -227,8 +225,7 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
+    figure, (left, middle, right) = panels(DOUBLE, 2.7, 1, 3)
     moments, level = surface.moments, summits.origin.level
     edges = _bins(maxima.heights - level)
     _draw_both(left, edges, maxima.heights - level, summits.heights - level)
