@@ -57,19 +57,20 @@ def cycle_figures(
         return style.no_contact("hysteresis", *(["loss"] if several else []))
     scale = Scale(contact)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
+    cycles = [cycles[i] for i in by_range]
+    loops = None if loops is None else [loops[i] for i in by_range]
     r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
     known = np.arange(len(r)) if loops is None else loops[0].asperities
     rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
     chosen = known[rings].tolist() if asperities is None else list(asperities)
     names = [f"{scale.length.of(each):.3g}" for each in r[chosen]]
-    shown = _spread([cycles[i].force_amplitude for i in by_range])
-    some = [cycles[by_range[i]] for i in shown]
-    theirs = None if loops is None else [loops[by_range[i]] for i in shown]
+    shown = _spread([each.force_amplitude for each in cycles])
+    some, theirs = [cycles[i] for i in shown], loops and [loops[i] for i in shown]
     meaning = scale.length.short("r")
     figure = loops_figure(some, chosen, names, meaning, scale, theirs, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
-        figures["loss"] = _loss_figure([cycles[i] for i in by_range], scale)
+        figures["loss"] = _loss_figure(cycles, scale)
     return figures
 
 
@@ -102,10 +103,7 @@ def loops_figure(
     x, q = scale.displacement, scale.force
     for cycle, loop in zip(cycles, loops, strict=True):
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
-            draw_loop(axes, scale, loop.displacements, loop.forces, slope)
-            if scale.sphere is not None:
-                moved = smooth_loop(scale.sphere, loop.forces)
-                draw_loop(axes, scale, moved, loop.forces, slope, smooth=True)
+            draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
         upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
                          textcoords="offset points", fontsize=7, va="center",
@@ -138,22 +136,19 @@ def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     if np.ptp(cycle.loads) > 0:
         return draw_closed(axes, cycle)
     scale = Scale(cycle.contact)
-    loop = cycle.loop(asperities=[])
-    draw_loop(axes, scale, loop.displacements, loop.forces)
-    if scale.sphere is not None:
-        draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
+    draw_loop(axes, scale, cycle.loop(asperities=[]))
     style.legend_inside(axes)
     return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
-def draw_loop(
-    axes: Axes, scale: Scale, X: Array, Q: Array, slope: float = 0.0, *, smooth: bool = False
-) -> None:
-    """Draw Q against X - slope * Q, for the rough contact or, if `smooth`, for the smooth one."""
-    rough: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
-    other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
-    look = other if smooth else rough
-    axes.plot(scale.displacement.of(X - slope * Q), scale.force.of(Q), **look)
+def draw_loop(axes: Axes, scale: Scale, loop: Loop, slope: float = 0.0) -> None:
+    """Draw Q against X - slope * Q, for the rough contact and, if there is one, the smooth one."""
+    Q = loop.forces
+    rough = scale.displacement.of(loop.displacements - slope * Q)
+    axes.plot(rough, scale.force.of(Q), color=ROUGH, lw=1.2, label="asperities")
+    if scale.sphere is not None:
+        smooth = scale.displacement.of(smooth_loop(scale.sphere, Q) - slope * Q)
+        axes.plot(smooth, scale.force.of(Q), color=SMOOTH, lw=1.0, ls=DASHED, label=scale.name)
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
