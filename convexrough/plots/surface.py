@@ -6,10 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
-from convexrough.arrays import Array, Number
+from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
 from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
@@ -23,13 +24,6 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     UNSURE,
-    bar,
-    disc_handle,
-    label,
-    legend_outside,
-    round_ticks,
-    title,
-    write_beside,
 )
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
@@ -83,9 +77,9 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
     whole = (-width, width, -height, height)
     image = axes.imshow(z.of(surface.heights), origin="lower", extent=whole, cmap="gray",
                         interpolation="nearest", rasterized=True)  # fmt: skip
-    label(axes, x.short("x"), x.short("y"))
-    axes.xaxis.set_major_locator(round_ticks())
-    axes.yaxis.set_major_locator(round_ticks())
+    style.label(axes, x.short("x"), x.short("y"))
+    axes.xaxis.set_major_locator(style.round_ticks())
+    axes.yaxis.set_major_locator(style.round_ticks())
     return image
 
 
@@ -111,7 +105,7 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """Draw the number of touching summits against the pruning; marks show what is proved."""
-    axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
+    axes.plot(curve.prune, curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
@@ -120,7 +114,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     axes.yaxis.set_major_formatter("{x:,g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     _name_prunings(axes, curve)
-    label(axes, "pruning  [% of $Sz$]", "number")
+    style.label(axes, "pruning  [% of $Sz$]", "number")
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
@@ -146,40 +140,37 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
         _name_prunings(axes, curve)
         axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
-        label(axes, "", name)
+        style.label(axes, "", name)
     lower.set_xlabel("pruning  [% of $Sz$]", fontsize=LABEL)
     upper.set_xlabel("")
     first = curve.trusted_from
     until = float(curve.prune[-1]) if np.isnan(first) else first
     for axes in (upper, middle, lower):
-        axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
-        axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
+        axes.axvspan(0.0, until, color="0.92", lw=0.0, zorder=0)
+        axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
     advised = "none is enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    title(upper, f"advised pruning: {advised}{size}")
+    style.title(upper, f"advised pruning: {advised}{size}")
     return figure
-
-
-def _place(prune: Number) -> Number:
-    """The abscissa of a pruning: its square root, which spreads small values and includes 0."""
-    return np.sqrt(prune)
 
 
 def _name_prunings(axes: Axes, curve: Provability) -> None:
     top = max(float(curve.prune[-1]), PRUNINGS[1])
-    axes.set_xlim(0.0, 1.02 * float(_place(top)))
     shown = [each for each in PRUNINGS if each <= top]
-    axes.set_xticks([float(_place(each)) for each in shown], [f"{100 * each:g}" for each in shown])
+    axes.set_xlim(0.0, 1.02**2 * top)
+    axes.set_xscale("function", functions=(np.sqrt, np.square))  # spreads small values, includes 0
+    axes.set_xticks(shown, [f"{100 * each:g}" for each in shown])
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> None:
-    axes.plot(_place(curve.prune), values, "-", lw=0.9, color=FAINT, zorder=1)
+    axes.plot(curve.prune, values, "-", lw=0.9, color=FAINT, zorder=1)
     for scope, (mark, colour) in SCOPES.items():
         chosen = curve.scope == scope
         if chosen.any() and np.isfinite(values[chosen]).any():
             said = f"{name}, proof: {scope}" if name else "_nothing"
-            axes.plot(_place(curve.prune[chosen]), values[chosen], mark, ls="", ms=4.5, mew=0.0,
+            axes.plot(curve.prune[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0,
                       color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
 
 
@@ -190,7 +181,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     if contact is not None and contact.loads.any():
         edge = _draw_contacts(axes, contact, length)
         contacts = f"contacts ({np.count_nonzero(contact.loads):,})"
-        handles = [disc_handle(UNSURE, contacts)]
+        handles = [style.disc_handle(UNSURE, contacts)]
         if Scale(contact).axes:
             line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="contact if smooth")
             handles.append(line)
@@ -200,9 +191,9 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         width, height = (min(edge, length.of(side / 2)) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
     draw_summits(axes, positions)
-    bar(axes, image, z.short("z"), above=True)
-    handles.insert(0, disc_handle(SUMMIT, f"summits ({shown})"))
-    legend_outside(figure, handles, "lower center", 3)
+    style.bar(axes, image, z.short("z"), above=True)
+    handles.insert(0, style.disc_handle(SUMMIT, f"summits ({shown})"))
+    style.legend_outside(figure, handles, "lower center", 3)
     return figure
 
 
@@ -219,7 +210,7 @@ def _draw_contacts(axes: Axes, contact: Contact, length: Measure) -> float:
     pairs, _ = crowded(contact)
     for i, j in pairs[:1]:
         middle = contact.scene.asperities.positions[[i, j]].mean(axis=0)
-        write_beside(axes, f"{i}, {j}", length.of(middle))
+        style.write_beside(axes, f"{i}, {j}", length.of(middle))
     return edge
 
 
@@ -236,9 +227,9 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
         normal = np.exp(-(((z - mean) / spread) ** 2) / 2) / (spread * np.sqrt(2 * np.pi))
         expected = moments.density * summits.origin.area * (edges[1] - edges[0])
         left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
-    left.xaxis.set_major_locator(round_ticks(4))
+    left.xaxis.set_major_locator(style.round_ticks(4))
     left.xaxis.get_offset_text().set_fontsize(TICK)
-    label(left, unit.short(r"\mathrm{height}"), "summits")
+    style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
     unit = measure(float(np.median(maxima.tip_radii)), surface.unit)
     every, some = (unit.of(each.tip_radii) for each in (maxima, summits))
@@ -248,15 +239,15 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     middle.axvline(unit.of(1 / moments.mean_curvature), color=SMOOTH, ls="--", lw=1.1)
     span = edges[-1] / edges[0]
     powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
-    middle.xaxis.set_major_locator(powers if span > 10 else round_ticks(4))
+    middle.xaxis.set_major_locator(powers if span > 10 else style.round_ticks(4))
     middle.xaxis.set_major_formatter("{x:g}")
-    label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
+    style.label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
     middle.xaxis.set_minor_formatter(NullFormatter())
 
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
     right.set_xlim(0.0, 1.0)
-    label(right, "eccentricity of the tip", "")
-    legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
+    style.label(right, "eccentricity of the tip", "")
+    style.legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
     return figure
 
 
