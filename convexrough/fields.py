@@ -195,8 +195,6 @@ def _sum_over_discs(
     places = _places(points)
     flat = places.reshape(-1, 2)
     total = np.zeros(len(flat))
-    if len(flat) == 0:
-        return total.reshape(places.shape[:-1])
     tree = cKDTree(flat)
     octaves = np.frexp(radii)[1]
     for octave in np.unique(octaves):

@@ -20,8 +20,8 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
 from convexrough.plots.measure import Measure, Scale, measure, quantity
-from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.press import pressure_figure
+from convexrough.plots.notebook import Figure, Figures, panels
+from convexrough.plots.press import map_and_profile, pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
 from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
 from convexrough.sphere.smooth import smooth
@@ -56,8 +56,8 @@ def paper_figures(found: PaperStates) -> Figures:
 
 def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     contact, named, onsets = found.contact, found.named, found.onsets
-    figure = Figure(figsize=(DOUBLE, 3.4), layout="constrained")
-    chart, bars = figure.subplots(1, 2, width_ratios=[1.0, 0.9], gridspec_kw={"wspace": 0.06})
+    how = {"width_ratios": [1.0, 0.9], "gridspec_kw": {"wspace": 0.06}}
+    figure, (chart, bars) = panels(DOUBLE, 3.4, 1, 2, **how)
     draw_state(chart, found.half, scale)
     left, right = chart.get_xlim()
     chart.set(xlim=(1.08 * left, 1.08 * right), ylim=(1.08 * left, 1.08 * right))  # for letters
@@ -80,7 +80,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     bars.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -0.6))
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
-        bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
+        bars.text(1.02, float(row), f"{value:.4f}", fontsize=TICK, va="center")
     limit = f"$fP$ = {quantity(scale.limit, '')}"
     style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     style.title(bars, "light: stick in part; dark: slide")
@@ -99,10 +99,8 @@ def _tractions(scale: Scale) -> tuple[float, Measure]:
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     centre = next(iter(found.firsts.values()))
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
+    figure, (chart, profile) = map_and_profile()
     _draw_tractions(chart, state, scale, unit)
-    chart.set_anchor("E")
     style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
@@ -140,8 +138,7 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 def _section_figure(found: PaperStates, scale: Scale) -> Figure:
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     sphere = smooth(contact.scene, load=contact.load)
-    figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(DOUBLE, 2.9)
     points, radii = contact.scene.contact_points, contact.contact_radii
     edge = 1.06 * max(scale.typical, float((np.hypot(*points.T) + radii)[contact.loads > 0].max()))
     x = np.union1d(
@@ -168,8 +165,7 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
 
 def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
     """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
-    figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
-    left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    figure, (left, right) = panels(DOUBLE, 3.2, 1, 2, gridspec_kw={"wspace": 0.06})
     firsts, path, share = found.firsts, found.path, found.fractions
     force = 100.0 * path.asperity_forces / found.limit
     moved = scale.displacement.of(path.asperity_displacements)
@@ -217,8 +213,7 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
 
 def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     """The figure of energy per cycle against amplitude, rough and smooth, with a zoom."""
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    figure, (whole, zoom) = panels(DOUBLE, 3.0, 1, 2, gridspec_kw={"wspace": 0.06})
     energy = scale.energy(max(each.loss for each in found.cycles))
     rough = np.array([energy.of(each.loss) for each in found.cycles])
     smooth = energy.of(scale.work) * np.array([each.smooth_normalised for each in found.cycles])
@@ -238,7 +233,7 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     _mark_crossing(zoom, found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth)))
     style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
     style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
-    whole.legend(loc="upper left", fontsize=TICK, frameon=False)
+    style.legend_inside(whole)
     style.title(whole, "energy lost per cycle")
     style.title(zoom, "zoom")
     return figure

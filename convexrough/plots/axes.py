@@ -13,7 +13,7 @@ from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath
 from convexrough.plots.asperity_map import draw_contact, status_handles, status_layers
 from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, image_tag, new_axes
+from convexrough.plots.notebook import image_tag, new_axes, panels
 from convexrough.plots.style import SINGLE, legend_below, say_nothing
 
 #: The module and the function that draw a result into axes, by the name of the result's class. A
@@ -78,8 +78,7 @@ def thumbnail(result: object) -> str:
     >>> print(cr.plots.thumbnail(contact)[:36])
     <img alt="Contact" src="data:image/p
     """
-    figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(SINGLE, 3.0)
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
         status = result.status if isinstance(result, Cycle) else result.status[-1]
         scale, radii = Scale(result.contact), result.contact.contact_radii

@@ -17,7 +17,7 @@ from convexrough.friction.loop import Loop
 from convexrough.plots import style
 from convexrough.plots.load_plane import draw_closed
 from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
@@ -58,19 +58,20 @@ def cycle_figures(
         return style.no_contact("hysteresis", *(["loss"] if several else []))
     scale = Scale(contact)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
+    cycles = [cycles[i] for i in by_range]
+    loops = None if loops is None else [loops[i] for i in by_range]
     r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
     known = np.arange(len(r)) if loops is None else loops[0].asperities
     rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
     chosen = known[rings].tolist() if asperities is None else list(asperities)
     names = [f"{scale.length.of(each):.3g}" for each in r[chosen]]
-    shown = _spread([cycles[i].force_amplitude for i in by_range])
-    some = [cycles[by_range[i]] for i in shown]
-    theirs = None if loops is None else [loops[by_range[i]] for i in shown]
+    shown = _spread([each.force_amplitude for each in cycles])
+    some, theirs = [cycles[i] for i in shown], loops and [loops[i] for i in shown]
     meaning = scale.length.short("r")
     figure = loops_figure(some, chosen, names, meaning, scale, theirs, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
-        figures["loss"] = _loss_figure([cycles[i] for i in by_range], scale)
+        figures["loss"] = _loss_figure(cycles, scale)
     return figures
 
 
@@ -99,15 +100,11 @@ def loops_figure(
         which `cycles` are drawn
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
+    figure, (whole, upright, single) = panels(DOUBLE, 3.0, 1, 3, width_ratios=[1, 1, 1.1])
     x, q = scale.displacement, scale.force
     for cycle, loop in zip(cycles, loops, strict=True):
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
-            draw_loop(axes, scale, loop.displacements, loop.forces, slope)
-            if scale.sphere is not None:
-                moved = smooth_loop(scale.sphere, loop.forces)
-                draw_loop(axes, scale, moved, loop.forces, slope, smooth=True)
+            draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
         upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
                          textcoords="offset points", fontsize=7, va="center",
@@ -140,22 +137,19 @@ def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     if np.ptp(cycle.loads) > 0:
         return draw_closed(axes, cycle)
     scale = Scale(cycle.contact)
-    loop = cycle.loop(asperities=[])
-    draw_loop(axes, scale, loop.displacements, loop.forces)
-    if scale.sphere is not None:
-        draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
-    axes.legend(fontsize=TICK, frameon=False, loc="upper left")
+    draw_loop(axes, scale, cycle.loop(asperities=[]))
+    style.legend_inside(axes)
     return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
-def draw_loop(
-    axes: Axes, scale: Scale, X: Array, Q: Array, slope: float = 0.0, *, smooth: bool = False
-) -> None:
-    """Draw Q against X - slope * Q, for the rough contact or, if `smooth`, for the smooth one."""
-    rough: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
-    other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
-    look = other if smooth else rough
-    axes.plot(scale.displacement.of(X - slope * Q), scale.force.of(Q), **look)
+def draw_loop(axes: Axes, scale: Scale, loop: Loop, slope: float = 0.0) -> None:
+    """Draw Q against X - slope * Q, for the rough contact and, if there is one, the smooth one."""
+    Q = loop.forces
+    rough = scale.displacement.of(loop.displacements - slope * Q)
+    axes.plot(rough, scale.force.of(Q), color=ROUGH, lw=1.2, label="asperities")
+    if scale.sphere is not None:
+        smooth = scale.displacement.of(smooth_loop(scale.sphere, Q) - slope * Q)
+        axes.plot(smooth, scale.force.of(Q), color=SMOOTH, lw=1.0, ls=DASHED, label=scale.name)
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
@@ -210,8 +204,7 @@ def _range(cycle: Cycle, scale: Scale) -> str:
 
 def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     """The figure of energy against amplitude; `cycles` are in order of amplitude."""
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    figure, (loss, ratio) = panels(DOUBLE, 3.0, 1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]
     amplitude = np.array([each.force_amplitude for each in some])
     rough = np.array([each.loss for each in some])
@@ -229,7 +222,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     style.few_ticks(loss.xaxis)
     style.few_ticks(loss.yaxis)
     style.label(loss, "amplitude of " + q.label("Q"), w.label("W"))
-    loss.legend(loc="upper left", fontsize=TICK, frameon=False)
+    style.legend_inside(loss)
     style.title(loss, "energy lost per cycle")
     if scale.sphere is None:
         style.say_nothing(ratio, "no smooth reference")

@@ -16,7 +16,7 @@ from convexrough.friction.phases import PhaseLosses
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.measure import Measure, Scale, measure, quantity
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE
 from convexrough.scene.rings import evenly_chosen
 
@@ -40,8 +40,7 @@ def steady_figures(found: Cycle) -> Figures:
     >>> print(*cr.plots.steady_figures(found))
     steady
     """
-    figure = Figure(figsize=(DOUBLE, 3.5), layout="constrained")
-    plane, place = figure.subplots(1, 2)
+    figure, (plane, place) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
     length = Scale(found.contact).length
     layers = status_layers(found.status, found.contact.contact_radii)
@@ -64,8 +63,8 @@ def phase_figures(found: PhaseLosses) -> Figures:
     >>> print(*cr.plots.phase_figures(found))
     phase_losses
     """
-    figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
-    draw_losses(figure.subplots(), found)
+    figure, (axes,) = panels(SINGLE, 3.4)
+    draw_losses(axes, found)
     return Figures({"phase_losses": figure})
 
 

@@ -37,6 +37,14 @@ class Figure(MatplotlibFigure):
         return as_png(self)
 
 
+def panels(
+    width: float, height: float, rows: int = 1, columns: int = 1, **how: Any
+) -> tuple[Figure, list[Axes]]:
+    """A new figure of this size [inches], and its axes, row by row."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how).ravel().tolist()
+
+
 class ShownAxes(Axes):
     """Axes whose figure notebooks display, without pyplot."""
 

@@ -17,7 +17,7 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.load_plane import draw_path
 from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import DOUBLE, MOST_NUMBERS, TICK
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
@@ -52,10 +52,8 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     if path.load_constant and not path.contact.loads.any():
         return style.no_contact("history")
     scale = Scale(path.contact)
-    figure = Figure(figsize=(DOUBLE, 3.0 if path.load_constant else 3.2), layout="constrained")
-    *plane, loop, cost = figure.subplots(
-        1, 2 if path.load_constant else 3, gridspec_kw={"wspace": 0.06}
-    )
+    height, columns = (3.0, 2) if path.load_constant else (3.2, 3)
+    figure, (*plane, loop, cost) = panels(DOUBLE, height, 1, columns, gridspec_kw={"wspace": 0.06})
     fine = fine or between(path)
     for axes in plane:
         draw_path(axes, path)
@@ -122,12 +120,11 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     chosen = evenly_chosen(range(len(path.loads)), MOST_MAPS)
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
-    figure = Figure(figsize=(DOUBLE, 0.5 + 1.9 * rows), layout="constrained")
-    places = figure.subplots(rows, columns, squeeze=False)
+    figure, places = panels(DOUBLE, 0.5 + 1.9 * rows, rows, columns)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
     room = radii[chosen].max(axis=0)
-    for axes, k in zip(places.ravel(), chosen, strict=False):
+    for axes, k in zip(places, chosen, strict=False):
         layers = status_layers(path.status[k], radii[k])
         draw_map(axes, scene.contact_points, layers, scale.length, room=room)
         slide = int((path.status[k] == "sliding").sum())
@@ -135,7 +132,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelbottom=False, labelleft=False)
-    for axes in places.ravel()[len(chosen) :]:
+    for axes in places[len(chosen) :]:
         axes.set_axis_off()
     handles: Any = status_handles(np.unique(path.status[chosen]))
     if handles:

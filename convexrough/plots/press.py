@@ -14,7 +14,7 @@ from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, draw_values
 from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE
 from convexrough.sphere import hertz
 
@@ -40,9 +40,7 @@ def press_figures(contact: Contact) -> Figures:
 def pressure_figure(scale: Scale) -> Figure:
     """Map and profile of the pressure."""
     contact = scale.contact
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
-    chart.set_anchor("E")
+    figure, (chart, profile) = map_and_profile()
     style.label(profile, scale.length.label("x"), scale.pressure.label("p"))
     colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
@@ -55,6 +53,14 @@ def pressure_figure(scale: Scale) -> Figure:
         _draw_peaks(profile, scale)
     profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
     return figure
+
+
+def map_and_profile() -> tuple[Figure, tuple[Axes, Axes]]:
+    """A figure with axes for a map, and beside them axes for the same along a line."""
+    how = {"width_ratios": [1.0, 1.05], "gridspec_kw": {"wspace": 0.08}}
+    figure, (chart, profile) = panels(DOUBLE, 3.0, 1, 2, **how)
+    chart.set_anchor("E")
+    return figure, (chart, profile)
 
 
 def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
@@ -133,8 +139,7 @@ def census(contact: Contact) -> str:
 
 def _loads_figure(scale: Scale) -> Figure:
     contact = scale.contact
-    figure = Figure(figsize=(SINGLE, 2.6), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(SINGLE, 2.6)
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
     if contact.certificate.scope == "none":  # mark only undecided asperities with a load

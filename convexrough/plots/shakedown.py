@@ -14,7 +14,7 @@ from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
 #: Number of points of the map along each axis.
@@ -35,8 +35,8 @@ def shakedown_figures(found: Shakedown) -> Figures:
     >>> print(*cr.plots.shakedown_figures(found))
     shakedown shakedown_map
     """
-    figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
-    draw_factors(figure.subplots(), found)
+    figure, (axes,) = panels(SINGLE + 0.7, 3.4)
+    draw_factors(axes, found)
     figures = Figures({"shakedown": figure})
     if found.kind == "exact" and len(onsets := _onsets(found)) > 1:
         figures["shakedown_map"] = _map(found, onsets)
@@ -92,8 +92,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
     """The map: how many asperities slide or open in every cycle; hatched where |Q| > f P."""
-    figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(SINGLE, 3.4)
     f = found.scene.friction or 1.0
     varies = np.ptp(found.load_amplitudes) > 0
     unit_p = np.ptp(found.load_amplitudes) / 2.0 / found.load

@@ -21,7 +21,7 @@ from convexrough.plots.asperity_map import (
     status_layers,
 )
 from convexrough.plots.measure import Scale, quantity
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
@@ -53,17 +53,16 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     doubted = any(style.not_proved(state.certificate.scope, state.status) for state in shown)
     above = 0.17 * (1 + (columns == 4) + doubted)
     height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
-    figure = Figure(figsize=(width, height), layout="constrained")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, state in zip(panels, shown, strict=False):
+    figure, maps = panels(width, height, rows, columns, sharex=True, sharey=True)
+    for axes, state in zip(maps, shown, strict=False):
         draw_state(axes, state, scale)
         style.title(axes, state_title(state, scale, narrow=columns == 4), "center")
         axes.set(xlabel="", ylabel="")
         if columns == 4:
             axes.xaxis.set_major_locator(style.round_ticks(4))
-    for axes in panels[len(shown) :]:
+    for axes in maps[len(shown) :]:
         axes.remove()
-    for axes in panels[len(shown) - columns : len(shown)]:
+    for axes in maps[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
     limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)

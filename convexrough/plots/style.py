@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from convexrough.arrays import Array
 from convexrough.plots.measure import literal as literal
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figures, panels
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -70,6 +70,10 @@ def few_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def legend_inside(axes: Axes) -> None:
+    axes.legend(loc="upper left", fontsize=TICK, frameon=False)
+
+
 def legend_above(axes: Axes, ncols: int = 3) -> None:
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=ncols, fontsize=TICK,
                 frameon=False, borderpad=0.2, columnspacing=1.0, handletextpad=0.4,
@@ -102,10 +106,11 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
 
 def no_contact(*stems: str) -> Figures:
     """Figures under these names, each with the text that nothing touches."""
-    figures = {stem: Figure(figsize=(SINGLE, 2.6), layout="constrained") for stem in stems}
-    for figure in figures.values():
-        say_nothing(figure.subplots())
-    return Figures(figures)
+    figures = Figures()
+    for stem in stems:
+        figures[stem], (axes,) = panels(SINGLE, 2.6)
+        say_nothing(axes)
+    return figures
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
-from convexrough.arrays import Array, Number
+from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
-from convexrough.plots.measure import Scale, literal, measure, quantity
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.measure import Measure, Scale, measure, quantity
+from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -24,13 +24,6 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     UNSURE,
-    bar,
-    disc_handle,
-    label,
-    legend_outside,
-    round_ticks,
-    title,
-    write_beside,
 )
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
@@ -79,27 +72,29 @@ def surface_figures(
 
 def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
     """Draw the heights in greys, with labelled axes; return the image."""
-    width, height = surface.size
-    whole = (-width / 2, width / 2, -height / 2, height / 2)
-    image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
+    x, z = _measures(surface)
+    width, height = (x.of(side / 2) for side in surface.size)
+    whole = (-width, width, -height, height)
+    image = axes.imshow(z.of(surface.heights), origin="lower", extent=whole, cmap="gray",
                         interpolation="nearest", rasterized=True)  # fmt: skip
-    _label_places(axes, surface)
-    axes.xaxis.set_major_locator(round_ticks())
-    axes.yaxis.set_major_locator(round_ticks())
+    style.label(axes, x.short("x"), x.short("y"))
+    axes.xaxis.set_major_locator(style.round_ticks())
+    axes.yaxis.set_major_locator(style.round_ticks())
     return image
 
 
-def _label_places(axes: Axes, surface: Surface) -> None:
-    most = axes.get_xlim()[1]
-    label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
-          _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
+def _measures(surface: Surface) -> tuple[Measure, Measure]:
+    """The measures of places on the map, and of heights."""
+    highest = float(np.abs(surface.heights).max())
+    return measure(surface.size[0] / 2, surface.unit), measure(highest, surface.unit)
 
 
 def draw_summit_map(axes: Axes, summits: Summits) -> None:
     """Draw a disc at each summit."""
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
+    length = measure(float(np.ptp(summits.positions)) / 2, summits.unit)
+    draw_map(axes, summits.positions, [layer], length)
 
 
 def draw_summits(axes: Axes, positions: Array) -> None:
@@ -110,7 +105,7 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """Draw the number of touching summits against the pruning; marks show what is proved."""
-    axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
+    axes.plot(curve.prune, curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
@@ -119,7 +114,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     axes.yaxis.set_major_formatter("{x:,g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     _name_prunings(axes, curve)
-    label(axes, "pruning  [% of $Sz$]", "number")
+    style.label(axes, "pruning  [% of $Sz$]", "number")
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
@@ -134,8 +129,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
     advised pruning: at least 0 %   ($Sz$ = 2.85)
     """
-    figure = Figure(figsize=(SINGLE, 5.0), layout="constrained")
-    upper, middle, lower = figure.subplots(3, 1)
+    figure, (upper, middle, lower) = panels(SINGLE, 5.0, 3, 1)
     draw_provability(upper, curve)
     upper.legend(fontsize=TICK - 1, frameon=False, loc="lower left", handlelength=1.6)
     for axes, values, limit, name in (
@@ -146,119 +140,114 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
         _name_prunings(axes, curve)
         axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
-        label(axes, "", name)
+        style.label(axes, "", name)
     lower.set_xlabel("pruning  [% of $Sz$]", fontsize=LABEL)
     upper.set_xlabel("")
     first = curve.trusted_from
     until = float(curve.prune[-1]) if np.isnan(first) else first
     for axes in (upper, middle, lower):
-        axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
-        axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
+        axes.axvspan(0.0, until, color="0.92", lw=0.0, zorder=0)
+        axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
     advised = "none is enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    title(upper, f"advised pruning: {advised}{size}")
+    style.title(upper, f"advised pruning: {advised}{size}")
     return figure
-
-
-def _place(prune: Number) -> Number:
-    """The abscissa of a pruning: its square root, which spreads small values and includes 0."""
-    return np.sqrt(prune)
 
 
 def _name_prunings(axes: Axes, curve: Provability) -> None:
     top = max(float(curve.prune[-1]), PRUNINGS[1])
-    axes.set_xlim(0.0, 1.02 * float(_place(top)))
     shown = [each for each in PRUNINGS if each <= top]
-    axes.set_xticks([float(_place(each)) for each in shown], [f"{100 * each:g}" for each in shown])
+    axes.set_xlim(0.0, 1.02**2 * top)
+    axes.set_xscale("function", functions=(np.sqrt, np.square))  # spreads small values, includes 0
+    axes.set_xticks(shown, [f"{100 * each:g}" for each in shown])
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> None:
-    axes.plot(_place(curve.prune), values, "-", lw=0.9, color=FAINT, zorder=1)
+    axes.plot(curve.prune, values, "-", lw=0.9, color=FAINT, zorder=1)
     for scope, (mark, colour) in SCOPES.items():
         chosen = curve.scope == scope
         if chosen.any() and np.isfinite(values[chosen]).any():
             said = f"{name}, proof: {scope}" if name else "_nothing"
-            axes.plot(_place(curve.prune[chosen]), values[chosen], mark, ls="", ms=4.5, mew=0.0,
+            axes.plot(curve.prune[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0,
                       color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
-    figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
-    axes = figure.subplots()
-    image = draw_surface(axes, surface)
-    positions, handles, shown = summits.positions, [], f"{len(summits):,}"
+    figure, (axes,) = panels(SINGLE + 0.9, 4.1)
+    image, (length, z) = draw_surface(axes, surface), _measures(surface)
+    positions, handles, shown = length.of(summits.positions), [], f"{len(summits):,}"
     if contact is not None and contact.loads.any():
-        edge = _draw_contacts(axes, contact)
+        edge = _draw_contacts(axes, contact, length)
         contacts = f"contacts ({np.count_nonzero(contact.loads):,})"
-        handles = [disc_handle(UNSURE, contacts)]
+        handles = [style.disc_handle(UNSURE, contacts)]
         if Scale(contact).axes:
             line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="contact if smooth")
             handles.append(line)
         positions = positions[np.abs(positions).max(axis=1) <= edge]
         if len(positions) < len(summits):
             shown = f"{len(positions):,} of {shown}"
-        width, height = (min(edge, side / 2) for side in surface.size)
+        width, height = (min(edge, length.of(side / 2)) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
-        _label_places(axes, surface)
     draw_summits(axes, positions)
-    scale = bar(axes, image, "")
-    highest = float(np.abs(surface.heights).max())
-    title(scale.ax, _count(scale.ax.yaxis, "$z$", surface.unit, highest), "center")
-    handles.insert(0, disc_handle(SUMMIT, f"summits ({shown})"))
-    legend_outside(figure, handles, "lower center", 3)
+    style.bar(axes, image, z.short("z"), above=True)
+    handles.insert(0, style.disc_handle(SUMMIT, f"summits ({shown})"))
+    style.legend_outside(figure, handles, "lower center", 3)
     return figure
 
 
-def _draw_contacts(axes: Axes, contact: Contact) -> float:
+def _draw_contacts(axes: Axes, contact: Contact, length: Measure) -> float:
     """Draw contacts, smooth contact and most crowded pair; return half the width of the view."""
-    points, radii = contact.scene.contact_points, contact.contact_radii
+    points, radii = length.of(contact.scene.contact_points), length.of(contact.contact_radii)
     touching, scale = contact.loads > 0, Scale(contact)
-    reach = np.abs(points - scale.centre).max(axis=1) + radii
-    edge = 1.2 * max(scale.typical, float(reach[touching].max()))
+    reach = np.abs(points - length.of(scale.centre)).max(axis=1) + radii
+    edge = 1.2 * float(max(length.of(scale.typical), reach[touching].max()))
     least = edge * float(np.clip(0.1 / np.sqrt(touching.sum()), 0.002, 0.01))
     discs = np.where(touching, np.maximum(radii, least), 0.0)
     draw_discs(axes, points, Layer("_contacts", discs, UNSURE, "white"))
-    draw_outline(axes, scale.axes, colour="white")
+    draw_outline(axes, [length.of(axis) for axis in scale.axes], colour="white")
     pairs, _ = crowded(contact)
     for i, j in pairs[:1]:
-        write_beside(axes, f"{i}, {j}", contact.scene.asperities.positions[[i, j]].mean(axis=0))
+        middle = contact.scene.asperities.positions[[i, j]].mean(axis=0)
+        style.write_beside(axes, f"{i}, {j}", length.of(middle))
     return edge
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
+    figure, (left, middle, right) = panels(DOUBLE, 2.7, 1, 3)
     moments, level = surface.moments, summits.origin.level
-    edges = _bins(maxima.heights - level)
-    _draw_both(left, edges, maxima.heights - level, summits.heights - level)
-    mean, spread = moments.mean_height, moments.height_std
+    unit = measure(float(np.abs(maxima.heights - level).max()), surface.unit)
+    every, some = (unit.of(each.heights - level) for each in (maxima, summits))
+    edges = _bins(every)
+    _draw_both(left, edges, every, some)
+    mean, spread = unit.of(moments.mean_height), unit.of(moments.height_std)
     if spread > 0:  # if 0, no Gaussian surface has these moments
         z = np.linspace(edges[0], edges[-1], 200)
         normal = np.exp(-(((z - mean) / spread) ** 2) / 2) / (spread * np.sqrt(2 * np.pi))
         expected = moments.density * summits.origin.area * (edges[1] - edges[0])
         left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
-    left.xaxis.set_major_locator(round_ticks(4))
+    left.xaxis.set_major_locator(style.round_ticks(4))
     left.xaxis.get_offset_text().set_fontsize(TICK)
-    highest = float(np.abs(edges).max())
-    label(left, _count(left.xaxis, "height", surface.unit, highest), "summits")
+    style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
-    edges = 10 ** _bins(np.log10(maxima.tip_radii))
-    _draw_both(middle, edges, maxima.tip_radii, summits.tip_radii)
+    unit = measure(float(np.median(maxima.tip_radii)), surface.unit)
+    every, some = (unit.of(each.tip_radii) for each in (maxima, summits))
+    edges = 10 ** _bins(np.log10(every))
+    _draw_both(middle, edges, every, some)
     middle.set_xscale("log")
-    middle.axvline(1 / moments.mean_curvature, color=SMOOTH, ls="--", lw=1.1)
+    middle.axvline(unit.of(1 / moments.mean_curvature), color=SMOOTH, ls="--", lw=1.1)
     span = edges[-1] / edges[0]
     powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
-    middle.xaxis.set_major_locator(powers if span > 10 else round_ticks(4))
+    middle.xaxis.set_major_locator(powers if span > 10 else style.round_ticks(4))
     middle.xaxis.set_major_formatter("{x:g}")
-    typical = float(np.median(maxima.tip_radii))
-    label(middle, _count(middle.xaxis, "tip radius", surface.unit, typical), "")
+    style.label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
     middle.xaxis.set_minor_formatter(NullFormatter())
 
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
     right.set_xlim(0.0, 1.0)
-    label(right, "eccentricity of the tip", "")
-    legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
+    style.label(right, "eccentricity of the tip", "")
+    style.legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
     return figure
 
 
@@ -275,17 +264,3 @@ def _bins(values: Array) -> Array:
     room = high - low if high - low > 1e-9 * size else size
     count = int(np.clip(np.sqrt(len(values)), 8, 40))
     return np.linspace(low - 0.02 * room, high + 0.02 * room, count + 1)
-
-
-def _count(axis: Axis, name: str, unit: str, size: float) -> str:
-    """The label of an axis for lengths of this size; sets ticks in SI units with a prefix."""
-    if not unit:
-        return name
-    length = measure(size, unit)
-
-    def said(value: float, _: float) -> str:
-        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # remove rounding errors of 0
-        return f"{shown:.9g}".replace("-", "\N{MINUS SIGN}")
-
-    axis.set_major_formatter(said)
-    return f"{name}  [{literal(length.said)}]"

@@ -11,7 +11,7 @@ from convexrough.gradients.gradient import Gradient
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.measure import Measure, Scale, measure
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOUBLE, SINGLE, TICK
 
 
@@ -28,17 +28,16 @@ def fretting_figures(worn: Fretting) -> Figures:
     if not worn.contact.loads.any():
         return style.no_contact("fretting")
     scale = Scale(worn.contact)
-    figure = Figure(figsize=(DOUBLE, 6.2), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+    figure, maps = panels(DOUBLE, 6.2, 2, 2, sharex=True, sharey=True)
     pressure, f = scale.units.pressure, scale.limit / worn.contact.load
     most = _largest(worn.largest_tractions) if pressure else f * scale.peak
     traction = measure(most, pressure, f"(f{scale.pressure.symbol})")
-    draw_slip(panels[0], worn, scale)
+    draw_slip(maps[0], worn, scale)
     energy = measure(_largest(worn.losses), scale.units.work, "W_m")
-    _draw(panels[1], scale, worn.losses, energy, "energy lost per cycle", "W_i")
-    _draw(panels[2], scale, worn.mean_tractions, traction, "mean traction", "\\bar q_i")
-    _draw(panels[3], scale, worn.largest_tractions, traction, "largest traction", "q_i")
-    for axes in panels:
+    _draw(maps[1], scale, worn.losses, energy, "energy lost per cycle", "W_i")
+    _draw(maps[2], scale, worn.mean_tractions, traction, "mean traction", "\\bar q_i")
+    _draw(maps[3], scale, worn.largest_tractions, traction, "largest traction", "q_i")
+    for axes in maps:
         axes.label_outer()
     low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
     between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
@@ -73,8 +72,8 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     >>> print(*cr.plots.gradient_figures(contact.gradient(load=1.0), of="P"))
     gradient
     """
-    figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
-    draw_gradient(figure.subplots(), gradient, of)
+    figure, (axes,) = panels(SINGLE + 0.7, 3.3)
+    draw_gradient(axes, gradient, of)
     return Figures({"gradient": figure})
 
 

@@ -11,7 +11,7 @@ from convexrough.normal.claims import Claim
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
 from convexrough.plots.measure import measure
-from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
 
 #: The indices of at most this many suspects are written, of the likeliest ones.
@@ -36,8 +36,8 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     """
     claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
     width = SINGLE if len(claims) == 1 else DOUBLE
-    figure = Figure(figsize=(width, 3.9), layout="constrained")
-    for axes, claim in zip(figure.subplots(1, len(claims), squeeze=False)[0], claims, strict=True):
+    figure, maps = panels(width, 3.9, 1, len(claims))
+    for axes, claim in zip(maps, claims, strict=True):
         draw_claim(axes, claim)
     return Figures({"verdict": figure})
 

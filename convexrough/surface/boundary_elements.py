@@ -109,6 +109,8 @@ class Whole(Table):
     pieces    : number of connected regions of loaded pixels
     resolution : relative change of the load if pixels are twice as wide, which indicates the error
         due to the pixel size
+
+    An example is under `press_whole`.
     """
 
     _along: ClassVar[Along] = {("asperity",): ("loads",), ("row", "column"): ("pressures",)}

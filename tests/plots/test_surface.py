@@ -39,3 +39,11 @@ def test_figures_fit(load: float) -> None:
     pairs, _ = cr.surface.crowded(contact)
     named = {f"{i}, {j}" for i, j in pairs[:1]}
     assert named <= said(figures["map"])
+
+
+def test_a_map_names_the_unit_of_its_numbers() -> None:
+    """256 Å are 25.6 nm, of heights and of summits."""
+    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, unit="Å")
+    for drawn in (surface.plot(), surface.summits().plot()):
+        assert drawn.get_xlabel().endswith("[nm]")
+        assert drawn.get_xlim()[1] == pytest.approx(12.8, rel=0.15)
