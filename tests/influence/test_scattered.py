@@ -1,7 +1,6 @@
 """The coupling on a mesh: the sum over pairs, bounds on the error."""
 
 import numpy as np
-import pytest
 from extended import inverse_sums
 from point_layouts import jittered
 
@@ -31,13 +30,6 @@ def test_upper_bounds_on_sums() -> None:
         low = product.apply(strengths) < (1 - relative) * inverse[i]
         too_low += int(low[inverse[i] > 0].sum())
     assert too_low > 100
-
-
-def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [-1.3, 0.0], [-2.2, 0.0]])
-    operator = ScatteredInfluence(points, SCALE)
-    radii = np.array([1.0, 0.5, 1.0, 0.1])
-    assert operator.crowding(radii) == pytest.approx(2.0 / 1.3)
 
 
 def test_point_error_is_counted() -> None:
