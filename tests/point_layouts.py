@@ -1,4 +1,6 @@
-"""Layouts of points without a lattice, and the operator of points on one."""
+"""Layouts of points, without a lattice and on one, and the operator of points on a lattice."""
+
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +42,27 @@ def coincident(rng: np.random.Generator) -> np.ndarray:
 
 
 LAYOUTS = {each.__name__: each for each in (disc, clustered, two, line, jittered, coincident)}
+
+
+BASES = {
+    "hexagonal": [[1.0, 0.0], [0.5, np.sqrt(0.75)]],
+    "square": [[1.0, 0.0], [0.0, 1.0]],
+    "rectangular": [[1.0, 0.0], [0.0, 2.6]],
+    "sheared": [[1.0, 0.0], [7.3, 1.4]],
+}
+
+
+def turned(basis: Any, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(basis) @ np.array([[c, s], [-s, c]])
+
+
+def lattice_patch(basis: np.ndarray, count: int) -> np.ndarray:
+    """The sites nearest to the origin, of a lattice given by any basis."""
+    steps = np.arange(-120, 121) if count > 300 else np.arange(-40, 41)
+    points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ basis
+    order = np.argsort((points**2).sum(axis=1), kind="stable")
+    return points[order[:count]]
 
 
 def on_lattice(

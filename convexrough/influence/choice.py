@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import get_args
 
-from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Indices
 from convexrough.errors import InputError
-from convexrough.influence.coupling import Influence, Kind, inverse_distances
+from convexrough.influence.coupling import Influence, Kind
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
-from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.scene.layout import Layout
 from convexrough.scene.scene import Scene
 
@@ -44,9 +42,8 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     tails = None if scene.contact_tails is None else scene.contact_tails[which]
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
-            layout = scene.asperities.layout
-            inverse, sums = _restricted(layout.cached(_inverse), which), layout.cached(_sums)
-            return DenseInfluence.of(points, scale, scale * inverse, sums.restricted(which))
+            part = scene.asperities.layout.cached(_whole).restricted(which)
+            return DenseInfluence.of(points, scale, scale * part.matrix, part.sums)
         return DenseInfluence.assemble(points, scale, error, tails)
     if kind == "lattice":
         expected = "contact points on a two-dimensional lattice"
@@ -58,17 +55,6 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     return ScatteredInfluence(points, scale, error, tails)
 
 
-def _inverse(layout: Layout) -> Array:
-    """1 / r_ij (n, n) between the points of a small layout, shared by all scenes with it."""
-    return frozen(inverse_distances(layout.points, layout.points))
-
-
-def _sums(layout: Layout) -> MatrixSums:
-    """The map to the sums over j of P_j / r_ij for all points of a layout, shared by its scenes."""
-    return MatrixSums(Pair.exact(layout.points))
-
-
-def _restricted(matrix: Array, which: Indices) -> Array:
-    if len(which) == len(matrix) and (which[1:] > which[:-1]).all():
-        return matrix
-    return matrix.take(which, axis=0).take(which, axis=1)
+def _whole(layout: Layout) -> DenseInfluence:
+    """1 / r_ij between all points of a small layout, shared by all scenes with it."""
+    return DenseInfluence.assemble(layout.points, 1.0)

@@ -55,7 +55,8 @@ CHUNK = 2**14
 #: (docs/theory/convexity.md).
 FILLED = 0.2
 
-#: For more asperities than this, rarely needed spectra (transforms of kernels) are not cached.
+#: For more asperities than this, spectra (transforms of kernels) that are rarely needed, and parts,
+#: are not cached.
 MOST_KEPT = 2**21
 
 #: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), a lower bound on the
@@ -113,9 +114,7 @@ class LatticeInfluence:
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = reach, box, i * np.intp(box.padded[1]) + j
-            if len(self) <= MOST_KEPT:
-                self._kept["boxed"] = last
+            last = self._keep("boxed", (reach, box, i * np.intp(box.padded[1]) + j))
         return last[1:]
 
     @property
@@ -220,17 +219,10 @@ class LatticeInfluence:
 
     def restricted(self, which: Indices) -> LatticeInfluence:
         members = self.members[which]
-        if self._parts and np.array_equal(self._parts[0].members, members):
-            return self._parts[0]
-        found = replace(self, members=members)
-        if len(self) <= MOST_KEPT:
-            self._parts[:] = [found]
-        return found
-
-    @cached_property
-    def _parts(self) -> list[LatticeInfluence]:
-        """The last result of `restricted`, if it is cached."""
-        return []
+        last: LatticeInfluence | None = self._kept.get("part")
+        if last is None or not np.array_equal(last.members, members):
+            last = self._keep("part", replace(self, members=members))
+        return last
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
@@ -327,14 +319,17 @@ class LatticeInfluence:
         return sliced.sums(loads, places) + off_sites
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
-        """The object that `make` returns, cached under `name` unless there are many asperities."""
-        found: Made = self._kept[name] if name in self._kept else make()
+        """The object that `make` returns, computed once unless there are many asperities."""
+        return self._kept[name] if name in self._kept else self._keep(name, make())
+
+    def _keep(self, name: object, made: Made) -> Made:
         if len(self) <= MOST_KEPT:
-            self._kept[name] = found
-        return found
+            self._kept[name] = made
+        return made
 
     @cached_property
     def _kept(self) -> dict[object, Any]:
+        """By name: kernels on the last box of `_boxed_for`, this box, and the last part."""
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:

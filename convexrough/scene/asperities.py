@@ -59,6 +59,7 @@ class Asperities(Record):
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
         The new asperities share all data that depend only on the positions, such as distances.
+        Raises InputError for values that are not valid.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -75,7 +76,7 @@ class Asperities(Record):
         Random numbers are added to the heights, and the tip radii are multiplied by random factors
         of mean 1. The arguments are those of `hexagonal`. The random numbers depend only on the
         seed, so use a new seed for each change: a second change with the same seed adds the same
-        numbers again.
+        numbers again. Raises InputError for bad values, and without a seed if there is a change.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -112,7 +113,11 @@ class Asperities(Record):
 
     @property
     def lattice(self) -> Lattice | None:
-        """The lattice on which all summits lie; None if there is no such lattice."""
+        """The lattice on which all summits lie; None if there is no such lattice.
+
+        >>> scene.asperities.lattice.spacing
+        0.0025
+        """
         return self.layout.lattice
 
     @property
@@ -145,6 +150,9 @@ class Asperities(Record):
         Random heights, and logarithms of random tip radii, are clipped at 6 standard deviations.
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities; the others keep their positions, random heights and random tip radii.
+
+        Raises InputError for bad values, and for more asperities than fit in memory. The class
+        docstring has an example.
         """
         regular = cls._lattice(HEXAGONAL, spacing, tip_radius, within)
         return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
@@ -160,7 +168,11 @@ class Asperities(Record):
         tip_radius_cv: float = 0.0,
         seed: int | None = None,
     ) -> Asperities:
-        """Asperities on a square lattice, with one on the axis; arguments as for `hexagonal`."""
+        """Asperities on a square lattice, with one on the axis; arguments as for `hexagonal`.
+
+        >>> cr.Asperities.square(spacing=0.5, tip_radius=5.0, within=0.5).positions.tolist()
+        [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [-0.5, 0.0], [0.0, -0.5]]
+        """
         regular = cls._lattice(SQUARE, spacing, tip_radius, within)
         return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 

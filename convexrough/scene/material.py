@@ -21,6 +21,9 @@ class Material:
     mismatch        : Dundurs' beta of a pair, 0 for equal materials. This number measures the
         coupling of normal and tangential displacements, which the package neglects
 
+    Raises InputError for values outside these ranges. Source: Johnson, Contact Mechanics (1985),
+    4.2 and 5.4; docs/theory/bodies.md.
+
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")
     1.154e+11
@@ -58,6 +61,8 @@ class Material:
         """The material of bodies with the same elastic constants; E* = E / (2 (1 - nu^2)).
 
         modulus : [force / length^2] Young's modulus E;  hardness : as in `Material`
+
+        Raises InputError for bad values. The class docstring has an example.
         """
         modulus = checks.positive("youngs_modulus", modulus)
         ratio = checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)
@@ -72,7 +77,8 @@ class Material:
 
         Normal and tangential compliances are those of two equal bodies with
         2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by
-        Dundurs' beta (docs/theory/bodies.md). The hardness is the smaller of the known ones.
+        Dundurs' beta (docs/theory/bodies.md). The hardness is the smaller of the known ones. Raises
+        InputError if one of the two is a pair.
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))

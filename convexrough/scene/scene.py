@@ -38,6 +38,8 @@ class Scene(Record):
     units         : names of the units of length and force, such as ("mm", "N"), for figures and
         reports; no number is converted
 
+    Raises InputError for bad values, and if two contact points coincide.
+
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     >>> scene = cr.Scene(sphere_radius=1.0, asperities=asperities, material=material, friction=0.5)
@@ -117,7 +119,13 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] `radius`; in the geometry "closest", `radius` + the tip radius rho_i."""
+        """(n,) [length] `radius`; in the geometry "closest", `radius` + the tip radius rho_i.
+
+        radius : [length] a radius of the sphere
+
+        >>> cr.Scene(1.0, scene.asperities, scene.material, geometry="closest").far_radii(1.0)[:2]
+        array([1.02, 1.02])
+        """
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
@@ -182,7 +190,12 @@ class Scene(Record):
     def reach(self, approach: float) -> float:
         """[length] distance from the axis beyond which none of these asperities can touch.
 
+        approach : [length] D0
+
         It is computed for the largest height and tip radius; inf on a flat or a cylinder.
+
+        >>> round(scene.reach(approach=5e-5), 10)
+        0.01
         """
         return reach(
             approach,

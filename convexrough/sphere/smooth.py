@@ -53,13 +53,23 @@ def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
 class SmoothSphere(Record):
     """A smooth sphere under a normal load P, and under shear forces Q at this load.
 
-    Methods take numbers or arrays. Tangential results raise InputError if the scene has no friction
-    or a shear force exceeds f P, the coefficient of friction times the load. nu is Poisson's ratio,
-    G the shear modulus.
+    scene, load : the scene, and P [force]
+
+    Methods take numbers or arrays, and return numbers or arrays of the same shape. Tangential
+    results raise InputError if the scene has no friction or a shear force exceeds f P, the
+    coefficient of friction times the load. E* is the contact modulus, nu Poisson's ratio, and G the
+    shear modulus. Source: Johnson, Contact Mechanics (1985), chapters 3, 4 and 7.
 
     >>> whole = cr.smooth(scene, load=contact.load)
-    >>> print(f"{whole.contact_radius:.4g}", f"{whole.displacement(0.25 * contact.load):.3g}")
-    0.006468 9.4e-06
+    >>> print(f"{whole.contact_radius:.4g} {whole.pressure(0.005):.4g}")
+    0.006468 0.002612
+    >>> print(f"{whole.normal_displacement(0.005):.4g} {whole.largest_force:.3g}")
+    2.934e-05 1.8e-07
+    >>> Q = 0.5 * whole.largest_force
+    >>> print(f"{whole.stick_radius(Q):.4g} {whole.traction(0.006, Q):.3g}")
+    0.005134 0.000769
+    >>> print(f"{whole.displacement(Q):.3g} {whole.branch(0.0, Q):.3g} {whole.energy(Q):.3g}")
+    9.4e-06 5.34e-07 1.29e-13
     """
 
     _shown = ("contact_radius", "approach", "peak_pressure")
@@ -93,7 +103,10 @@ class SmoothSphere(Record):
         return hertz.pressure(distance, self.contact_radius, self.peak_pressure)
 
     def normal_displacement(self, distance: ArrayLike) -> Any:
-        """[length] sum of both surfaces' normal displacements at a distance from the axis."""
+        """[length] sum of both surfaces' normal displacements at a distance r from the axis.
+
+        It is delta - r^2 / (2 R) inside the contact (Johnson, 3.42, gives it outside).
+        """
         return hertz.surface_displacement(distance, self.contact_radius, self.radius)
 
     @property
@@ -127,7 +140,8 @@ class SmoothSphere(Record):
         """[length] displacement after loading from rest to `turning_force` and back to `force`.
 
         By Masing's rule it is X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force Q1
-        and X of `displacement`: [14]-[15] of Dini and Hills (2009).
+        and X of `displacement`: [14]-[15] of Dini and Hills (2009). Raises InputError for larger
+        forces.
         """
         turning = checks.finite("turning_force", turning_force)
         first = self.displacement(turning)
@@ -145,6 +159,7 @@ class SmoothSphere(Record):
 
         It is W0 e((maximum - minimum) / (2 f P)), with the `energy_scale` W0 and the function e of
         `sphere.mindlin.loss`: [16] of Dini and Hills (2009). The default minimum is -maximum.
+        Raises InputError if a minimum exceeds the maximum.
         """
         upper = self._share("maximum", maximum)
         lower = -upper if minimum is None else self._share("minimum", minimum)
@@ -185,7 +200,8 @@ class SmoothEllipsoid(SmoothSphere):
     The contact is an ellipse with the semi-axes a, b. `contact_radius` is sqrt(a b). For a point
     (x, y), the argument `distance` is s sqrt(a b), with s^2 = x^2/a^2 + y^2/b^2. The stick zone is
     an ellipse of the same shape. The ratio of tangential to normal compliance is approximated by
-    its mean over all directions, Mindlin's ratio; this is exact at nu = 0.
+    its mean over all directions, Mindlin's ratio; this is exact at nu = 0. docs/theory/bodies.md
+    derives the formulas.
 
     >>> oval = cr.Scene((1.0, 2.0), scene.asperities, scene.material)
     >>> "{:.4g} {:.4g}".format(*cr.smooth(oval, load=contact.load).semi_axes)

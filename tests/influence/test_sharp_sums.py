@@ -2,33 +2,21 @@
 
 from fractions import Fraction
 from math import ceil, floor, log2
-from typing import Any
 
-import multiprecision
 import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.typing import NDArray
-from point_layouts import LAYOUTS, disc
+from point_layouts import disc
 
-import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
-from convexrough.bench.scenes import APPROACH, scene
 from convexrough.influence import sharp_sums as sharp
 from convexrough.influence.pair_sums import Product
-from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.influence.splitting import Splitting
-from convexrough.normal.certificate import certify_on
-from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import trial
-from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
-
-#: Layouts where near pairs are a small part of all.
-EVEN = ("disc", "jittered")
 
 SPACING = 0.0371
 KERNELS = {order: Softened(1, order, 0.43) for order in (4, 12, 26)}
@@ -50,22 +38,6 @@ def soft(kernel: Softened, squares: Fraction) -> arb:
 
 def ball(x: Fraction) -> arb:
     return arb(x.numerator) / arb(x.denominator)
-
-
-def exact(points: Array, loads: Array, row: int) -> arb:
-    return multiprecision.inverse_sum(
-        multiprecision.exact(points), multiprecision.exact(loads), row
-    )
-
-
-def value(found: Ball, row: int) -> arb:
-    return arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
-
-
-def sums(operator: ScatteredInfluence, loads: Array) -> Ball:
-    found = operator.sums(Pair.exact(loads))
-    assert found is not None
-    return found
 
 
 def weight(place: float, node: int, order: int) -> Fraction:
@@ -172,54 +144,3 @@ def test_values_at_points(order: int) -> None:
         assert abs(found - true) <= Fraction(rounding) * Fraction(unit)
         missed += abs(Fraction(float(plain[k])) - true) > Fraction(rounding) * Fraction(unit)
     assert missed > 2
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("kind", ["smooth", "rough", "few"])
-def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
-    rng = np.random.default_rng(3)
-    points = LAYOUTS[layout](rng)
-    loads = rng.random(len(points))
-    if kind == "rough":
-        loads = rng.standard_normal(len(points)) * 1e-7
-    elif kind == "few":
-        loads = np.where(rng.random(len(points)) < 0.01, 1e5 * loads, 0.0)
-    operator = ScatteredInfluence(points, 0.37)
-    found = sums(operator, loads)
-    sizes = operator.apply(np.abs(loads)) / 0.37
-    with ctx.workprec(200):
-        for row in rng.integers(0, len(points), 4).tolist():
-            off = abs(value(found, row) - exact(points, loads, row))
-            assert off <= arb(float(found.radius[row]))
-            if layout in EVEN:
-                assert float(off.mid()) <= 1e-16 * sizes.max()
-    if layout in EVEN:
-        plain = operator.rounding(loads).of(0.37 * sizes).max()
-        assert found.radius.max() * 0.37 < 0.1 * plain
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
-    """Gaps of a press in ball arithmetic; loads are then proved to eleven digits."""
-    made = scene("scattered", 8.0)
-    given = cr.Scene(1.0, made.asperities, made.material, friction=0.5, geometry=geometry)
-    problem = NormalProblem.assemble(given, approach=APPROACH)
-    assert problem.influence.name == "scattered"
-    loads = Newton().solve(problem).loads
-    pair = Pair.exact(loads)
-    found = trial(problem, pair, Ball.exact(0.0), problem.product(pair))
-    rows = range(3, len(problem), len(problem) // 12)
-    with ctx.workprec(200):
-        known = np.full(len(given), arb(0))
-        known[problem.candidates] = [arb(load) * arb(problem.units.force) for load in loads]
-        places = problem.candidates[list(rows)].tolist()
-        exactly = multiprecision.gaps(given, known, arb(APPROACH), places)
-        for m, gap in zip(rows, exactly, strict=True):
-            off = gap / arb(problem.units.length) - value(found.gap, m)
-            assert abs(off) <= arb(float(found.gap.radius[m]))
-    assert found.gap.radius.max() < 2e-14 * problem.approach
-    certificate = certify_on(problem, problem.to_scene(loads) * problem.units.force)
-    assert certificate.scope == "local"
-    assert certificate.load_error < 1e-11 * loads.max() * problem.units.force

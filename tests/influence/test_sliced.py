@@ -1,7 +1,6 @@
 """Sliced products against long integers, ball arithmetic and exact fractions."""
 
 from fractions import Fraction
-from typing import Any
 
 import multiprecision
 import numpy as np
@@ -10,14 +9,11 @@ from flint import arb, ctx
 from numpy.typing import NDArray
 from point_layouts import on_lattice
 
-import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.sliced import Distances, Sliced, cut
-from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import trial
 
 Array = NDArray[np.float64]
 
@@ -181,35 +177,3 @@ def test_loads_near_the_middle_take_smaller_transforms(seed: int) -> None:
         assert np.abs(A.slopes(loads) - exactly).max() <= 1e-11 * np.abs(exactly).max()
     assert sizes == sorted(sizes)
     assert sizes[0] < sizes[3] == sizes[4] == A.box.padded
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize(
-    ("geometry", "R"), [("summit", 1.0), ("closest", 1.0), ("closest", (0.3, np.inf))]
-)
-@pytest.mark.parametrize("shift", [0.0, 0.3e-3, None])
-def test_the_sharp_residual(geometry: Any, R: Any, shift: float | None) -> None:
-    """Gaps of loads, whatever these are, in ball arithmetic: within what is said of them."""
-    rng = np.random.default_rng(4)
-    if shift is None:  # exactly on their sites
-        lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
-    else:
-        lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    heights = 1e-6 * rng.standard_normal(len(lattice))
-    asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
-    scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)
-    contact = cr.press(scene, approach=5e-5)
-    for control in ({"approach": 5e-5}, {"load": contact.load}):
-        problem = NormalProblem.assemble(scene, influence="lattice", **control)
-        loads = contact.loads[problem.candidates] / problem.units.force
-        pair = Pair.exact(loads)
-        found = trial(problem, pair, Ball.exact(0.0), problem.product(pair))
-        with ctx.workprec(200):
-            known = np.full(len(scene), arb(0))
-            known[problem.candidates] = [arb(load) * arb(problem.units.force) for load in loads]
-            gaps = multiprecision.gaps(scene, known, arb(0), problem.candidates.tolist())
-            level = middle(found.approach)
-            for gap, off in zip(gaps, found.gap, strict=True):
-                exact = gap / arb(problem.units.length)
-                assert abs(exact - level - middle(off)) <= arb(float(off.radius))
-        assert found.gap.radius.max() < 1e-19

@@ -1,0 +1,254 @@
+"""What every compliance operator promises, against sums over all pairs in 160 bits."""
+
+from dataclasses import replace
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from extended import inverse_sums
+from flint import arb, ctx
+from numpy.typing import NDArray
+from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
+
+import convexrough as cr
+from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair, two_product
+from convexrough.bench.scenes import APPROACH
+from convexrough.bench.scenes import scene as bench_scene
+from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.influence.shells import fitted_shells, shells
+from convexrough.normal.certificate import certify_on
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.refine import trial
+from convexrough.roundoff import ROUNDOFF
+from convexrough.solvers import Newton
+
+Array = NDArray[np.float64]
+
+SCALE = 0.37
+
+#: Layouts of which a mesh gives sums much better than products.
+EVEN = ("disc", "jittered")
+
+
+def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
+    if kind == "lattice":
+        points = lattice_patch(
+            turned(BASES[layout], 0.3), count or int(rng.choice([40, 500, 1000]))
+        )
+        return on_lattice(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
+    points = LAYOUTS[layout](rng)
+    if kind == "dense":  # more than 64 points are summed in blocks
+        return DenseInfluence.assemble(rng.permutation(points)[: count or 500], SCALE)
+    return ScatteredInfluence(points[:count] if count else points, SCALE)
+
+
+CASES = [
+    *(("dense", layout) for layout in ("disc", "coincident")),
+    *(("lattice", basis) for basis in BASES),
+    *(("scattered", layout) for layout in LAYOUTS),
+]
+each_operator = pytest.mark.parametrize(("kind", "layout"), CASES)
+
+
+def loadings(count: int, rng: np.random.Generator) -> Array:
+    """(5, count) equal loads, over many decades, one, of either sign, and of few."""
+    few = rng.random(count) * (rng.random(count) < 0.05)
+    signs, one = rng.choice([-1.0, 1.0], count), np.eye(count)[count // 3]
+    return np.array([np.ones(count), 10 ** rng.uniform(-30, 0, count), one, signs, few])
+
+
+@pytest.mark.sample(4)
+@each_operator
+def test_products_and_sums(kind: str, layout: str) -> None:
+    """Within their bounds, which are not absurd.
+
+    Off the axis, points in float64 are themselves off a lattice: a product then loses 6e-14 at 300
+    spacings. Its bound is 100 to 3000 times what is lost.
+    """
+    rng = np.random.default_rng()
+    A: Influence = operator(kind, layout, rng)
+    rows, loads = rng.integers(0, len(A), 30), loadings(len(A), rng)
+    shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 0.0
+    good = {"dense": 1e-14, "lattice": max(1e-14, 3e-16 * shift), "scattered": 1e-13}[kind]
+    for load, true, rest in zip(
+        loads, *(x.T for x in inverse_sums(A.points[rows], A.points, loads.T, SCALE)), strict=True
+    ):
+        product, sizes, rounding = A.apply(load), A.apply(np.abs(load)), A.rounding(load)
+        error, top = np.abs(product[rows] - true - rest), float(sizes.max())
+        assert error.max() <= good * top
+        assert (error <= rounding.of(sizes)[rows] * (1 + 1e-12)).all()
+        assert (kind != "dense") or (rounding.each == 0 and rounding.relative <= 1e-14)
+        assert rounding.each <= {"lattice": 1e-9 * max(1.0, 1e-3 * shift)}.get(kind, 1e-10) * top
+        assert rounding.relative <= 1e-12
+        if not A.stored:
+            single = A.apply(load.astype(np.float32))
+            assert single.dtype == np.float32
+            assert np.abs(single - product).max() <= (1e-6 if kind == "lattice" else 1e-4) * top
+
+        found = A.sums(Pair.exact(load))
+        high, low = two_product(SCALE, found.mid.high[rows])
+        off = np.abs((high - true) + (low - rest + SCALE * found.mid.low[rows]))
+        radius = SCALE * found.radius
+        assert (off <= radius[rows] * (1 + 1e-12) + 1e-30 * top).all()
+        if kind == "lattice":
+            assert radius.max() <= 1e-9 * rounding.each + 1e-300
+        elif kind == "dense":
+            assert radius.max() <= 1e-24 * top or layout == "coincident"
+        elif layout in EVEN:
+            assert off.max() <= 1e-16 * top
+            assert radius.max() <= 0.1 * rounding.of(sizes).max()
+
+
+def assert_above(above: Array, true: Array, layout: str) -> None:
+    """Upper bounds that are mostly a few per cent too large."""
+    assert (above >= true).all()
+    if layout != "coincident":
+        assert (above <= 1.05 * true + 0.02 * np.median(true[true > 0])).all()
+
+
+@pytest.mark.sample(4)
+@each_operator
+@pytest.mark.parametrize("power", [2, 3])
+def test_upper_bounds(kind: str, layout: str, power: int) -> None:
+    rng = np.random.default_rng()
+    A = operator(kind, layout, rng)
+    rows = rng.integers(0, len(A), 40)
+    strengths = np.array([rng.random(len(A)), rng.random(len(A)) < 0.3], dtype=float)
+    true, _ = inverse_sums(A.points[rows], A.points, strengths.T, power=power)
+    for strength, each in zip(strengths, true.T, strict=True):
+        assert_above(A.falloff(strength, power)[rows], each, layout)
+
+
+@pytest.mark.sample(5)
+@each_operator
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 40, 200])
+def test_parts_and_other_points(kind: str, layout: str, count: int) -> None:
+    """Among some, in any order, and onto others: on the lattice, off it, at one place, none."""
+    rng = np.random.default_rng()
+    A = operator(kind, layout, rng, 400)
+    which = rng.permutation(400)[:count]
+    part, loads = A.restricted(which), rng.random(count) ** 9
+    assert (part.points == A.points[which]).all()
+    assert len(part) == len(part.separations()) == count
+    assert part.crowding(np.ones(count)) >= 0
+    mixed = np.concatenate((A.points[:60], part.points[:1]))
+    targets = [mixed, mixed + 1e-3, np.concatenate((mixed, [[0.3, 0.4]])), mixed[:0]]
+    couplings: list[tuple[Coupling, Array]] = [(part, part.points)]
+    couplings += [(part.onto(points), points) for points in targets]
+    if kind == "scattered":
+        together = ScatteredInfluence(np.concatenate((mixed, part.points)), SCALE)
+        couplings.append((JointCoupling(together, len(mixed)), mixed))
+    for coupling, points in couplings:
+        true, rest = inverse_sums(points, part.points, loads, SCALE)
+        product = coupling.apply(loads)
+        error = np.abs(product - true - rest)
+        assert (error <= coupling.rounding(loads).of(product) * (1 + 1e-12)).all()
+        assert error.max(initial=0.0) <= 1e-9 * true.max(initial=0.0)
+        for power in (2, 3):
+            exactly, _ = inverse_sums(points, part.points, loads, power=power)
+            assert (coupling.falloff(loads, power) >= exactly).all()
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize(
+    ("kind", "layout"), [c for c in CASES if c[0] == "lattice" or c[1] in EVEN]
+)
+def test_slopes(kind: str, layout: str) -> None:
+    rng = np.random.default_rng()
+    A = operator(kind, layout, rng)
+    loads, rows = rng.uniform(0.5, 1.0, len(A)), rng.integers(0, len(A), 100)
+    apart = A.points[rows, None] - A.points
+    pulls = SCALE * inverse_distances(A.points[rows], A.points) ** 3 * loads
+    true = -(pulls[..., None] * apart).sum(axis=1)
+    sizes = (pulls[..., None] * np.abs(apart)).sum(axis=1)
+    assert (np.abs(A.slopes(loads)[rows] - true) <= 1e-10 * sizes.max(axis=1)[:, None]).all()
+
+
+@pytest.mark.sample(20)
+@pytest.mark.parametrize("seed", range(60))
+def test_shells_do_not_overlap(seed: int) -> None:
+    """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
+    rng = np.random.default_rng(seed)
+    points = lattice_patch(turned(BASES[sorted(BASES)[seed % 4]], 0.2), 300)
+    points = rng.permutation(points)[:120] + rng.choice([0.0, 1e6])
+    touching = rng.random(120) < rng.random() ** 3
+    radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
+    inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
+    dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
+    for A in (on_lattice(points, SCALE), mesh, dense):
+        with np.errstate(divide="ignore"):
+            fitted, halves = SCALE / fitted_shells(A, radii, share), SCALE / shells(A)
+        for s in (fitted, halves):
+            assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
+
+
+@pytest.mark.parametrize("basis", ["hexagonal", "square"])
+def test_the_most_crowded_pair(basis: str) -> None:
+    """Also if it is not one of nearest neighbours, at the ends of rows, and if none touches."""
+    rng = np.random.default_rng()
+    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(BASES[basis])
+    A, mesh = on_lattice(points, SCALE), ScatteredInfluence(points, SCALE)
+    dense = DenseInfluence.assemble(points, SCALE)
+    for coverage in np.linspace(0.0, 0.2, 150):
+        radii = rng.choice([1.0, 0.2], 42) * (rng.random(42) < coverage)
+        expected = pytest.approx(dense.crowding(radii), rel=1e-12)
+        assert A.crowding(radii) == expected
+        assert mesh.crowding(radii) == expected
+
+
+def assert_gaps_known(problem: NormalProblem, loads: Array, limit: float) -> None:
+    """Gaps of any loads are within their bounds, which are at most `limit`, by ball arithmetic."""
+    scene, units, pair = problem.scene, problem.units, Pair.exact(loads)
+    found = trial(problem, pair, Ball.exact(0.0), problem.product(pair))
+    with ctx.workprec(200):
+        known = np.full(len(scene), arb(0))
+        known[problem.candidates] = [arb(load) * arb(units.force) for load in loads]
+        level, *middles = (
+            arb(float(ball.mid.high)) + arb(float(ball.mid.low))
+            for ball in (found.approach, *found.gap)
+        )
+        rows = list(range(0, len(problem), max(1, len(problem) // 12)))
+        gaps = multiprecision.gaps(scene, known, arb(0), problem.candidates[rows].tolist())
+        for m, gap in zip(rows, gaps, strict=True):
+            off = gap / arb(units.length) - level - middles[m]
+            assert abs(off) <= arb(float(found.gap.radius[m]))
+    assert found.gap.radius.max() < limit
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize(
+    ("geometry", "R"), [("summit", 1.0), ("closest", 1.0), ("closest", (0.3, np.inf))]
+)
+@pytest.mark.parametrize("shift", [0.0, 0.3e-3, None])
+def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
+    if shift is None:  # exactly on their sites
+        lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
+    else:
+        lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    heights = 1e-6 * np.random.default_rng(4).standard_normal(len(lattice))
+    asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
+    scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)
+    contact = cr.press(scene, approach=APPROACH)
+    for control in ({"approach": APPROACH}, {"load": contact.load}):
+        problem = NormalProblem.assemble(scene, influence="lattice", **control)
+        loads = contact.loads[problem.candidates] / problem.units.force
+        assert_gaps_known(problem, loads, limit=1e-19)
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_gaps_on_a_mesh_and_what_they_prove(geometry: Any) -> None:
+    """Loads are then proved to eleven digits."""
+    scene = replace(bench_scene("scattered", 8.0), geometry=geometry)
+    problem = NormalProblem.assemble(scene, approach=APPROACH)
+    assert problem.influence.name == "scattered"
+    loads = Newton().solve(problem).loads
+    assert_gaps_known(problem, loads, limit=2e-14 * problem.approach)
+    force = problem.units.force
+    certificate = certify_on(problem, problem.to_scene(loads) * force)
+    assert certificate.scope == "local"
+    assert certificate.load_error < 1e-11 * loads.max() * force
