@@ -13,7 +13,9 @@ from scenes import (
     MATERIAL,
     OPERATORS,
     PAPER_APPROACH,
+    hexagonal,
     on_lattice,
+    on_sphere,
     operators,
     paper,
     random_cases,
@@ -134,8 +136,7 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
     """Newton's method starts somewhere wherever there is an answer."""
     ring = np.exp(2j * np.pi * np.arange(6) / 6)
     positions = 0.01 * np.column_stack((ring.real, ring.imag))
-    tall = cr.Scene(1.0, cr.Asperities(positions, 0.02, 6e-5), MATERIAL, geometry="summit")
-    assert cr.press(tall, **prescribed).certificate.holds
+    assert cr.press(on_sphere(positions, heights=6e-5), **prescribed).certificate.holds
 
 
 @pytest.mark.sample(3)
@@ -153,8 +154,7 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
     """How far a scene has to reach under a load."""
 
     def scene_within(within: float) -> cr.Scene:
-        tips = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within, **rough)
-        return cr.Scene(1.0, tips, MATERIAL, geometry="summit")
+        return hexagonal(within=within, **rough)
 
     def farthest(approach: float) -> float:
         return reach(
