@@ -23,14 +23,11 @@ from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Rows
-from convexrough.normal.levels import NUMBERS, solved
+from convexrough.normal.levels import MOST, NUMBERS, solved
 from convexrough.normal.problem import Data, NormalProblem
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
-
-#: Scenes with more asperities are solved one by one, because for them stacks save no time.
-MOST = 512
 
 #: Rows are processed together up to this total number of entries of their matrices.
 MATRICES = 2**20

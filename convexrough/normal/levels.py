@@ -24,8 +24,8 @@ from convexrough.normal.refine import defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF
 
-#: Largest number of candidates for which levels are solved together: for more candidates this saves
-#: no time.
+#: Largest number of asperities for which problems are solved together: for more asperities this
+#: saves no time.
 MOST = 512
 
 #: Largest number of Newton steps.
