@@ -22,9 +22,10 @@ from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
+from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import ALL_SHARP, NormalProblem, Units
+from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 from convexrough.plottable import Plottable
@@ -136,7 +137,7 @@ class Contact(Cached, Table, Plottable):
         >>> print(contact.proof().proved.splitlines()[0])
         proved: under the approach 5e-05 there is a solution, the only one
         """
-        from convexrough.proof import NearState, prove, refuse_many  # a higher layer
+        from convexrough.proof import prove, refuse_many  # a higher layer
 
         refuse_many(self.scene)
         given = [*sheared] if isinstance(sheared, Iterable) else [sheared]
@@ -147,7 +148,7 @@ class Contact(Cached, Table, Plottable):
                 found = "a state of another contact" if other else kind
                 expected = "a shear state of this contact, a result of `shear`"
                 raise InputError(f"sheared[{k}]", found=found[:60], expected=expected)
-        by_load, n = self.prescribed_load is not None, len(self.scene)
+        by_load = self.prescribed_load is not None
         levels, states = self.cached(levels_of), []
         for k, state in enumerate(given):
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
@@ -158,10 +159,13 @@ class Contact(Cached, Table, Plottable):
             if getattr(state, "order", "") == "fails":
                 raise ProofError(f"sheared[{k}]: an indentation may fall as the load rises")
             left = levels.top.load - Ball.exact(drop / Fraction(levels.problem.units.force))
-            states.append((state.force, NearState.of(levels.at(left), n)))
+            near = levels.at(left).trial
+            assert near is not None  # only the level at the load 0 has no trial
+            states.append((state.force, near))
+        assert levels.top.trial is not None
         return prove(
             self.scene,
-            NearState.of(levels.top, n),
+            levels.top.trial,
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
             sheared=states,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from operator import index
 from typing import Any, ClassVar, cast
 
@@ -19,7 +20,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle, cycle
-from convexrough.record import Along, Table, in_text
+from convexrough.record import Along, Table, in_text, singular
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.rows import CYCLE, MATRICES, TOTALS, PressedRows, in_rows
 from convexrough.scene.scene import Scene
@@ -74,12 +75,10 @@ class Contacts(Table):
         if not -len(self) <= index(k) < len(self):
             raise IndexError(f"scene {k} of {len(self):,}: the first is 0")
         k = index(k) % len(self)
-        known: dict[int, Contact] = self.__dict__.setdefault("_known", {})
-        if k not in known:
-            name = "load" if self.by_load else "approach"
-            start = self.asperity_loads[k]
-            known[k] = _pressed(self.scenes[k], name, self.controls[k], start)
-        return known[k]
+        if k not in self._known:
+            name, start = "load" if self.by_load else "approach", self.asperity_loads[k]
+            self._known[k] = _pressed(self.scenes[k], name, self.controls[k], start)
+        return self._known[k]
 
     def cycles(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Cycles:
         """The steady cycle of each contact between two shear forces.
@@ -121,20 +120,20 @@ class Contacts(Table):
         for k in np.flatnonzero(alone).tolist():
             one = cycle(self[k], maximum=float(upper[k]), minimum=float(lower[k]))
             upper[k], lower[k] = one.maximum, one.minimum
-            known = one.loss, one.loss_error, one.displacement_amplitude, one.displacement_error
-            for name, value in zip(CYCLE, known, strict=True):
-                fields[name][k] = value
-            fields["order"][k], fields["status"][k] = one.order, one.status
+            for name, values in fields.items():
+                values[k] = getattr(one, singular(name))
         fields = {name: frozen(values) for name, values in fields.items()}
         return Cycles(contacts=self, maximum=frozen(upper), minimum=frozen(lower), **fields)
 
-    @property
+    @cached_property
+    def _known(self) -> dict[int, Contact]:
+        """The contacts made so far, by the indices of their scenes."""
+        return {}
+
+    @cached_property
     def _together(self) -> list[PressedRows]:
         """The scenes that were proved together; an unpickled object proves them again."""
-        if "_pressed" not in self.__dict__:
-            self.__dict__["_pressed"] = in_rows(self.scenes, self.controls, self.by_load)
-        rows: list[PressedRows] = self.__dict__["_pressed"]
-        return rows
+        return in_rows(self.scenes, self.controls, self.by_load)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,7 +232,7 @@ def press_many(
         alone=frozen(np.flatnonzero(alone)),
         **{each: frozen(values) for each, values in fields.items()},
     )
-    contacts.__dict__.update(_pressed=rows, _known=known)
+    contacts.__dict__.update(_together=rows, _known=known)
     return contacts
 
 

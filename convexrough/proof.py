@@ -29,7 +29,8 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.atomic import replacing
 from convexrough.errors import InputError, ProofError
-from convexrough.normal.level import Level
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.refine import Trial, trial_of
 from convexrough.progress import LOGGER
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
@@ -61,32 +62,6 @@ class ShearedState(Protocol):
     def force(self) -> float: ...
 
 
-class NearState(NamedTuple):
-    """Loads near a solution, with any number of digits.
-
-    loads    : (n,) [force] in the order of the scene's asperities
-    approach : [length] approach; None to compute it from the loads
-    """
-
-    loads: Sequence[Fraction]
-    approach: Fraction | None
-
-    @classmethod
-    def given(cls, loads: Array) -> NearState:
-        return cls(list(map(Fraction, loads.tolist())), None)
-
-    @classmethod
-    def of(cls, level: Level, n: int) -> NearState:
-        found, units = [Fraction(0)] * n, level.problem.units
-        if level.trial is None:
-            return cls(found, None)
-        loads, approach = level.trial.loads, level.trial.approach.mid
-        for i, high, low in zip(level.problem.candidates, *loads, strict=True):
-            found[i] = (Fraction(high) + Fraction(low)) * Fraction(units.force)
-        centre = Fraction(float(approach.high)) + Fraction(float(approach.low))
-        return cls(found, centre * Fraction(units.length))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof(Record):
     """A checked proof: statuses of all asperities, and bounds on loads, gaps, forces and losses.
@@ -116,19 +91,19 @@ class Proof(Record):
 
 def prove(
     scene: Scene,
-    loads: ArrayLike | NearState,
+    loads: ArrayLike | Trial,
     *,
     approach: float | None = None,
     load: float | None = None,
-    sheared: Sequence[tuple[float, NearState]] = (),
+    sheared: Sequence[tuple[float, Trial]] = (),
 ) -> Proof:
     """A proof of the solution near given loads, which may come from any source.
 
-    loads    : (n,) [force] not negative, in the order of the scene's asperities; or a `NearState`
+    loads    : (n,) [force] not negative, in the order of the scene's asperities; or a `Trial`
     approach : [length] prescribed approach, if no load is given
     load     : [force] prescribed load P, if no approach is given
     sheared  : friction states to prove, with the losses of cycles from -Q to Q. Each is a pair: the
-        shear force Q [force], and the `NearState` of the contact without shear at the load P - Q/f,
+        shear force Q [force], and the `Trial` of the contact without shear at the load P - Q/f,
         with the coefficient of friction f (docs/theory/proof-file.md)
 
     The function runs the checker, which computes the bounds, so it takes as long as a check (times:
@@ -139,22 +114,16 @@ def prove(
     """
     checks.exactly_one("approach", approach, "load", load)
     refuse_many(scene)
-    if not isinstance(loads, NearState):
-        loads = NearState.given(
-            checks.array("loads", loads, length=len(scene), sign="not negative")
-        )
-    if load is not None and not any(loads.loads):
-        raise InputError("loads", found="none", expected="a load on some asperity")
+    if not isinstance(loads, Trial):
+        loads = _trial(scene, loads, approach, load)
     modulus = scene.material.contact_modulus
-    states = np.array([loads.loads, *(near.loads for _, near in sheared)], dtype=np.float64)
-    radii = hertz.contact_radius(states, modulus, scene.relative_radii)
-    share = None if load is None else load / modulus
-    trial = TrialState(scene, radii[0], radii.max(axis=0), approach, share)
-    document = _document(trial, {"approach": approach} if load is None else {"load": load})
-    document["pressed"] = _place(trial, document, loads, approach)
+    states = np.array([_exact_loads(near) for near in (loads, *(it for _, it in sheared))])
+    radii = hertz.contact_radius(states.astype(np.float64), modulus, scene.relative_radii)
+    trial = TrialState(scene, radii[0], radii.max(axis=0), approach)
+    document = _document(scene, {"approach": approach} if load is None else {"load": load})
+    document["pressed"] = _place(document, loads)
     document["sheared"] = [
-        {"force": abs(force).hex(), "held": _place(trial, document, near, None)}
-        for force, near in sheared
+        {"force": abs(force).hex(), "held": _place(document, near)} for force, near in sheared
     ]
     refusal = "contacts overlap too much for the energy to be proved convex near these loads"
     for argument in trial.arguments():
@@ -176,9 +145,26 @@ def refuse_many(scene: Scene) -> None:
         raise InputError("asperities of a scene to prove", found=f"{len(scene):,}", expected=most)
 
 
-def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
+def _trial(scene: Scene, loads: ArrayLike, approach: float | None, load: float | None) -> Trial:
+    """The trial of given loads (n,) [force], in which all asperities may touch under a load."""
+    given = checks.array("loads", loads, length=len(scene), sign="not negative")
+    if load is not None and not given.any():
+        raise InputError("loads", found="none", expected="a load on some asperity")
+    control: Any = {"approach": approach} if load is None else {"load": load, "highest": np.inf}
+    problem = NormalProblem.assemble(scene, **control, influence="dense")
+    return trial_of(problem, given[problem.candidates] / problem.units.force)
+
+
+def _exact_loads(trial: Trial) -> list[Fraction]:
+    """(n,) [force] the loads of a trial, with all their digits, of all asperities of the scene."""
+    problem, found = trial.problem, [Fraction(0)] * len(trial.problem.scene)
+    for i, high, low in zip(problem.candidates, *trial.loads, strict=True):
+        found[i] = (Fraction(high) + Fraction(low)) * Fraction(problem.units.force)
+    return found
+
+
+def _document(scene: Scene, prescribed: dict[str, Any]) -> dict[str, Any]:
     """The contents of the file without its entries `argument`, `pressed`, `sheared`, `claims`."""
-    scene = trial.scene
     x, y = scene.asperities.positions.T
     given = {
         "sphere_radius": scene.sphere_radius,
@@ -203,19 +189,15 @@ def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _place(
-    trial: TrialState, document: dict[str, Any], near: NearState, approach: float | None
-) -> dict[str, Any]:
+def _place(document: dict[str, Any], near: Trial) -> dict[str, Any]:
     """The entry of the file for a state: contact radii to thirty digits, and the approach."""
-    scene = checker.read_scene(document["scene"])
+    scene, (high, low) = checker.read_scene(document["scene"]), near.approach.mid
+    approach = (Fraction(float(high)) + Fraction(float(low))) * Fraction(near.problem.units.length)
     radii = [
         _cube_root(load * R * Fraction(3, 4) / scene.modulus)
-        for load, R in zip(near.loads, scene.radii, strict=True)
+        for load, R in zip(_exact_loads(near), scene.radii, strict=True)
     ]
-    centre = Fraction(trial.best_approach) if near.approach is None else near.approach
-    if approach is not None:
-        centre = Fraction(approach)
-    return {"radii": [_digits(radius) for radius in radii], "approach": _digits(centre)}
+    return {"radii": [_digits(radius) for radius in radii], "approach": _digits(approach)}
 
 
 def _cube_root(x: Fraction) -> Fraction:
@@ -267,16 +249,16 @@ class Argument(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution, and the prescribed approach or load / E*.
+    """Contact radii (n,) [length] near a solution.
 
-    largest : (n,) [length] the largest contact radii in this and in all friction states
+    largest  : (n,) [length] the largest contact radii in this and in all friction states
+    approach : [length] the prescribed approach, or None
     """
 
     scene: Scene
     radii: Array
     largest: Array
     approach: float | None
-    load: float | None
 
     @cached_property
     def apart(self) -> Array:
@@ -287,9 +269,8 @@ class TrialState:
 
     @cached_property
     def loads(self) -> Array:
-        """(n,) loads / E*, scaled to the prescribed total."""
-        loads: Array = 4 * self.radii**3 / (3 * self.scene.relative_radii)
-        return loads if self.load is None else loads * (self.load / loads.sum())
+        """(n,) loads / E*."""
+        return np.asarray(4 * self.radii**3 / (3 * self.scene.relative_radii))
 
     @cached_property
     def local(self) -> Array:
@@ -300,14 +281,6 @@ class TrialState:
     def pushed(self) -> Array:
         """(n,) [length] displacements A P by the loads on other asperities."""
         return (1 / self.apart) @ self.loads / np.pi
-
-    @cached_property
-    def best_approach(self) -> float:
-        """[length] the prescribed approach, or the one that fits the touching asperities best."""
-        if self.approach is not None:
-            return self.approach
-        wanted = self.local + self.pushed - self.scene.offsets
-        return float(self.radii @ wanted / self.radii.sum())
 
     @cached_property
     def ceiling(self) -> tuple[float | None, float]:

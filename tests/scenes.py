@@ -20,10 +20,31 @@ STEEL = cr.Material.from_youngs(210e9, 0.3)
 PAPER_APPROACH = 5e-5
 
 
+def hexagonal(
+    spacing: float = 0.0025, tip_radius: float = 0.02, within: float = 0.0102, **options: Any
+) -> cr.Scene:
+    """The source paper's example, 61 asperities, or another array on its sphere."""
+    array = cr.Asperities.hexagonal(
+        spacing=spacing, tip_radius=tip_radius, within=within, **options
+    )
+    return cr.Scene(1.0, array, MATERIAL, geometry="summit")
+
+
+def on_sphere(
+    points: Any,
+    tip_radii: Any = 0.02,
+    heights: Any = 0.0,
+    radius: float = 1.0,
+    friction: Any = None,
+) -> cr.Scene:
+    """Asperities at these points under a sphere of this radius."""
+    asperities = cr.Asperities(points, tip_radii, heights)
+    return cr.Scene(radius, asperities, MATERIAL, friction, "summit")
+
+
 def paper(geometry: Any = "summit") -> cr.Scene:
     """The source paper's example: 61 asperities, of which 37 touch."""
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
+    return replace(hexagonal(), geometry=geometry)
 
 
 def rough(geometry: Any = "summit") -> cr.Scene:
@@ -52,6 +73,11 @@ def twins() -> tuple[cr.Scene, float]:
     return cr.Scene(
         1.0, cr.Asperities(points, 0.02), MATERIAL, friction=0.5, geometry="summit"
     ), 6.6e-8
+
+
+def prescribed(scene: cr.Scene, approach: float, control: str) -> dict[str, float]:
+    """How to prescribe the contact at this approach: by the approach, or by its load."""
+    return {control: getattr(cr.press(scene, approach=approach), control)}
 
 
 #: name -> (scene, approach): every one in the convex range.

@@ -16,6 +16,7 @@ from scenes import (
     PAPER_APPROACH,
     operators,
     paper,
+    prescribed,
     random_cases,
     reference,
     rough,
@@ -67,9 +68,9 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     8e-16 through the matrix and 3e-15 through transforms; each of itself, by 3e-15 and 2e-14.
     """
     scene, approach = NAMED[name]
-    prescribed = {control: {"approach": approach, "load": total(name)}[control]}
-    contact = cr.press(scene, **prescribed, influence=kind)
-    certificate, exact = contact.certificate, reference(scene, **prescribed)
+    given = prescribed(scene, approach, control)
+    contact = cr.press(scene, **given, influence=kind)
+    certificate, exact = contact.certificate, reference(scene, **given)
     assert contact.influence == kind
     assert (certificate.scope, certificate.holds) == ("global", True)
     assert_honest(certificate, contact.loads, exact)
@@ -84,18 +85,12 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     drift = abs(float(multiprecision.errors([contact.approach], [exact.approach])[0]))
     assert drift <= 1e-14 * contact.approach
     rounded = np.array([float(load) for load in exact.loads])
-    known = cr.certify(scene, rounded, **prescribed, influence=kind)
+    known = cr.certify(scene, rounded, **given, influence=kind)
     assert known.holds
     assert_honest(known, rounded, exact)
     if kind != "scattered":  # known to half a unit in the last place
         half = 2.0**-53 * rounded * (1 + 1e-9) + 1e-24 * rounded.max()
         assert (known.load_errors <= half).all()
-
-
-def total(name: str) -> float:
-    """A load to prescribe."""
-    scene, approach = NAMED[name]
-    return cr.press(scene, approach=approach, influence="dense").load
 
 
 @pytest.mark.sample(3)

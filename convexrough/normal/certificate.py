@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
@@ -24,7 +23,7 @@ from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, completed, refined, trial
+from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -182,8 +181,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
-    pair, missing = completed(problem, Pair.exact(given))
-    start = trial(problem, pair, missing, problem.pressed_product(pair))
+    start = trial_of(problem, given, problem.pressed_product)
     level = proved(problem, start)
     if len(problem):
         better = proved(problem, refined(problem, start))
@@ -211,7 +209,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     if box.scope != "global":
         assert level.trial is not None
         # `overhang` needs weights and the displacement that exactly these weights cause.
-        highest = problem.overhang(level.trial.loads.high, level.trial.product.upper)
+        highest = problem.overhang(level.trial.loads.high, level.trial.product)
         others = OtherSolutions.of(problem, level.loads.upper, highest)
     load_errors = _load_errors(problem, loads, level)
     moved = _apart(start.loads.high, level) + np.abs(start.loads.low)

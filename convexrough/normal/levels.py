@@ -24,8 +24,8 @@ from convexrough.normal.refine import defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF
 
-#: Largest number of candidates for which levels are solved together: for more candidates this saves
-#: no time.
+#: Largest number of asperities for which problems are solved together: for more asperities this
+#: saves no time.
 MOST = 512
 
 #: Largest number of Newton steps.
@@ -143,7 +143,7 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
     state = refined_loads(stack, finite)
     if box is None:
         loads = state.loads.high
-        box = widest(stack, loads, stack.overhang(loads, state.product.upper))
+        box = widest(stack, loads, stack.overhang(loads, state.product))
     inside, _, level = solution_in(stack, box, state)
     good = inside & np.ravel(box.convexity_number < 1)
     good &= np.isfinite(level.loads.radius).all(axis=1) & (level.touching | level.open).all(axis=1)

@@ -27,28 +27,27 @@ STRAIGHT = 1e-11
 
 
 @np.errstate(all="ignore")
-def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
+def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
     """Indentations delta + tau, with the tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
 
-    The sign + means max(., 0). For m problems delta is (m, n) and the load (m, 1). The sum to the
-    power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in tau. So
-    Newton's method converges to the root from the right.
+    The sign + means max(., 0). The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is
+    convex and nearly straight in tau. So Newton's method converges to the root from the right.
     """
-    highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
+    highest = indentation.max()
     indentation, inverse = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
+    most = hertz.indentation(load, coefficients.max())  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * inverse
         root = np.sqrt(ratio)
-        total = summed(ratio * root)
+        total = (ratio * root).sum()
         # (total^(2/3) - load^(2/3)) over its slope, without cancellation
         excess = -np.expm1(2 / 3 * np.log1p((load - total) / total)) * total
-        step = excess / summed(root * inverse)
-        if steps > 0:
-            step = np.where(step > 4 * ROUNDOFF * shift, step, 0.0)
+        step = excess / (root * inverse).sum()
+        if steps > 0 and not step > 4 * ROUNDOFF * shift:
+            break
         shift = shift - step
-        if (np.abs(step) < STRAIGHT * shift).all():
+        if np.abs(step) < STRAIGHT * shift:
             break
     return np.asarray(indentation + shift)
 

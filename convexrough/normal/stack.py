@@ -15,7 +15,8 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.normal.problem import Data, NormalProblem
+from convexrough.normal.exact import Data
+from convexrough.normal.problem import NormalProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Stack(NormalProblem):
             "coefficients": exact.coefficients.value,
             "offsets": exact.offsets.value,
             "offset_errors": exact.offsets.error,
-            "highest": np.inf if by_load else control.upper,
+            "highest": np.full(control.shape, np.inf) if by_load else control.upper,
             "shells": shells,
             "control": control,
             "by_load": by_load,

@@ -172,7 +172,7 @@ class Newton:
             if len(near) == len(problem):
                 return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
-            gap = trial.gap.value if trial else _gaps(problem, loads, approach)
+            gap = trial.gap.value if trial else problem.gap(loads, problem.apply(loads), approach)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
@@ -234,7 +234,3 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     if problem.load is not None:
         loads = loads / loads.max() * problem.load  # also if they are too small for a sum
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
-
-
-def _gaps(problem: NormalProblem, loads: Array, approach: float) -> Array:
-    return problem.gap(loads, problem.influence.apply(loads), approach)

@@ -13,7 +13,7 @@ from flint import arb, ctx
 from gradient_oracle import DIGITS, STEP, Setup, exact
 from levels_reference import SCENES, Bristles, cycle_loss, of_setup
 from path_scenes import LARGEST, PAPER, around, on_flat, shaded
-from scenes import MATERIAL
+from scenes import MATERIAL, on_sphere
 
 import convexrough as cr
 from convexrough import checker
@@ -97,9 +97,7 @@ def test_no_slip_of_what_does_not_touch() -> None:
     low, high = -3e-5, 0.0
 
     def pressed(height: float) -> cr.Contact:
-        scene = cr.Scene(
-            1.0, cr.Asperities(points, 0.02, [height, 0.0, 0.0]), MATERIAL, 0.5, geometry="summit"
-        )
+        scene = on_sphere(points, heights=[height, 0.0, 0.0], friction=0.5)
         return cr.press(scene, approach=3e-5)
 
     for _ in range(40):
@@ -122,9 +120,7 @@ def test_gradients_of_one_asperity_are_within_their_bounds(fraction: float) -> N
     rng = np.random.default_rng(3)
     for _ in range(6):
         place = rng.uniform(1, 2, 2)
-        scene = cr.Scene(
-            300.0, cr.Asperities([place], 0.144), MATERIAL, friction=0.5, geometry="summit"
-        )
+        scene = on_sphere([place], 0.144, radius=300.0, friction=0.5)
         low = 1 + 10 ** rng.uniform(-5, -2)
         contact = cr.press(scene, approach=float(place @ place) / 600 * low)
         force = fraction * 0.5 * contact.load
@@ -145,8 +141,7 @@ def test_gradients_of_one_asperity_are_within_their_bounds(fraction: float) -> N
 def test_gradients_of_gaps_are_within_their_bounds() -> None:
     """Lift the only one that touches under a held load: each gap grows by as much."""
     points = [[0.0, 0.0], [0.01, 0.0], [-0.01, 0.0], [0.0, 0.01]]
-    asperities = cr.Asperities(points, 0.02, [0.0, -1e-3, -1e-3, -1e-3])
-    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), load=1e-8)
+    contact = cr.press(on_sphere(points, heights=[0.0, -1e-3, -1e-3, -1e-3]), load=1e-8)
     assert contact.status.tolist() == ["contact", "open", "open", "open"]
     rng = np.random.default_rng(1)
     for _ in range(20):

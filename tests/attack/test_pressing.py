@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attacks import assert_honest, excess
-from scenes import MATERIAL, PAPER_APPROACH, STEEL, paper, reference
+from scenes import PAPER_APPROACH, STEEL, on_sphere, paper, reference
 from status_audit import Tally
 
 import convexrough as cr
@@ -16,8 +16,7 @@ import convexrough as cr
 def test_the_duality_gap_where_heights_cancel_drops(radius: float) -> None:
     """Summits on a bowl: the indentation of 1e-12 is a difference of numbers near 10."""
     points = 3.0 * np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
-    asperities = cr.Asperities(points, 1.0, (points**2).sum(axis=1) / (2 * radius))
-    scene = cr.Scene(radius, asperities, MATERIAL, geometry="summit")
+    scene = on_sphere(points, 1.0, (points**2).sum(axis=1) / (2 * radius), radius)
     contact = cr.press(scene, approach=1e-12, influence="lattice")
     exact = reference(scene, approach=1e-12)
     assert contact.certificate.duality_gap >= excess(scene, contact.loads, exact)
@@ -30,10 +29,7 @@ def test_a_stored_matrix_of_many_rows_decides_what_grazes() -> None:
     points = 0.0025 * np.column_stack((i, j)) + rng.uniform(-2e-4, 2e-4, (900, 2))
 
     def pressed(heights: Any) -> cr.Contact:
-        asperities = cr.Asperities(points, 0.02, heights)
-        return cr.press(
-            cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), approach=8e-4, influence="dense"
-        )
+        return cr.press(on_sphere(points, 0.02, heights), approach=8e-4, influence="dense")
 
     contact, heights = pressed(0.0), np.zeros(900)
     assert contact.certificate.load_error < 2e-16 * contact.loads.max()
@@ -46,8 +42,7 @@ def test_a_stored_matrix_of_many_rows_decides_what_grazes() -> None:
 @pytest.mark.parametrize("load", [1e-320, 5e-324])
 def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
     """The solution carries nothing and has no energy; these loads have some."""
-    asperities = cr.Asperities([[0.0, 0.0], [0.01, 0.0]], 0.02, [-1e-8, -1e-8])
-    scene = cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+    scene = on_sphere([[0.0, 0.0], [0.01, 0.0]], heights=-1e-8)
     gap = cr.certify(scene, [load, 0.0], approach=5e-9).duality_gap
     assert Fraction(gap) >= Fraction(5e-9) * Fraction(load)
 

@@ -12,8 +12,11 @@ from scenes import (
     NAMED,
     OPERATORS,
     PAPER_APPROACH,
+    hexagonal,
+    on_sphere,
     operators,
     paper,
+    prescribed,
     random_cases,
     reference,
     rough,
@@ -22,6 +25,7 @@ from scenes import (
 )
 
 import convexrough as cr
+from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.coupling import Kind
 from convexrough.normal.boxes import MARGINS, box_of_touching, convex_margin, tried
 from convexrough.normal.problem import NormalProblem
@@ -51,8 +55,7 @@ def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
     """Where only a box is convex: loads outside it must not be proved, nor their neighbours."""
-    lattice = cr.Asperities.hexagonal(spacing=0.0012, tip_radius=0.2, within=0.0102)
-    scene = cr.Scene(1.0, lattice, MATERIAL, geometry="summit")
+    scene = hexagonal(0.0012, 0.2)
     contact = cr.press(scene, approach=PAPER_APPROACH, influence="dense")
     assert contact.certificate.scope == "local"
     for seed in range(4):
@@ -100,9 +103,7 @@ def test_touching_to_rounding(steps: int) -> None:
     approach = k * load ** (2 / 3)
     height = load / (np.pi * r) - approach + r**2 / 2
     height += steps * np.spacing(height)
-    scene = cr.Scene(
-        1.0, cr.Asperities([[0, 0], [r, 0]], 0.01, [0, height]), MATERIAL, geometry="summit"
-    )
+    scene = on_sphere([[0, 0], [r, 0]], 0.01, [0, height])
     contact, exact = cr.press(scene, approach=approach), reference(scene, approach=approach)
     assert_honest(contact.certificate, contact.loads, exact)
     assert contact.certificate.scope == "global"
@@ -112,8 +113,7 @@ def test_touching_to_rounding(steps: int) -> None:
 
 def test_touching_exactly_is_undecided() -> None:
     """Neither load nor gap: two asperities that first touch at approach 0, all numbers exact."""
-    pair = cr.Asperities([[0.0, 0.0], [0.5, 0.0]], 0.02, [0.0, 0.125])
-    contact = cr.press(cr.Scene(1.0, pair, MATERIAL, geometry="summit"), approach=0.0)
+    contact = cr.press(on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125]), approach=0.0)
     assert list(contact.status) == ["undecided", "undecided"]
     assert list(contact.loads) == [0.0, 0.0]
     assert not contact.certificate.holds
@@ -124,8 +124,7 @@ def test_scopes(kind: Kind) -> None:
     """From easy to hard: the shells, the Cholesky test or secants, a local box, nothing."""
 
     def pressed(spacing: float, tip_radius: float) -> cr.Certificate:
-        lattice = cr.Asperities.hexagonal(spacing=spacing, tip_radius=tip_radius, within=0.0102)
-        scene = cr.Scene(1.0, lattice, MATERIAL, geometry="summit")
+        scene = hexagonal(spacing, tip_radius)
         return cr.press(scene, approach=PAPER_APPROACH, influence=kind).certificate
 
     shells, cholesky = pressed(0.0012, 0.01), pressed(0.0012, 0.03)
@@ -159,7 +158,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
     radii[touching] = 1e-3 * rng.uniform(0.6, 0.75, len(touching))
     problem = NormalProblem.assemble(scene, approach=1e-3, influence=operator)
     loads = 4 / 3 * radii**3 / scene.relative_radii / problem.units.force
-    boxes = list(tried(problem, loads, problem.influence.apply(loads)))
+    boxes = list(tried(problem, loads, problem.plain_product(Pair.exact(loads))))
     for room in (0.0, 0.1):
         touching = box_of_touching(problem, loads, loads > 0, room * loads)
         boxes += [] if touching is None else [touching]
@@ -173,8 +172,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 3))
 def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
-    points = rng.uniform(-1, 1, (12, 2)) * 1e-2
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
+    scene = on_sphere(rng.uniform(-1, 1, (12, 2)) * 1e-2)
     problem = NormalProblem.assemble(scene, approach=1e-4)
     h = problem.compliance(problem.bounds(problem.approach_bound) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
@@ -208,19 +206,18 @@ def test_screened_asperities_are_open_whatever_the_loads(kind: Kind, control: st
     A load on an asperity that cannot touch is proved to be wrong by just that load.
     """
     scene = paper()
-    load = cr.press(scene, approach=3e-5).load
-    prescribed = {"approach": 3e-5} if control == "approach" else {"load": load}
-    candidates = NormalProblem.assemble(scene, **prescribed).candidates
+    given = prescribed(scene, 3e-5, control)
+    candidates = NormalProblem.assemble(scene, **given).candidates
     screened = np.setdiff1d(np.arange(61), candidates)
     wrong = np.zeros(61)
-    wrong[candidates[-1]] = load
+    wrong[candidates[-1]] = cr.press(scene, approach=3e-5).load
     wrong[60] = 1e-9
-    certificate = cr.certify(scene, wrong, **prescribed, influence=kind)
+    certificate = cr.certify(scene, wrong, **given, influence=kind)
     assert certificate.scope == "global"
     assert (certificate.gap_errors[screened] > certificate.gaps[screened]).all()
     assert (certificate.status[screened] == "open").all()
     assert certificate.load_errors[60] == 1e-9
-    assert_honest(certificate, wrong, reference(scene, **prescribed))
+    assert_honest(certificate, wrong, reference(scene, **given))
 
 
 def test_no_loads_under_load_control() -> None:
@@ -239,14 +236,13 @@ def test_no_loads_under_load_control() -> None:
 def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> None:
     """Of pressed loads, and with an error of the largest; both are scaled to a prescribed load."""
     scene = paper("closest")
-    load = cr.press(scene, approach=PAPER_APPROACH).load
-    prescribed = {"approach": PAPER_APPROACH} if control == "approach" else {"load": load}
-    contact, exact = cr.press(scene, **prescribed), reference(scene, **prescribed)
+    given = prescribed(scene, PAPER_APPROACH, control)
+    contact, exact = cr.press(scene, **given), reference(scene, **given)
     wrong, certificate = contact.loads.copy(), contact.certificate
     if off:
         wrong[np.argmax(wrong)] *= 1 + off
-        certificate = cr.certify(scene, wrong, **prescribed)
-    above = excess(scene, wrong, exact, load if control == "load" else None)
+        certificate = cr.certify(scene, wrong, **given)
+    above = excess(scene, wrong, exact, given.get("load"))
     assert 0 < above <= certificate.duality_gap
     if off >= 1e-9:
         assert certificate.duality_gap <= 3 * above
@@ -276,12 +272,11 @@ def test_loads_far_too_large_under_load_control(factor: float) -> None:
 def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
     flat = paper()
     scene = cr.Scene(1.0, flat.asperities, cr.Material(1e12, 0.3), geometry="summit")
-    load = cr.press(scene, approach=PAPER_APPROACH).load
-    prescribed = {"approach": PAPER_APPROACH} if control == "approach" else {"load": load}
-    exact, given = reference(scene, **prescribed), cr.press(scene, **prescribed).loads.copy()
-    problem = NormalProblem.assemble(scene, **prescribed)
+    given = prescribed(scene, PAPER_APPROACH, control)
+    exact, wrong = reference(scene, **given), cr.press(scene, **given).loads.copy()
+    problem = NormalProblem.assemble(scene, **given)
     assert problem.units.force > 8
-    open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(given))
+    open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(wrong))
     assert len(open_ones)
-    given[open_ones] = 5e-324
-    assert_honest(cr.certify(scene, given, **prescribed), given, exact)
+    wrong[open_ones] = 5e-324
+    assert_honest(cr.certify(scene, wrong, **given), wrong, exact)

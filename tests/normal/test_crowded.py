@@ -10,7 +10,7 @@ from attacks import assert_honest, excess
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scenes import MATERIAL, OPERATORS, operators, solve_exactly
+from scenes import OPERATORS, hexagonal, on_sphere, operators, solve_exactly
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair
@@ -36,7 +36,7 @@ def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
     r, angle = 0.01 * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
     points = np.column_stack((r * np.cos(angle), r * np.sin(angle)))
     tips = size * 0.02 * np.sqrt(61 / count) * rng.lognormal(0, 0.2, count)
-    return cr.Scene(1.0, cr.Asperities(points, tips), MATERIAL, friction=0.5, geometry="summit")
+    return on_sphere(points, tips, friction=0.5)
 
 
 @settings(max_examples=40, deadline=None)
@@ -124,8 +124,7 @@ def all_states(scene: cr.Scene, approach: float) -> list[Any]:
 def test_other_solutions_are_as_the_certificate_says(distance: float) -> None:
     """Twins, where there are two or three solutions: each is judged, and says true things."""
     points = np.array([[0.0, 0.0], [distance, 0.0], [3e-3, 0.0]])
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
-    approach = 5e-5
+    scene, approach = on_sphere(points), 5e-5
     states = all_states(scene, approach)
     assert states
     inverse = inverse_distances(points, points)
@@ -208,10 +207,8 @@ def test_lattices_exclude_more_other_solutions() -> None:
     """Where shells of the secants meet, the lattice may still say that there is one solution."""
     rng, by_lattice = np.random.default_rng(3), 0
     for size in np.linspace(3.0, 8.0, 11):
-        array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02 * size, within=0.0102)
-        problem = NormalProblem.assemble(
-            cr.Scene(1.0, array, MATERIAL, geometry="summit"), approach=1e-4, influence="lattice"
-        )
+        scene = hexagonal(tip_radius=0.02 * size)
+        problem = NormalProblem.assemble(scene, approach=1e-4, influence="lattice")
         loads, most = Newton().solve(problem).loads, problem.bounds(problem.approach_bound)
         others, A = OtherSolutions.of(problem, loads, problem.approach_bound), problem.influence
         secant = problem.coefficients * (np.cbrt(most) ** 2 - np.cbrt(loads) ** 2) / (most - loads)
@@ -245,16 +242,12 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
         [(i + 0.5 * j, j * np.sqrt(3) / 2) for i in range(-4, 5) for j in range(-4, 5)]
     )
     bank = sites[np.argsort(np.hypot(*sites.T), kind="stable")][:13]
-    material, apart, far = cr.Material(1.0, 0.3), 1e-2, 1e4
-    flat = cr.Scene(np.inf, cr.Asperities(bank, 0.4), material, geometry="summit")
-    loads = cr.press(flat, approach=1.0).loads
+    apart, far = 1e-2, 1e4
+    loads = cr.press(on_sphere(bank, 0.4, radius=np.inf), approach=1.0).loads
     tips = (2.28 * apart) ** 2 / 0.5, (2.65 * apart) ** 2 / 0.475
-    asperities = cr.Asperities(
-        [*bank, (far, 0), (far + apart, 0), (-far, far)],
-        [0.4] * 13 + [*tips, 0.4],
-        [0.0] * 13 + [-0.5, -0.525, -1.02],
-    )
-    scene = cr.Scene(np.inf, asperities, material, geometry="summit")
+    points = [*bank, (far, 0), (far + apart, 0), (-far, far)]
+    heights = [0.0] * 13 + [-0.5, -0.525, -1.02]
+    scene = on_sphere(points, [0.4] * 13 + [*tips, 0.4], heights, radius=np.inf)
     one = np.append(loads, [4 / 3 * np.sqrt(tips[0]) * 0.5**1.5, 0, 0])
     two = np.append(loads, [0, 4 / 3 * np.sqrt(tips[1]) * 0.475**1.5, 0])
     total = float(one.sum())

@@ -13,7 +13,9 @@ from scenes import (
     MATERIAL,
     OPERATORS,
     PAPER_APPROACH,
+    hexagonal,
     on_lattice,
+    on_sphere,
     operators,
     paper,
     random_cases,
@@ -22,6 +24,7 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.convex.newton import descend
 from convexrough.influence import Kind
 from convexrough.normal.boxes import tried
@@ -65,7 +68,7 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     problem = assembled(scene, load=contact.load, influence=kind)
     assert set(np.flatnonzero(contact.loads)) <= set(problem.candidates)
     weights = np.random.default_rng(seed).random(len(problem)) ** 9
-    bound = problem.overhang(weights, problem.influence.apply(weights))
+    bound = problem.overhang(weights, problem.plain_product(Pair.exact(weights)))
     assert bound * problem.units.length >= approach * (1 - 1e-12)
 
 
@@ -134,8 +137,7 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
     """Newton's method starts somewhere wherever there is an answer."""
     ring = np.exp(2j * np.pi * np.arange(6) / 6)
     positions = 0.01 * np.column_stack((ring.real, ring.imag))
-    tall = cr.Scene(1.0, cr.Asperities(positions, 0.02, 6e-5), MATERIAL, geometry="summit")
-    assert cr.press(tall, **prescribed).certificate.holds
+    assert cr.press(on_sphere(positions, heights=6e-5), **prescribed).certificate.holds
 
 
 @pytest.mark.sample(3)
@@ -153,8 +155,7 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
     """How far a scene has to reach under a load."""
 
     def scene_within(within: float) -> cr.Scene:
-        tips = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within, **rough)
-        return cr.Scene(1.0, tips, MATERIAL, geometry="summit")
+        return hexagonal(within=within, **rough)
 
     def farthest(approach: float) -> float:
         return reach(
@@ -172,7 +173,7 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 def test_no_proof_where_loads_lie_beyond_a_face_of_the_box() -> None:
     problem = assembled(paper(), load=3.6e-7)
     state = refined_loads(problem, Newton().solve(problem).loads)
-    box = next(tried(problem, state.loads.high, state.product.value))
+    box = next(tried(problem, state.loads.high, state.product))
     assert proved(problem, state, iter((box,))).box is box
     lower = box._replace(faces=0.9 * state.loads.high)
     assert proved(problem, state, iter((lower,))).box is None
@@ -184,7 +185,7 @@ def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     total = problem.load
     assert total is not None
     state = refined_loads(problem, Newton().solve(problem).loads)
-    box = next(tried(problem, state.loads.high, state.product.value))
+    box = next(tried(problem, state.loads.high, state.product))
     wide, higher = (
         proved(each, refined_loads(each, state.loads.high), iter((box,)))
         for each in (

@@ -182,8 +182,7 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     assert checker.check(held, quiet).startswith("proved")
 
     def pair(*which: int) -> cr.Scene:
-        asperities = cr.Asperities(np.array([[0.0, 0.0], [0.002, 0.0]])[[*which]], 0.02)
-        return cr.Scene(1.0, asperities, scenes.MATERIAL, geometry="summit")
+        return scenes.on_sphere(np.array([[0.0, 0.0], [0.002, 0.0]])[[*which]])
 
     alone, both = proof_of(pair(1), 1e-5), proof_of(pair(0, 1), 1e-5)
     radii = [[(0.0).hex()], *alone["pressed"]["radii"]]
@@ -236,10 +235,8 @@ def test_an_asperity_that_is_dragged_along_is_refused() -> None:
     """
     six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
     points = 0.0025 * np.array([[0, 0], *six])
-    ring = cr.Asperities(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6])
-    contact = cr.press(
-        cr.Scene(1.0, ring, scenes.MATERIAL, friction=0.5, geometry="summit"), approach=7.6e-5
-    )
+    ring = scenes.on_sphere(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6], friction=0.5)
+    contact = cr.press(ring, approach=7.6e-5)
     assert contact.proof().document["claims"]["scope"] == "global"
     left = cr.press(contact.scene, load=0.99 * contact.load)
     assert left.loads[0] > contact.loads[0]
@@ -350,9 +347,7 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
 def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
     """Deep in two neighbours: one carries all and keeps the other open, or the other way round."""
     depth, apart = 1.0, 1.0
-    scene = cr.Scene(
-        1e30, cr.Asperities([[0, 0], [apart, 0]], 9.0), scenes.MATERIAL, geometry="summit"
-    )
+    scene = scenes.on_sphere([[0, 0], [apart, 0]], 9.0, radius=1e30)
     radius = float(scene.relative_radii[0])
     a = math.sqrt(radius * depth)
     assert a > 3 * math.pi / 4 * apart  # then it pushes the other down by more than the approach

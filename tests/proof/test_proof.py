@@ -95,9 +95,7 @@ def test_random_scenes() -> None:
 def test_the_bound_holds_where_the_energy_is_flattest() -> None:
     """Two equal contacts, as near to the end of convexity as is provable, off in opposite ways."""
     a, apart = 0.75 * np.pi / 2, 1.0
-    scene = cr.Scene(
-        1e30, cr.Asperities([[0, 0], [apart, 0]], 1e3), scenes.MATERIAL, geometry="summit"
-    )
+    scene = scenes.on_sphere([[0, 0], [apart, 0]], 1e3, radius=1e30)
     approach = a**2 / 1e3 * (1 + 4 * a / (3 * np.pi * apart))
     loads = cr.press(scene, approach=approach).loads
     claims = judged(prove(scene, loads * [1 + 1e-6, 1 - 1e-6], approach=approach))
