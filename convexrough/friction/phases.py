@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.errors import blamed_on
-from convexrough.friction.cycle import Cycle, steady
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.order import Order
+from convexrough.friction.steady import steady
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
