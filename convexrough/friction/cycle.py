@@ -24,7 +24,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Point
-from convexrough.friction.levels import FrictionLevels, forces_at, rounded
+from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loop import Loop, loop_through
 from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
@@ -239,12 +239,9 @@ class Cycle(Table, Plottable):
 
 
 def steady_cycles(
-    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]], forces: Sequence[Array]
+    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]]
 ) -> list[Cycle]:
-    """The steady cycles of several closed paths that begin from the same memory curve.
-
-    paths, forces : for each path the points (P, T) and the shear forces Q
-    """
+    """The steady cycles of several closed paths (P, T) that begin from the same memory curve."""
     levels = contact.cached(FrictionLevels)
     closed = [Closed.around(levels, start, points) for points in paths]
     levels.prepare(load for each in closed for load in each.needed)
@@ -254,12 +251,12 @@ def steady_cycles(
     moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
     ends = np.cumsum([0, *map(len, paths)]).tolist()
     return [
-        _cycle(contact, closed[k], forces[k], spent[2 * k : 2 * k + 2], moved[start:stop])
+        _cycle(contact, closed[k], spent[2 * k : 2 * k + 2], moved[start:stop])
         for k, (start, stop) in enumerate(pairwise(ends))
     ]
 
 
-def _cycle(contact: Contact, closed: Closed, forces: Array, spent: Ball, moved: Ball) -> Cycle:
+def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
     levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
     (first, loss), (first_error, error) = rounded(spent)
@@ -298,7 +295,7 @@ def _cycle(contact: Contact, closed: Closed, forces: Array, spent: Ball, moved: 
     return Cycle(
         contact=contact,
         loads=frozen(np.array([float(load) for load in loaded])),
-        forces=forces_at(closed.points[: closed.once], forces.tolist(), contact.scene),
+        forces=closed.forces[: closed.once],
         loss=float(loss),
         loss_error=float(error),
         loss_first=float(first),

@@ -26,7 +26,6 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.friction.curve import Point
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
@@ -190,13 +189,6 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
     if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
         return height
     return load if height > 0 else -load
-
-
-def forces_at(points: Sequence[Point], forces: Iterable[float], scene: Scene) -> Array:
-    """(m,) [force] the shear forces Q at points (P, T): f P or -f P if |T| = P, else as given."""
-    f = Fraction(checks.friction(scene.friction))
-    both = zip(points, forces, strict=True)
-    return frozen(np.array([float(f * T) if abs(T) == P else Q for (P, T), Q in both]))
 
 
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:

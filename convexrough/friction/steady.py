@@ -76,8 +76,7 @@ def cycles(
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         checks.some("displacement", amplitudes)
         tops = [levels.load - levels.displaced(x) for x in amplitudes]
-        heights, upper = [(T, -T) for T in tops], np.array([float(f * T) for T in tops])
-        lower = -upper
+        heights = [(T, -T) for T in tops]
     else:
         assert maximum is not None  # exactly_one
         upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
@@ -94,8 +93,7 @@ def cycles(
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]
         LOGGER.info("pressing at the level of a cycle")
     paths = [[(levels.load, T) for T in each] for each in heights]
-    forces = [np.array(both) for both in zip(upper, lower, strict=True)]
-    return steady_cycles(contact, MemoryCurve.pressed(levels.load), paths, forces)
+    return steady_cycles(contact, MemoryCurve.pressed(levels.load), paths)
 
 
 def steady(
@@ -119,4 +117,4 @@ def steady(
     """
     points = points_of(scene, loads, forces)
     contact = pressed_for(scene, [load for load, _ in points], influence)
-    return steady_cycles(contact, MemoryCurve(), [points], [np.array(forces, dtype=np.float64)])[0]
+    return steady_cycles(contact, MemoryCurve(), [points])[0]
