@@ -16,6 +16,7 @@ import convexrough as cr
 from convexrough.bench.scenes import scene as bench_scene
 from convexrough.friction import order
 from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.sweeping import swept_rates
 
 NOTHING = Fraction(0)
 
@@ -80,6 +81,12 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
     proved = order.proved_between(levels.top, levels.at(NOTHING), ~levels.top.open)
     assert proved or aim > 0.9
     assert not (proved and down)
+    problem, n = levels.top.problem, len(levels.candidates)
+    stiffness = 1.5 * np.cbrt(levels.top.loads.value) / problem.coefficients
+    bounds = swept_rates(problem.influence, stiffness, np.zeros(n), 1000)
+    for part in (0.3, 1.0) if aim <= 0.9 else ():  # regular for all smaller stiffnesses
+        matrix = np.eye(n) + problem.influence.matrix * (part * stiffness)
+        assert (bounds <= np.linalg.solve(matrix, np.ones(n)) + 1e-12).all()
 
 
 @pytest.mark.sample(2)
