@@ -46,6 +46,8 @@ DISTANCES = 64
 class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle. Arrays are (n,), and 0 where open.
 
+    contact          : the contact of the cycle
+    maximum, minimum : [force] the largest and the smallest shear force of the cycle
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
         load of the cycle; nan where contact is lost in the cycle ("intermittent"),

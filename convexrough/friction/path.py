@@ -39,6 +39,7 @@ LEAST_PART = 1e-250
 class LoadPath(Table, Plottable):
     """The friction states at m points of a path (P, Q) with straight segments between them.
 
+    contact        : the contact at the highest load of the path
     loads, forces  : (m,) [force] load P and shear force Q
     displacements  : (m,) [length] tangential displacement X of one body relative to the other, at
         distant points

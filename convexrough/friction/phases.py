@@ -91,6 +91,7 @@ class PhaseLosses(Table, Plottable):
     An ellipse has one phase and one factor. In all arrays the ellipses with the first factor come
     first, one for each phase, then those with the second factor, and so on.
 
+    scene   : the scene
     phases, factors : (c,) phase [rad], and factor of both amplitudes
     losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
         replace the ellipse

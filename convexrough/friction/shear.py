@@ -78,6 +78,7 @@ class ShearCertificate(Table):
 class ShearState(Table, Plottable):
     """A friction state after monotonic shear. Arrays are (n,), in the order of the asperities.
 
+    contact       : the pressed contact
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
@@ -85,6 +86,7 @@ class ShearState(Table, Plottable):
         slip; the effect of other asperities is left out
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides or is open
+    certificate   : what is proved about this state
     height        : [force] Q / f, without rounding
 
     >>> state = cr.shear(contact, displacement=9.88e-6)

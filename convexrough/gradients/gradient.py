@@ -201,6 +201,7 @@ class Gradient(Table, Plottable):
     asperities and no stored matrix, bounds for positions are also infinite, and in the geometry
     "closest" those for radii, too. An infinite derivative, in gross sliding, has the error 0.
 
+    contact         : the contact on which the number depends
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant
     heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for
