@@ -194,12 +194,10 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
-    Order means that, as the load rises, every asperity that is open at the load of `contact` stays
-    open, and the indentation of every other asperity never falls. The result is "proved", "proved
-    for one step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse
-    the proof. For some asperities, mostly at the edge of the contact, the proof needs a search that
-    takes some milliseconds per asperity. Other functions make this search for at most 1,000
-    asperities, and only if at most 10,000 touch.
+    docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
+    and "fails". Later results for this contact reuse the proof. For some asperities, mostly at the
+    edge of the contact, the proof needs a search that takes some milliseconds per asperity. Other
+    functions make this search for at most 1,000 asperities, and only if at most 10,000 touch.
 
     most : largest number of asperities for which the search is made. It is made only if at most ten
         times as many touch

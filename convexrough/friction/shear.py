@@ -37,11 +37,10 @@ class ShearCertificate(Table):
     Arrays are (n,), in the order of the scene's asperities.
 
     scope  : scope of the certificate of the pressed contact; "none" if nothing is proved
-    order  : "proved": no indentation falls as the load rises from P - |Q|/f to P, so statuses and
-        bounds hold for the true state (P is the load, Q the shear force, f the coefficient of
-        friction); "proved for one step": statuses and bounds hold for the result of one general
-        step from rest to Q (docs/theory/without-order.md), which is the true state unless the
-        deflection of some asperity decreased on the way; "fails": nothing is proved
+    order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
+        "Order"). "proved": statuses and bounds hold for the true state; "proved for one step": for
+        one general step from rest to Q, which gives the true state unless the deflection of some
+        asperity decreased on the way; "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
