@@ -38,9 +38,9 @@ class ShearCertificate(Table):
 
     scope  : scope of the certificate of the pressed contact; "none" if nothing is proved
     order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
-        "Order"). "proved": statuses and bounds hold for the true state; "proved for one step": for
-        one general step from rest to Q, which gives the true state unless the deflection of some
-        asperity decreased on the way; "fails": nothing is proved
+        "Order"). "proved": statuses and bounds hold for the true state. "proved for one step": they
+        hold for one general step from rest to Q, which gives the true state unless the deflection
+        of some asperity decreased on the way. "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
