@@ -292,7 +292,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         first, both = closed.general.losses[[closed.once, -1]]
         loss, defect = both - first, np.nan
         amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
-    return Cycle(
+    found = Cycle(
         contact=contact,
         loads=frozen(np.array([float(load) for load in loaded])),
         forces=closed.forces[: closed.once],
@@ -319,6 +319,8 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         start=float(closed.start.load),
         heights=heights,
     )
+    found.__dict__["_walk"] = closed  # the cached property would follow the path again
+    return found
 
 
 def loops(
