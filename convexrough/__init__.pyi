@@ -17,10 +17,7 @@ from .errors import SolverError as SolverError
 from .errors import WorkerError as WorkerError
 from .friction.curve import MemoryCurve as MemoryCurve
 from .friction.cycle import Cycle as Cycle
-from .friction.cycle import cycle as cycle
-from .friction.cycle import cycles as cycles
 from .friction.cycle import loops as loops
-from .friction.cycle import steady as steady
 from .friction.fretting import Fretting as Fretting
 from .friction.fretting import fretting as fretting
 from .friction.levels import prove_order as prove_order
@@ -38,6 +35,9 @@ from .friction.shear import shear as shear
 from .friction.side_by_side import PathComparison as PathComparison
 from .friction.side_by_side import PathEntry as PathEntry
 from .friction.side_by_side import compare_paths as compare_paths
+from .friction.steady import cycle as cycle
+from .friction.steady import cycles as cycles
+from .friction.steady import steady as steady
 from .friction.verdict import certify_shear as certify_shear
 from .gradients.change import ContactChange as ContactChange
 from .gradients.change import Direction as Direction

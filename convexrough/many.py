@@ -19,7 +19,8 @@ from convexrough import checks, threads
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.cycle import Cycle, cycle
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.steady import cycle
 from convexrough.record import Along, Table, in_text, singular
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.rows import CYCLE, MATRICES, TOTALS, PressedRows, in_rows

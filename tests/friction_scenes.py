@@ -52,10 +52,11 @@ def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) 
     return cr.Scene(scene.sphere_radius, scene.asperities, material, friction, scene.geometry)
 
 
-def off(value: float, true: Any) -> float:
-    """|value - true|."""
+def off(values: Any, true: Any) -> np.ndarray:
+    """(m,) upper bounds on |values - true|."""
+    both = zip(np.atleast_1d(values), np.atleast_1d(true), strict=True)
     with ctx.workdps(DIGITS):
-        return abs(float(arb(float(value)) - true))
+        return np.array([float(abs(arb(float(value)) - it).upper()) for value, it in both])
 
 
 @cache

@@ -16,9 +16,10 @@ from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.cycle import Cycle, cycle, cycles
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath, load_path
 from convexrough.friction.shear import shear
+from convexrough.friction.steady import cycle, cycles
 from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.problem import NormalProblem

@@ -1,21 +1,6 @@
 """Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
 
-f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. In a
-contact disc with a stick disc of radius c (0 if nothing sticks), the amplitude of the slip at the
-distance r from the centre is  f c_t [g + (r^2/R) h(c/r)]  with
-
-    h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
-
-f c_t g is the amplitude of gross slip; g is 0 if a part of the disc sticks. (r^2/R) h(c/r) is the
-gap of a Hertz contact of radius c at the distance r. The formula holds inside the contact disc at
-the lowest load of the cycle. Outside this disc contact is lost in each cycle, and the slip is not
-known. The shear traction is a sum over the loads s_k at which the slope of the memory curve
-(docs/theory/paths.md) changes. b_k is the slope below s_k minus the slope above it, and a(s_k) is
-the contact radius at the load s_k:
-
-    q(r) = f (2 E* / pi R) sum_k b_k sqrt(a(s_k)^2 - r^2).
-
-Source: Johnson, Contact Mechanics (1985), sections 4.2 and 7.2; docs/theory/paths.md.
+docs/theory/losses.md, "Slip and traction inside a contact", gives the formulas.
 """
 
 from __future__ import annotations
@@ -46,6 +31,8 @@ DISTANCES = 64
 class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle. Arrays are (n,), and 0 where open.
 
+    contact          : the contact of the cycle
+    maximum, minimum : [force] the largest and the smallest shear force of the cycle
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
         load of the cycle; nan where contact is lost in the cycle ("intermittent"),
@@ -90,7 +77,7 @@ class Fretting(Table, Plottable):
 def fretting(cycle: Cycle) -> Fretting:
     """The fretting of each asperity in a steady cycle, which `cycle` or `steady` returns.
 
-    The formulas are those of Johnson, Contact Mechanics (1985), sections 4.2 and 7.2.
+    docs/theory/losses.md, "Slip and traction inside a contact", gives the formulas.
 
     Raises InputError if `cycle` is no `Cycle`.
 

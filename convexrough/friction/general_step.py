@@ -6,13 +6,9 @@ has its own memory curve: its deflection, which its own shear force causes, as a
 indentation. Newton's method solves (1) of that page for eta_i and x, the displacements of the
 asperities and of the bodies in the step.
 
-The curves of asperities change as in docs/theory/paths.md, "Changes of the curve". If an asperity
-slips at the end (s1, t1) of the step, the front L on the old curve, cut at the smaller of the old
-and the new indentation, solves
-
-    L - c h(L) = s1 - c t1,
-
-with the sign c of the slip and the heights h of this curve. The left side does not decrease.
+The curves of asperities change as in docs/theory/paths.md, "Changes of the curve", whose last
+equation gives the front. The old curve is cut beforehand at the smaller of the old and the new
+indentation.
 """
 
 from __future__ import annotations

@@ -26,7 +26,6 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.friction.curve import Point
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
@@ -192,21 +191,12 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
     return load if height > 0 else -load
 
 
-def forces_at(points: Sequence[Point], forces: Iterable[float], scene: Scene) -> Array:
-    """(m,) [force] the shear forces Q at points (P, T): f P or -f P if |T| = P, else as given."""
-    f = Fraction(checks.friction(scene.friction))
-    both = zip(points, forces, strict=True)
-    return frozen(np.array([float(f * T) if abs(T) == P else Q for (P, T), Q in both]))
-
-
 def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
-    Order means that, as the load rises, every asperity that is open at the load of `contact` stays
-    open, and the indentation of every other asperity never falls. The result is "proved", "proved
-    for one step" or "fails" (docs/theory/states.md, "Order"). Later results for this contact reuse
-    the proof. Other functions try it only if at most 20,000 asperities touch, because it takes
-    longer than the other parts of their results.
+    docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
+    and "fails". Later results for this contact reuse the proof. Other functions try it only if at
+    most 20,000 asperities touch, because for more it takes seconds.
 
     most : largest number of touching asperities for which a proof is tried
 

@@ -20,7 +20,7 @@ from convexrough.contact import Contact, press
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.general_step import Stepper
-from convexrough.friction.levels import FrictionLevels, forces_at, height_at, rounded
+from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.order import Order
 from convexrough.friction.walk import Walk
 from convexrough.influence import Kind
@@ -39,6 +39,7 @@ LEAST_PART = 1e-250
 class LoadPath(Table, Plottable):
     """The friction states at m points of a path (P, Q) with straight segments between them.
 
+    contact        : the contact at the highest load of the path
     loads, forces  : (m,) [force] load P and shear force Q
     displacements  : (m,) [length] tangential displacement X of one body relative to the other, at
         distant points
@@ -193,7 +194,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     checks.some("forces", Q)
     levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
-    return _path(contact, Q, Walk(levels, MemoryCurve.pressed(levels.load), points))
+    return _path(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
 
 
 def walk(
@@ -218,9 +219,7 @@ def walk(
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     levels = contact.cached(FrictionLevels)
-    return _path(
-        contact, np.array(forces, dtype=float), Walk(levels, curve, points, general_steps, stepper)
-    )
+    return _path(contact, Walk(levels, curve, points, general_steps, stepper))
 
 
 def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
@@ -252,7 +251,7 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
     return [(load, height_at(load, force, scene)) for load, force in pairs]
 
 
-def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
+def _path(contact: Contact, walk: Walk) -> LoadPath:
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
     (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
@@ -262,7 +261,7 @@ def _path(contact: Contact, forces: Array, walk: Walk) -> LoadPath:
     return LoadPath(
         contact=contact,
         loads=frozen(np.array(points, dtype=np.float64)),
-        forces=forces_at(walk.points, forces.tolist(), contact.scene),
+        forces=walk.forces,
         displacements=displacements,
         displacement_errors=displacement_errors,
         approaches=frozen(rows.approach.value * levels.units.length + 0.0),

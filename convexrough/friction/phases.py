@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.errors import blamed_on
-from convexrough.friction.cycle import Cycle, steady
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.order import Order
+from convexrough.friction.steady import steady
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -90,6 +91,7 @@ class PhaseLosses(Table, Plottable):
     An ellipse has one phase and one factor. In all arrays the ellipses with the first factor come
     first, one for each phase, then those with the second factor, and so on.
 
+    scene   : the scene
     phases, factors : (c,) phase [rad], and factor of both amplitudes
     losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
         replace the ellipse

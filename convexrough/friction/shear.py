@@ -37,11 +37,10 @@ class ShearCertificate(Table):
     Arrays are (n,), in the order of the scene's asperities.
 
     scope  : scope of the certificate of the pressed contact; "none" if nothing is proved
-    order  : "proved": no indentation falls as the load rises from P - |Q|/f to P, so statuses and
-        bounds hold for the true state (P is the load, Q the shear force, f the coefficient of
-        friction); "proved for one step": statuses and bounds hold for the result of one general
-        step from rest to Q (docs/theory/without-order.md), which is the true state unless the
-        deflection of some asperity decreased on the way; "fails": nothing is proved
+    order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
+        "Order"). "proved": statuses and bounds hold for the true state. "proved for one step": they
+        hold for one general step from rest to Q, which gives the true state unless the deflection
+        of some asperity decreased on the way. "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
@@ -78,6 +77,7 @@ class ShearCertificate(Table):
 class ShearState(Table, Plottable):
     """A friction state after monotonic shear. Arrays are (n,), in the order of the asperities.
 
+    contact       : the pressed contact
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
@@ -85,6 +85,7 @@ class ShearState(Table, Plottable):
         slip; the effect of other asperities is left out
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides or is open
+    certificate   : what is proved about this state
     height        : [force] Q / f, without rounding
 
     >>> state = cr.shear(contact, displacement=9.88e-6)

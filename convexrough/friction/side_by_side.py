@@ -64,7 +64,10 @@ class PathEntry(Record):
 class PathComparison(Table, Plottable):
     """The results of three methods for one load path, the general step first.
 
+    scene : the scene
+    loads, forces : (m,) [force] load P and shear force Q at the points of the path
     order : as in `LoadPath`; if it is "fails", the result of the memory curve is refused
+    entries : the result of each method
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> max(each.displacement_disagreement for each in found.entries) < 1e-4

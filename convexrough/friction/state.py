@@ -1,9 +1,9 @@
 """Friction states as weighted sums of solutions under normal load.
 
 The weights are the changes of slope of the memory curve. Equation (1) of docs/theory/paths.md gives
-the shear forces Q_i of the asperities and the displacement X of the bodies, and the sum below it
-the own deflection plus drift of an asperity. Equation (1) of docs/theory/states.md is the special
-case of first loading.
+the shear forces Q_i of the asperities and the displacement X of the bodies. With indentations in
+place of approaches, the sum for X is the own deflection plus drift of an asperity. Equation (1) of
+docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations

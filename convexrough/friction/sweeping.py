@@ -90,6 +90,8 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
     spare : (n,) at an open asperity, a bound above -spare is not improved further
     """
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
+    if len(support) < 2:
+        return rates
     rates, least = rates.copy(), np.where(c > 0, 0.0, -spare)
     swept = _Swept(influence, support, influence.scale * c)
     others = others[~(rates[others] > least[others])]

@@ -18,6 +18,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
@@ -50,6 +51,12 @@ class Walk:
     points: Sequence[Point]
     steps: int | None = None
     stepper: type[Stepper] = Stepper
+
+    @property
+    def forces(self) -> Array:
+        """(m,) [force] the shear force Q = f T at each point."""
+        f = Fraction(checks.friction(self.levels.scene.friction))
+        return frozen(np.array([float(f * T) for _, T in self.points]))
 
     @cached_property
     def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:

@@ -23,7 +23,7 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
-from convexrough.friction.levels import FrictionLevels, height_at
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.walk import Walk
 from convexrough.gradients.parts import ZERO, Moves, Part
 
@@ -103,15 +103,6 @@ class Along:
     steps: Steps
     loads: Sequence[Fraction]
     heights: Sequence[Fraction]
-
-    @classmethod
-    def of(
-        cls, known: FrictionLevels, start: Fraction, steps: Steps, loads: Array, forces: Array
-    ) -> Along:
-        """The path through points with these loads P and shear forces Q."""
-        pairs = list(zip(map(Fraction, loads.tolist()), forces.tolist(), strict=True))
-        heights = [height_at(load, force, known.scene) for load, force in pairs]
-        return cls(known, start, steps, [load for load, _ in pairs], heights)
 
     @cached_property
     def walk(self) -> Walk:

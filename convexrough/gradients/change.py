@@ -72,6 +72,7 @@ class Direction(Record):
 class ContactChange(Table):
     """First-order changes of a contact when the scene or the load changes.
 
+    contact, direction : the contact, and the changes that cause those of the results
     loads    : (n,) [force] loads, in the scene's order
     gaps     : (n,) [length] gaps, in the scene's order
     approach : [length] approach
@@ -95,6 +96,7 @@ class ContactChange(Table):
 class ShearChange(Table):
     """First-order changes of a friction state when the scene, load or shear force changes.
 
+    contact, direction : the pressed contact, and the changes that cause those of the results
     pressed : changes of the pressed contact (loads, gaps, approach)
     forces  : (n,) [force] shear forces, in the scene's order
     slips   : (n,) [length] gross slips, in the scene's order

@@ -188,12 +188,9 @@ class Gradient(Table, Plottable):
 
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
     derivative is at constant values of the other parameters named here. So shear forces Q are
-    constant, but neither their fractions Q / (f P) nor the displacements are. If instead the
-    displacement amplitude X of a symmetric cycle is constant, its loss W changes by
-    dW|X = dW|Q - (W_Q / X_Q) dX|Q. Here W_Q is the derivative of W by the amplitude of Q, which is
-    twice the derivative by `maximum`. X_Q and dX|Q follow from the gradient of X in the `shear`
-    state whose force is the amplitude of the cycle: X_Q is the derivative by `force`, and dX|Q the
-    change at constant Q.
+    constant, but neither their fractions Q / (f P) nor the displacements are;
+    docs/theory/gradients.md, "Derivatives at a prescribed approach or displacement", tells how to
+    keep a displacement constant.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
@@ -201,6 +198,7 @@ class Gradient(Table, Plottable):
     asperities and no stored matrix, bounds for positions are also infinite, and in the geometry
     "closest" those for radii, too. An infinite derivative, in gross sliding, has the error 0.
 
+    contact         : the contact on which the number depends
     value           : the number itself
     holding         : "load" or "approach", the quantity that is kept constant
     heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for

@@ -14,8 +14,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import ExtraError, InputError
-from convexrough.friction.cycle import cycle
 from convexrough.friction.shear import shear
+from convexrough.friction.steady import cycle
 from convexrough.gradients.gradient import Gradient, Holding
 from convexrough.influence import Kind
 from convexrough.record import Record

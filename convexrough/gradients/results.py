@@ -220,7 +220,8 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         m = len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
-        along = Along.of(known, Fraction(0), first + again, cycle.loads, cycle.forces)
+        loads = [Fraction(load) for load in cycle.loads.tolist()]
+        along = Along(known, Fraction(0), first + again, loads, cycle.heights)
         return _gradient(contact, along, holding, paths=True, order=cycle.order)
     amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
     top, low = known.top, level_below(known, "maximum", amplitude, holding)
@@ -258,9 +259,9 @@ def path_gradient(
     # A loss on one segment is part of all later losses.
     later = [*accumulate(map(Fraction, spent[::-1].tolist()))][::-1]
     steps = [(k, later[k], Fraction(far[k])) for k in range(m)]
-    along = Along.of(known, Fraction(path.start), steps, path.loads, path.forces)
-    sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
-    if path.load_constant and any(sliding):
+    loads, heights = zip(*((curve.load, curve.height) for curve in path.curves), strict=True)
+    along = Along(known, Fraction(path.start), steps, loads, heights)
+    if path.load_constant and any(curve.load == abs(curve.height) for curve in path.curves):
         expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     order = path.order if spent.any() else "proved"

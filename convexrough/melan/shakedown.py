@@ -40,6 +40,7 @@ class Shakedown(Table, Plottable):
     The path has m points (P0, Q0) + factor (p, q) of normal load and shear force. The scene has n
     asperities and the coefficient of friction f.
 
+    scene   : the scene
     kind    : "exact": with partial slip, for any path. "elastic" and "vector": for asperities that
         stick until they slide as a whole, by Melan's theorem at constant load. "elastic" uses the
         scalar tangential kernel, "vector" the full one, with shear forces in the plane

@@ -18,8 +18,9 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.cycle import Cycle, cycles
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import history
+from convexrough.friction.steady import cycles
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth

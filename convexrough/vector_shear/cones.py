@@ -1,12 +1,8 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-docs/theory/vector-friction.md, "Cones", derives it. For the shear force q and the load P of an
-asperity, |q| / P = 1 - t^3 defines t, and u = 1 - t. The kernel becomes positive semidefinite if a
-diagonal, the shift, is added; S is the shift divided by the local compliance. epsilon is an
-estimate of |q| / P for asperities that all stick. The variables are q / (epsilon P), and the
-variables of the cones; one of order u^k is divided by epsilon^k. The multiplier of the total is the
-rigid displacement. The multiplier of |q_i| <= P_i (1 - t^3) is the sum of the slip and of the slope
-of the local energy.
+docs/theory/vector-friction.md, "Cones", derives it and defines t, u, S and epsilon; the shift is S
+times the local compliance. The variables are q / (epsilon P) of each asperity with the shear force
+q and the load P, and those of the cones. The multiplier of the total is the rigid displacement.
 """
 
 from __future__ import annotations

@@ -43,6 +43,7 @@ class FrictionSolver(Protocol):
 class VectorShearState(Table, Plottable):
     """A vector friction state. Arrays are in the order of the scene's asperities.
 
+    contact      : the pressed contact
     force        : (2,) [force] shear force Q
     displacement : (2,) [length] relative tangential displacement X of distant points
     forces       : (n, 2) [force] shear forces on the asperities; their sum is `force`

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
+from friction_scenes import off
 from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
 from scenes import paper
 
@@ -18,13 +19,6 @@ ULP, BOUND = 2.0**-53, 1e-14
 
 #: Entries of the geometry "closest" are proved to fewer digits by the operator as it is.
 FRACTIONS = [1e-3, 0.37, 0.999]
-
-
-def off(values: Any, true: Any) -> np.ndarray:
-    values, true = np.atleast_1d(values), np.atleast_1d(true)
-    return np.array(
-        [float(abs(arb(float(a)) - b).upper()) for a, b in zip(values, true, strict=True)]
-    )
 
 
 def assert_known(values: Any, errors: Any, true: Any, bound: float) -> None:

@@ -16,6 +16,7 @@ import convexrough as cr
 from convexrough.bench.scenes import scene as bench_scene
 from convexrough.friction import order, sweeping
 from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.sweeping import swept_rates
 from convexrough.influence.dense import DenseInfluence
 
 NOTHING = Fraction(0)
@@ -82,6 +83,13 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
     proved = order.proved_between(levels.top, levels.at(NOTHING), ~levels.top.open)
     assert proved or aim > 0.9
     assert not (proved and down)
+    problem, n = levels.top.problem, len(levels.candidates)
+    stiffness = 1.5 * np.cbrt(levels.top.loads.value) / problem.coefficients
+    known = 1.0 - problem.influence.matrix @ stiffness
+    bounds = swept_rates(problem.influence, stiffness, known, np.zeros(n))
+    for part in (0.3, 1.0) if aim <= 0.9 else ():  # regular for all smaller stiffnesses
+        matrix = np.eye(n) + problem.influence.matrix * (part * stiffness)
+        assert (bounds <= np.linalg.solve(matrix, np.ones(n)) + 1e-12).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -111,7 +119,7 @@ def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
         far = far[far != i]
         swept_potential = weights[k] @ swept.potentials(near[k][:, None], far)
         assert (swept_potential >= (1 + gains[k]) * matrix[i, far]).all()
-    bounds = sweeping.swept_rates(influence, c, 1.0 - matrix @ c, np.zeros(n))
+    bounds = swept_rates(influence, c, 1.0 - matrix @ c, np.zeros(n))
     assert (bounds[support] > 0).all()
     for _ in range(3):
         y = np.linalg.solve(np.eye(n) + matrix * (c * random.random(n)), np.ones(n))

@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike
 from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.cycle import cycles, loops
+from convexrough.friction.cycle import loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.loop import Loop
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
+from convexrough.friction.steady import cycles
 from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit, same
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring

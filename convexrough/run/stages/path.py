@@ -12,10 +12,10 @@ from pydantic import Field
 from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
-from convexrough.friction.cycle import steady
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
+from convexrough.friction.steady import steady
 from convexrough.record import rows_of
 from convexrough.run.stage import (
     MOST_PRINTED,
