@@ -29,9 +29,8 @@ from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.arrays import reading
 from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, few, named_columns, read_table
-from convexrough.tabular.text import bare
 from convexrough.tabular.toml_slips import explained
-from convexrough.tabular.units import parsed
+from convexrough.tabular.units import bare, parsed
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage

@@ -25,8 +25,8 @@ from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
 from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
-from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, bare, read_text_table
-from convexrough.tabular.units import in_text, one_unit, parsed
+from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, read_text_table
+from convexrough.tabular.units import bare, in_text, one_unit, parsed
 
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)

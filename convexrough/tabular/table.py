@@ -18,16 +18,17 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import (
-    HOLES,
-    PERHAPS_GROUPED,
-    Style,
-    TextTable,
+from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
+from convexrough.tabular.units import (
+    NAMELESS,
+    Unit,
+    UnitNames,
     bare,
-    read_text_table,
+    in_text,
+    known_unit,
+    parsed,
     unit,
 )
-from convexrough.tabular.units import NAMELESS, Unit, UnitNames, in_text, known_unit, parsed
 
 
 class Column(NamedTuple):

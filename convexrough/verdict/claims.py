@@ -23,7 +23,7 @@ from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.reading import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
-from convexrough.tabular.text import bare, unit
+from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import rounded_up, verify_on
 

@@ -19,7 +19,7 @@ from convexrough.errors import InputError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.tabular.table import INDEX, ReadTable, in_sheet
-from convexrough.tabular.text import bare
+from convexrough.tabular.units import bare
 from convexrough.verdict.verdict import rounded_up
 
 if TYPE_CHECKING:
