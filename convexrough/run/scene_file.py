@@ -28,7 +28,8 @@ from convexrough.scene.base import checked
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.arrays import reading
-from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, few, named_columns, read_table
+from convexrough.tabular.roles import AS_IT_IS, Reading, is_index, named_columns
+from convexrough.tabular.table import few, read_table
 from convexrough.tabular.toml_slips import explained
 from convexrough.tabular.units import bare, parsed
 
@@ -60,7 +61,7 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 def unknown(column: str) -> bool:
     """True if a column may contain heights: its header is not a number, an index or a result."""
-    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
+    return not (column.isdecimal() or is_index(column) or bare(column).lower() in RESULTS)
 
 
 def read_summits(
@@ -85,7 +86,7 @@ def read_summits(
             raise InputError(f"column {name}", found=f"{said}, and a scene without units",
                              expected=expected, where=str(path))  # fmt: skip
     for name, cells in table.others.items():
-        if bare(name).lower() in INDEX and is_permuted(cells):
+        if is_index(name) and is_permuted(cells):
             found = f"{cells[0]:g}, {cells[1]:g}, ..."
             expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))

@@ -24,9 +24,10 @@ from convexrough.surface.detrend import Trend
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
-from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
+from convexrough.tabular.roles import COLUMNS, Reading, is_index
+from convexrough.tabular.table import matrix, read_table
 from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, read_text_table
-from convexrough.tabular.units import bare, in_text, one_unit, parsed
+from convexrough.tabular.units import in_text, one_unit, parsed
 
 #: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
@@ -352,7 +353,7 @@ def _from_list(path: Path, cells: TextTable) -> HeightGrid:
 def _is_label(name: str, cells: NDArray[Any]) -> bool:
     """True for an index, and for the same text in every row, which cannot change heights."""
     count = len(np.unique(cells))
-    if bare(name).lower() in INDEX:
+    if is_index(name):
         return count == len(cells)
     return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)
 

@@ -13,7 +13,7 @@ from scenes import rough
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene, read_summits
-from convexrough.tabular.table import Reading
+from convexrough.tabular.roles import Reading
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with
 
