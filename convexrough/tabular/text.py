@@ -56,7 +56,7 @@ _GROUPED = re.compile(
 )
 PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
-#: What stands between the words of a comment that may be a header.
+#: The separators in a comment that may be a header.
 _APART = re.compile(r"\s*[,;\s]\s*")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
 #: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.

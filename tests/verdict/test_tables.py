@@ -137,6 +137,8 @@ def test_columns_without_names_that_are_ignored_are_named(tmp_path: Path) -> Non
     found = read_loads(path, columns={"load": "4"})
     assert found.values.tolist() == LOADS
     assert "in the scene's order (not used: columns 1, 2, 3)" in found.note
+    put(tmp_path, "0,inf,nan,1.5\n0,9,9,0\n0,9,9,2.5e-5\n")  # numbers that are no positions
+    assert read_loads(path, columns={"load": "4"}).values.tolist() == LOADS
 
 
 def test_arrays(tmp_path: Path) -> None:
