@@ -437,7 +437,10 @@ def _numeric(cells: Sequence[str], style: Style) -> bool:
 
 def _width(cells: Sequence[str]) -> int:
     """The number of cells without empty ones at the end, which trailing separators cause."""
-    return next((i for i in range(len(cells), 0, -1) if cells[i - 1]), 0)
+    width = len(cells)
+    while width and not cells[width - 1]:
+        width -= 1
+    return width
 
 
 def _trimmed(
