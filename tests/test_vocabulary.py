@@ -1,9 +1,8 @@
-"""Turns of phrase that readers had to read twice, and names that they guessed wrong."""
+"""Turns of phrase that readers had to read twice."""
 
 import io
 import re
 import tokenize
-from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -21,35 +20,6 @@ BANNED = {
     r"\bis no \w+ness\b|\bwhat is no\b": "say what it is",
 }
 
-#: A name that the code had, and the term of the field that took its place.
-FORMER_NAMES = {
-    "accept": "assemble",
-    "among": "restricted",
-    "announce": "the logger `convexrough`",
-    "at_hand": "stored",
-    "beside": "what is next to what",
-    "blur": "site_error, or what is uncertain",
-    "ceilings": "thresholds",
-    "doubt": "uncertainty",
-    "different_words": "different_statuses",
-    "Drawn": "Plottable",
-    "drawn": "random, or plotted",
-    "felt": "coupled",
-    "first_loading": "from_rest",
-    "judge": "check",
-    "Judged": "Checked",
-    "Keeper": "Cached",
-    "lacking": "missing",
-    "listed": "joined",
-    "rise": "displacement",
-    "rival": "other solution",
-    "rivals": "other solutions",
-    "sharp": "cheap_sums",
-    "told": "reported",
-    "word": "status",
-    "words": "statuses",
-}
-
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MODULES = sorted((ROOT / "convexrough").rglob("*.py"))
 EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
@@ -61,15 +31,11 @@ def prose_of_a_page(path: Path) -> str:
     return re.sub(r"`[^`]*`", "", re.sub(r"^    .*$", "", text, flags=re.M))
 
 
-@cache
-def tokens_of(path: Path) -> list[tokenize.TokenInfo]:
-    return list(tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline))
-
-
 def prose_of_a_module(path: Path) -> str:
     """Docstrings, messages, help texts and comments."""
     names = {"STRING", "FSTRING_MIDDLE", "COMMENT"}
-    return "\n".join(t.string for t in tokens_of(path) if tokenize.tok_name[t.type] in names)
+    tokens = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
+    return "\n".join(t.string for t in tokens if tokenize.tok_name[t.type] in names)
 
 
 def found_in(text: str) -> list[str]:
@@ -79,20 +45,6 @@ def found_in(text: str) -> list[str]:
         for turn, advice in BANNED.items()
         for found in re.finditer(turn, text, re.I)
     ]
-
-
-def names_of_a_module(path: Path) -> set[str]:
-    """Names of modules, classes, functions, parameters, attributes and variables."""
-    return {path.stem, *(t.string for t in tokens_of(path) if t.type == tokenize.NAME)}
-
-
-def test_former_names_do_not_come_back() -> None:
-    found = [
-        f"{path.relative_to(ROOT)}: {name}: write {FORMER_NAMES[name]}"
-        for path in MODULES
-        for name in sorted(names_of_a_module(path) & FORMER_NAMES.keys())
-    ]
-    assert not found, "\n".join(found)
 
 
 def test_no_banned_turn() -> None:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
     from convexrough.checks import finite
-    from convexrough.tabular.table import named_columns
+    from convexrough.tabular.roles import named_columns
     from convexrough.verdict.claims import Manner
 
     names = ("load", "pressure", "area", "x", "y", "force", "status", "index")

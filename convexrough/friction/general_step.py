@@ -6,9 +6,9 @@ has its own memory curve: its deflection, which its own shear force causes, as a
 indentation. Newton's method solves (1) of that page for eta_i and x, the displacements of the
 asperities and of the bodies in the step.
 
-The curves of asperities change as in docs/theory/paths.md, "Changes of the curve", whose last
-equation gives the front. The old curve is cut beforehand at the smaller of the old and the new
-indentation.
+The curves of asperities change as in docs/theory/paths.md, "Changes of the curve", which
+also gives an equation for the front. The old curve is cut beforehand at the smaller of the old and
+the new indentation.
 """
 
 from __future__ import annotations

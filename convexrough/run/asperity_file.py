@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.scene.asperities import Asperities
-from convexrough.tabular.table import AS_IT_IS, INDEX, Reading, read_table
-from convexrough.tabular.text import bare
-from convexrough.tabular.units import parsed
+from convexrough.tabular.roles import AS_IT_IS, Reading, is_index
+from convexrough.tabular.table import read_table
+from convexrough.tabular.units import bare, parsed
 
 #: Names of columns with results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
@@ -25,7 +25,7 @@ ROUNDED = 1e-3
 
 def unknown(column: str) -> bool:
     """True if a column may contain heights: its header is not a number, an index or a result."""
-    return not column.isdecimal() and bare(column).lower() not in (*INDEX, *RESULTS)
+    return not (column.isdecimal() or is_index(column) or bare(column).lower() in RESULTS)
 
 
 def read_summits(
@@ -50,7 +50,7 @@ def read_summits(
             raise InputError(f"column {name}", found=f"{said}, and a scene without units",
                              expected=expected, where=str(path))  # fmt: skip
     for name, cells in table.others.items():
-        if bare(name).lower() in INDEX and is_permuted(cells):
+        if is_index(name) and is_permuted(cells):
             found = f"{cells[0]:g}, {cells[1]:g}, ..."
             expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))

@@ -24,7 +24,8 @@ from convexrough.scene.base import checked
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.arrays import reading
-from convexrough.tabular.table import Reading, few, named_columns
+from convexrough.tabular.roles import Reading, named_columns
+from convexrough.tabular.table import few
 from convexrough.tabular.toml_slips import explained
 
 if TYPE_CHECKING:

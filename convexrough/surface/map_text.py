@@ -18,8 +18,9 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.surface.height_grid import HeightGrid, on_grid
 from convexrough.surface.map_arrays import SCALES
-from convexrough.tabular.table import COLUMNS, INDEX, Reading, matrix, read_table
-from convexrough.tabular.text import COMMENT, TextTable, bare, read_text_table
+from convexrough.tabular.roles import COLUMNS, Reading, is_index
+from convexrough.tabular.table import matrix, read_table
+from convexrough.tabular.text import COMMENT, TextTable, read_text_table
 from convexrough.tabular.units import in_text, parsed
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
@@ -160,6 +161,6 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
 def _is_label(name: str, cells: NDArray[Any]) -> bool:
     """True for an index, and for the same text in every row, which cannot change heights."""
     count = len(np.unique(cells))
-    if bare(name).lower() in INDEX:
+    if is_index(name):
         return count == len(cells)
     return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)

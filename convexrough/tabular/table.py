@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import Any, NamedTuple
@@ -18,45 +16,21 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import (
-    HOLES,
-    PERHAPS_GROUPED,
-    Style,
-    TextTable,
-    bare,
-    read_text_table,
-    unit,
+from convexrough.tabular.roles import (
+    AS_IT_IS,
+    COLUMNS,
+    INDEX,
+    Column,
+    Reading,
+    factors_of,
+    is_index,
+    lookalikes,
+    places_of,
+    shortened,
+    units_in,
 )
-from convexrough.tabular.units import NAMELESS, Unit, UnitNames, in_text, known_unit, parsed
-
-
-class Column(NamedTuple):
-    """A known column: the quantity that it measures, "" for text, and its other names."""
-
-    kind: str = "length"
-    also: tuple[str, ...] = ()
-    positive: bool = False
-
-
-#: The known columns.
-COLUMNS = {
-    "x": Column(),
-    "y": Column(),
-    "height": Column(also=("z", "h", "heights")),
-    "tip_radius": Column(also=("radius",), positive=True),
-    "load": Column("force"),
-    "force": Column("force"),
-    "pressure": Column("pressure"),
-    "area": Column("area"),
-    "status": Column(""),
-    "contact": Column("", also=("touching", "in_contact")),
-    "no_contact": Column("", also=("open",)),
-    "index": Column(""),
-}
-
-#: Names of columns with row numbers.
-INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
-         "")  # fmt: skip
+from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
+from convexrough.tabular.units import bare, unit
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
@@ -65,59 +39,11 @@ TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "
 #: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
-#: Largest number of characters of a line that are shown.
-MOST_SHOWN = 60
-
-#: Similarity above which the name of an unread column may be a misspelling of a missing one.
-LOOKS_LIKE = 0.75
-
 #: If at least this many cells are such as 1.013, whole numbers below 100 beside them also show that
 #: the mark separates thousands.
 SURELY_GROUPED = 10
 
 _WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
-
-#: Relative difference up to which two factors count as equal.
-SAME = 1e-9
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """How columns of a file are read.
-
-    columns : names in the file, by known name;  scales : factors of the numbers
-    units   : units of the scene;  convert : convert columns in other units, else refuse them
-    scalable : messages may propose the options --scale and --column
-    shared  : columns that are also read from another file; no message proposes --scale for them,
-        because the option would apply to both files
-    alike   : columns of one quantity must have one unit, even if the scene names none
-    """
-
-    columns: Mapping[str, str] = field(default_factory=dict, hash=False)
-    scales: Mapping[str, float] = field(default_factory=dict, hash=False)
-    units: UnitNames = NAMELESS
-    convert: bool = False
-    scalable: bool = False
-    shared: Sequence[str] = ()
-    alike: bool = True
-
-
-AS_IT_IS = Reading()
-
-
-def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """The header of each known column that `given` names.
-
-    An entry of `given` is a known name and a header, in either order.
-    """
-    named = {}
-    for one, other in given.items():
-        name, column = (one, other) if one in known or other not in known else (other, one)
-        if name not in known or not column:
-            expected = f"NAME=COLUMN, where NAME is one of {', '.join(known)}"
-            raise InputError(what, found=f"{one}={other}", expected=expected)
-        named[name] = column
-    return named
 
 
 class ReadTable(NamedTuple):
@@ -197,7 +123,10 @@ def read_table(
     alone = source.header is None and len(source.rows) == 1 and not how.columns
     if unnamed and alone and (len(source.columns) > 3 or len(source.columns) == line):
         source = _upright(source)
-    places, mistakes = _places(source, wanted, how, unnamed)
+    headers = source.header or [""] * len(source.columns)
+    if source.header is None and not how.columns:
+        headers = next((each for each in unnamed if len(each) == len(headers)), headers)
+    places, mistakes = places_of(wanted, headers, how, _named(source))
     index = places.pop("index", None)
     if instead and instead[0] in places and required[0] not in places:
         required = ()
@@ -205,7 +134,7 @@ def read_table(
         places = {name: place for name, place in places.items() if name not in instead}
     missing = [name for name in required if name not in places]
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
-    others = [quote(name) for name in left if name.lower() not in INDEX]
+    others = [quote(name) for name in left if not is_index(name)]
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
     other = others[0] if short else "NAME" if source.header else "NUMBER"
     pixels = instead and {"x", "y"} <= places.keys()
@@ -217,21 +146,21 @@ def read_table(
         if each not in how.columns
     ]
     measured = (name for name in optional if COLUMNS[name].kind and name not in places)
-    mistakes += _lookalikes(left, [*missing, *measured])
+    mistakes += lookalikes(left, [*missing, *measured])
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
         raise TableError(str(path), few([*mistakes, *source.mistakes]))
     names = source.header or [str(i + 1) for i in range(len(source.columns))]
     units = {name: found for name, place in places.items() if (found := unit(names[place]))}
-    factors, wrong = _factors([name for name in places if COLUMNS[name].kind], units, how)
+    factors, wrong = factors_of([name for name in places if COLUMNS[name].kind], units, how)
     rest = [i for i in range(len(names)) if i not in (index, *places.values())]
     texts = [("comments", text) for text in (source.comments if table is None else ())]
     for i in (i for i in rest if "unit" in names[i].lower()):
         said = dict.fromkeys(map(str, source.columns[i]))
         texts += [(f"column {names[i]}", each) for each in said]
     without = [name for name in places if name not in (*units, *how.scales)]
-    mistakes += [*wrong, *_units_in(texts, without, how)]
+    mistakes += [*wrong, *units_in(texts, without, how)]
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -295,68 +224,6 @@ def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[st
         yield f"{grouped[0][1]}: {found}, expected {expected}"
 
 
-def _factors(
-    names: Sequence[str], units: Mapping[str, str], how: Reading
-) -> tuple[dict[str, float], list[str]]:
-    """The factors of the columns, by name, and mistakes in their units."""
-    factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
-    first: dict[str, tuple[str, Unit]] = {}  # of each quantity, the first column with a unit
-    for name in (name for name in names if name in units):
-        kind, said, place = COLUMNS[name].kind, units[name], f"column {name}"
-        scene, given = how.units.unit(kind), how.scales.get(name)
-        if given is not None and scene is None:
-            continue
-        way = f"--scale {name}=" if how.scalable and name not in how.shared else ""
-        try:
-            found = known_unit(place, said, kind)
-        except InputError as error:
-            if given is None and (scene or "a unit of" in str(error.found)):
-                taken = f", or {way}1 to take the numbers as they are" if way else ""
-                mistakes.append(f"{error}{taken}")
-            continue  # text in brackets need not be a unit
-        assert found is not None
-        other, wanted = first.setdefault(kind, (name, found))
-        if scene is None:
-            if how.alike and found.size != wanted.size:
-                mistakes.append(f"{place}: found {said}, expected {units[other]}, as {other}")
-            continue
-        factor = found.into(scene)
-        equal = f"1 {said} is {factor:.15g} {scene.name}"
-        if given is not None:
-            if abs(abs(given) / factor - 1) > SAME:
-                mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as "
-                                f"{equal}")  # fmt: skip
-        elif factor != 1 and how.convert:
-            factors[name] = factor
-        elif factor != 1:
-            advice = f"{way}{factor:.15g} or " if way else ""
-            mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
-                            f"{equal}: {advice}convert = true in [units] of the scene")  # fmt: skip
-    for name in names:
-        there = first.get(COLUMNS[name].kind)
-        if there and there[0] in factors and name not in units and name not in how.scales:
-            mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
-    return factors, mistakes
-
-
-def _units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each text of `said` that names another unit than the scene's.
-
-    said  : pairs of the place in the file and the text
-    names : columns that have no unit in the header, so that the text may be about them
-    """
-    kinds = {COLUMNS[name].kind for name in names}
-    for place, text in said:
-        for name in in_text(text):
-            found = parsed(name)
-            kind = found.kind if found else "length"
-            scene = how.units.unit(kind)
-            if kind in kinds and not (found and scene and found.size == scene.size):
-                expected = f"units in the header, as NAME [{name}], or no such {place.split()[0]}"
-                yield f"{place}: found {_cut(text)!r}, expected {expected}"
-                break
-
-
 def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
     cells = source.columns[place]
     numbers = source.style.numbers(cells)
@@ -415,57 +282,12 @@ def _upright(source: _Source) -> _Source:
     return source._replace(columns=[cells], rows=rows, lines=[str(cell) for cell in cells])
 
 
-def _places(
-    source: _Source, wanted: Sequence[str], how: Reading, unnamed: Sequence[list[str]]
-) -> tuple[dict[str, int], list[str]]:
-    """The number of the column of each wanted name that the file has, and mistakes."""
-    names = source.header or [""] * len(source.columns)
-    if source.header is None and not how.columns:
-        names = next((each for each in unnamed if len(each) == len(names)), names)
-    bared = [bare(name) for name in names]
-    lowered = [each.lower() for each in bared]
-    places: dict[str, int] = {}
-    mistakes: list[str] = []
-    for name in wanted:
-        called = how.columns.get(name)
-        if called is None:
-            alike = [i for i, each in enumerate(lowered) if each in (name, *COLUMNS[name].also)]
-        else:  # the header as it is, else without its unit, else in any case
-            ways = ((names, called), (bared, called), (lowered, called.lower()))
-            found = ([i for i, each in enumerate(known) if each == it] for known, it in ways)
-            alike = next(filter(None, found), [])
-            if not alike and called.isdecimal() and 1 <= int(called[:9]) <= len(names):
-                alike = [int(called) - 1]
-            if not alike:
-                mistakes.append(f"columns: found {_named(source)}, expected a column {called!r}")
-        if alike:
-            places[name] = alike[0]
-        if len(alike) > 1:
-            choice = f": --column {name}={bared[alike[0]]}" if how.scalable else ""
-            several = [*dict.fromkeys(bared[i] for i in alike)]
-            found_them, expected = " and ".join(map(repr, several)), f"one of them{choice}"
-            if called is not None or len(several) < len(alike):
-                found_them, expected = f"{called or several[0]!r} twice", "once"
-            mistakes.append(f"columns: found {found_them}, expected {expected}")
-    return places, mistakes
-
-
-def _lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
-    """Mistakes: columns that are not read, with names similar to one that is missing."""
-    from difflib import SequenceMatcher  # only when a column is missing
-
-    for name, each in product(unread, missing):
-        alike = SequenceMatcher(None, name.lower(), each).ratio()
-        if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
-            yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
-
-
 def _named(source: _Source) -> str:
     if source.header is None:
         columns, rows = len(source.columns), len(source.rows)
         turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
         return f"no header and {columns} columns{turned}"
-    return _cut(", ".join(source.header)) + in_sheet(str(source.style))
+    return shortened(", ".join(source.header)) + in_sheet(str(source.style))
 
 
 def in_sheet(style: str) -> str:
@@ -503,19 +325,14 @@ def _numbers(
             expected = "a decimal point, not a comma" if comma else "a finite number"
             if PERHAPS_GROUPED.fullmatch(str(cell)):
                 expected += ", and no thousands separators"
-            raise InputError(place, found=_cut(repr(cell)), expected=expected)
+            raise InputError(place, found=shortened(repr(cell)), expected=expected)
         except InputError as error:
             mistakes.append(_shown(str(error), source.lines[i]))
     return numbers
 
 
 def _shown(mistake: str, line: str) -> str:
-    return f"{mistake}: {_cut(line)}" if line else mistake
-
-
-def _cut(text: str) -> str:
-    text = "".join(each if each.isprintable() else " " for each in text[: MOST_SHOWN + 1])
-    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+    return f"{mistake}: {shortened(line)}" if line else mistake
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:

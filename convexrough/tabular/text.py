@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,13 +23,13 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import FileError
 from convexrough.tabular.arrays import foreign, needed
-from convexrough.tabular.units import parsed
+from convexrough.tabular.units import bare, parsed, unit
 
 #: Largest number of characters of a line.
 LONGEST = 2**24
 
-#: Largest numbers of characters of a number, and of a column's name with its unit.
-LONGEST_NUMBER, LONGEST_NAME = 400, 400
+#: Largest number of characters of a number.
+LONGEST_NUMBER = 400
 
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
@@ -56,10 +56,7 @@ _GROUPED = re.compile(
 )
 PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SURROGATE = re.compile("[\udc80-\udcff]")
-_WITH_UNIT = re.compile(
-    r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
-)
-#: What stands between the words of a comment that may be a header.
+#: The separators in a comment that may be a header.
 _APART = re.compile(r"\s*[,;\s]\s*")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
 #: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.
@@ -163,23 +160,6 @@ class TextTable(NamedTuple):
     comments: list[str]
 
 
-def bare(name: str) -> str:
-    """The name of a column without its unit."""
-    found = _with_unit(name)
-    return found["name"] if found else name
-
-
-def unit(name: str) -> str:
-    """The unit in the name of a column, in brackets or after a slash; "" if there is none."""
-    found = _with_unit(name)
-    return (found["unit"] or found["per"] or found["tight"] or "").strip() if found else ""
-
-
-def _with_unit(name: str) -> re.Match[str] | None:
-    found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
-    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as in p/p0
-
-
 def read_text_table(
     path: Path,
     known: Sequence[str] = (),
@@ -233,8 +213,12 @@ def read_text_table(
     above, (header, rows) = rows, _headed(rows, title, style, known)
     if header:
         comments += [row.text for row in above if row.number < header.number]
-        if len(units) == len(header.cells) and not any(map(unit, header.cells)):
-            header = header._replace(cells=_with_units(header.cells, units))
+        below = rows[0].cells if rows else []
+        if _are_units(below) and len(below) <= len(header.cells):
+            units, rows = below, rows[1:]
+        elif len(units) != len(header.cells) or any(map(unit, header.cells)):
+            units = []
+        header = header._replace(cells=_with_units(header.cells, units))
     elif len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
@@ -243,7 +227,7 @@ def read_text_table(
 def _headed(
     rows: list[TextRow], title: str, style: Style, known: Sequence[str]
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header or None, and the rows below; a header gets the units that the next line has."""
+    """The header or None, and the rows below."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -267,9 +251,6 @@ def _headed(
         apart = re.split(r"\s{2,}", line.text.strip())
         names = apart if len(apart) == width < len(names) else names
         rows = _unlisted(line, rows, first, style)
-    below = rows[0].cells if rows else []
-    if _are_units(below) and len(below) <= len(names):
-        names, rows = _with_units(names, below), rows[1:]
     return line._replace(cells=names), rows
 
 
@@ -281,12 +262,11 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
     """The names of columns, each followed by its unit in brackets."""
-    bared = [cell.strip("[]() ") for cell in units]
-    named = [
-        name if each in ("", "-") else f"{name} [{each}]"
-        for name, each in zip(names, bared, strict=False)
+    bared = [cell.strip("[]() -") for cell in units]
+    return [
+        f"{name} [{each}]" if each else name
+        for name, each in zip_longest(names, bared, fillvalue="")
     ]
-    return [*named, *names[len(named) :]]
 
 
 def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) -> list[TextRow]:
@@ -457,7 +437,10 @@ def _numeric(cells: Sequence[str], style: Style) -> bool:
 
 def _width(cells: Sequence[str]) -> int:
     """The number of cells without empty ones at the end, which trailing separators cause."""
-    return next((i for i in range(len(cells), 0, -1) if cells[i - 1]), 0)
+    width = len(cells)
+    while width and not cells[width - 1]:
+        width -= 1
+    return width
 
 
 def _trimmed(

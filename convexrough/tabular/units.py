@@ -68,6 +68,14 @@ _IN_TEXT = re.compile(
 )
 
 
+#: Largest number of characters of a column's name with its unit.
+LONGEST_NAME = 400
+
+_WITH_UNIT = re.compile(
+    r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
+)
+
+
 def in_text(text: str) -> list[str]:
     """The units of length and force that a sentence seems to name."""
     return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
@@ -90,6 +98,23 @@ def parsed(name: str) -> Unit | None:
             found *= UNITS[symbol] ** (sign * int(power or 1))
             shown = symbol
     return found._replace(name=shown if name.strip().isalpha() else name.strip())
+
+
+def bare(name: str) -> str:
+    """The name of a column without its unit."""
+    found = _with_unit(name)
+    return found["name"] if found else name
+
+
+def unit(name: str) -> str:
+    """The unit in the name of a column, in brackets or after a slash; "" if there is none."""
+    found = _with_unit(name)
+    return (found["unit"] or found["per"] or found["tight"] or "").strip() if found else ""
+
+
+def _with_unit(name: str) -> re.Match[str] | None:
+    found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
+    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as in p/p0
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:

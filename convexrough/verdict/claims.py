@@ -22,8 +22,9 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.height_grid import steps
-from convexrough.tabular.table import Reading, ReadTable, few, read_table
-from convexrough.tabular.text import bare, unit
+from convexrough.tabular.roles import Reading
+from convexrough.tabular.table import ReadTable, few, read_table
+from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import rounded_up, verify_on
 

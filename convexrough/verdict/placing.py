@@ -18,8 +18,9 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.tabular.table import INDEX, ReadTable, in_sheet
-from convexrough.tabular.text import bare
+from convexrough.tabular.roles import is_index
+from convexrough.tabular.table import ReadTable, in_sheet
+from convexrough.tabular.units import bare
 from convexrough.verdict.verdict import rounded_up
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class Placing:
             self._refuse(i, found, f"at most {limit} from its neighbour")
         if self.column == "pressure":
             self._refuse_repeated(self.points @ [1, 1j], loaded, "each node or pixel once")
-        elif any(bare(name).lower() in INDEX for name in self.table.others):
+        elif any(map(is_index, self.table.others)):
             cells = *self.table.columns.values(), *self.table.others.values()
             rows = [*zip(*(each.tolist() for each in cells), strict=True)]
             first = {row: i for i, row in reversed([*enumerate(rows)])}
@@ -170,7 +171,7 @@ class Placing:
             if not ((cells >= 0) & (cells < 2**53) & (np.floor(cells) == cells)).all():
                 continue
             index = cells.astype(np.intp)
-            if bare(name).lower() in INDEX:
+            if is_index(name):
                 named[name] = index
             elif (
                 (np.diff(index) < 0).any()

@@ -36,6 +36,7 @@ NOISE = 1e-6
 class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
+    scene       : the scene of the loads
     loads       : (n,) [force] the given loads
     floor       : [force] a load up to this size counts as 0, and its asperity as open
     within      : largest error allowed, as a fraction of the largest load
@@ -45,8 +46,8 @@ class Verdict(Claim, Table, Plottable):
         own start, with its own certificate; None where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
-    >>> verdict.holds, verdict.decided_alone
-    (True, True)
+    >>> verdict.holds, verdict.decided_alone, list(verdict.hints())
+    (True, True, [])
     """
 
     one = "load"
@@ -106,7 +107,7 @@ class Verdict(Claim, Table, Plottable):
         return None if found is None else (found.loads, found.certificate.load_errors)
 
     def hints(self) -> Iterator[str]:
-        """Lines that suggest where wrong loads may come from."""
+        """Lines that suggest where wrong loads may come from; none if the claim holds."""
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
@@ -133,9 +134,10 @@ def verify(
     floor: float = 0.0,
     influence: Kind | None = None,
 ) -> Verdict:
-    """Compare loads from any source with the solution: the contact set, and the errors of loads.
+    """The verdict on loads from any source: their contact set and their errors, as proved.
 
-    loads : (n,) [force] in the order of the scene's asperities
+    scene : the scene, whose asperities the loads are about
+    loads : (n,) [force] the loads in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
     within : largest error allowed: of a load, as a fraction of the largest load, and of a
         prescribed total, as a fraction of this total. With `within=1` hardly more than the contact
@@ -144,7 +146,8 @@ def verify(
         asperity as open
     influence : compliance operator; None for the cheapest
 
-    Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
+    The errors are bounded by certificates (docs/theory/certificate.md, "The bound"). Raises
+    InputError for loads of the wrong length, not finite, or negative beyond the floor.
 
     >>> claimed = contact.loads.copy()
     >>> claimed[3] = 0.0

@@ -258,6 +258,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "units in a comment below the names": (
         lambda case: lines(case.table()).replace("load\n", "load\n# m,m,mN\n", 1), "",
         "column load: found mN, expected N"),
+    "another unit below the header": (
+        lambda case: lines(case.table()).replace("load\n", "load\nm,m,mN\n", 1), "",
+        "column load: found mN, expected N"),
     "names and units in comments": (
         lambda case: "# x,y,load\n# [m], [m], [mN]\n" + lines(case.table(), header=False), "",
         "column load: found mN, expected N"),

@@ -14,7 +14,7 @@ from scenes import rough
 import convexrough as cr
 from convexrough.run.asperity_file import read_summits
 from convexrough.run.scene_file import read_scene
-from convexrough.tabular.table import Reading
+from convexrough.tabular.roles import Reading
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with
 
@@ -138,6 +138,8 @@ def test_columns_without_names_that_are_ignored_are_named(tmp_path: Path) -> Non
     found = read_loads(path, columns={"load": "4"})
     assert found.values.tolist() == LOADS
     assert "in the scene's order (not used: columns 1, 2, 3)" in found.note
+    put(tmp_path, "0,inf,nan,1.5\n0,9,9,0\n0,9,9,2.5e-5\n")  # numbers that are no positions
+    assert read_loads(path, columns={"load": "4"}).values.tolist() == LOADS
 
 
 def test_arrays(tmp_path: Path) -> None:

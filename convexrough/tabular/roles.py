@@ -1,0 +1,207 @@
+"""Columns of tables: known names, what they measure, their units, and messages on these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import NamedTuple
+
+from convexrough.errors import InputError
+from convexrough.tabular.units import NAMELESS, Unit, UnitNames, bare, in_text, known_unit, parsed
+
+
+class Column(NamedTuple):
+    """A known column: the quantity that it measures, "" for text, and its other names."""
+
+    kind: str = "length"
+    also: tuple[str, ...] = ()
+    positive: bool = False
+
+
+#: The known columns.
+COLUMNS = {
+    "x": Column(),
+    "y": Column(),
+    "height": Column(also=("z", "h", "heights")),
+    "tip_radius": Column(also=("radius",), positive=True),
+    "load": Column("force"),
+    "force": Column("force"),
+    "pressure": Column("pressure"),
+    "area": Column("area"),
+    "status": Column(""),
+    "contact": Column("", also=("touching", "in_contact")),
+    "no_contact": Column("", also=("open",)),
+    "index": Column(""),
+}
+
+#: Names of columns with row numbers.
+INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
+         "")  # fmt: skip
+
+
+def is_index(header: str) -> bool:
+    """True for the header of a column with row numbers."""
+    return bare(header).lower() in INDEX
+
+
+#: Largest number of characters of a line that are shown.
+MOST_SHOWN = 60
+
+#: Similarity above which the name of an unread column may be a misspelling of a missing one.
+LOOKS_LIKE = 0.75
+
+#: Relative difference up to which two factors count as equal.
+SAME = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How columns of a file are read.
+
+    columns : names in the file, by known name;  scales : factors of the numbers
+    units   : units of the scene;  convert : convert columns in other units, else refuse them
+    scalable : messages may propose the options --scale and --column
+    shared  : columns that are also read from another file; no message proposes --scale for them,
+        because the option would apply to both files
+    alike   : columns of one quantity must have one unit, even if the scene names none
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict, hash=False)
+    scales: Mapping[str, float] = field(default_factory=dict, hash=False)
+    units: UnitNames = NAMELESS
+    convert: bool = False
+    scalable: bool = False
+    shared: Sequence[str] = ()
+    alike: bool = True
+
+
+AS_IT_IS = Reading()
+
+
+def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
+    """The header of each known column that `given` names.
+
+    An entry of `given` is a known name and a header, in either order.
+    """
+    named = {}
+    for one, other in given.items():
+        name, column = (one, other) if one in known or other not in known else (other, one)
+        if name not in known or not column:
+            expected = f"NAME=COLUMN, where NAME is one of {', '.join(known)}"
+            raise InputError(what, found=f"{one}={other}", expected=expected)
+        named[name] = column
+    return named
+
+
+def places_of(
+    wanted: Sequence[str], names: Sequence[str], how: Reading, found: str
+) -> tuple[dict[str, int], list[str]]:
+    """The number of the column of each wanted name that the file has, and mistakes.
+
+    names : the headers of the file;  found : what messages say about them
+    """
+    bared = [bare(name) for name in names]
+    lowered = [each.lower() for each in bared]
+    places: dict[str, int] = {}
+    mistakes: list[str] = []
+    for name in wanted:
+        called = how.columns.get(name)
+        if called is None:
+            alike = [i for i, each in enumerate(lowered) if each in (name, *COLUMNS[name].also)]
+        else:  # the header as it is, else without its unit, else in any case
+            ways = ((names, called), (bared, called), (lowered, called.lower()))
+            ranks = ([i for i, each in enumerate(known) if each == it] for known, it in ways)
+            alike = next(filter(None, ranks), [])
+            if not alike and called.isdecimal() and 1 <= int(called[:9]) <= len(names):
+                alike = [int(called) - 1]
+            if not alike:
+                mistakes.append(f"columns: found {found}, expected a column {called!r}")
+        if alike:
+            places[name] = alike[0]
+        if len(alike) > 1:
+            choice = f": --column {name}={bared[alike[0]]}" if how.scalable else ""
+            several = [*dict.fromkeys(bared[i] for i in alike)]
+            found_them, expected = " and ".join(map(repr, several)), f"one of them{choice}"
+            if called is not None or len(several) < len(alike):
+                found_them, expected = f"{called or several[0]!r} twice", "once"
+            mistakes.append(f"columns: found {found_them}, expected {expected}")
+    return places, mistakes
+
+
+def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
+    """Mistakes: columns that are not read, with names similar to one that is missing."""
+    from difflib import SequenceMatcher  # only when a column is missing
+
+    for name, each in product(unread, missing):
+        alike = SequenceMatcher(None, name.lower(), each).ratio()
+        if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
+            yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
+
+
+def factors_of(
+    names: Sequence[str], units: Mapping[str, str], how: Reading
+) -> tuple[dict[str, float], list[str]]:
+    """The factors of the columns, by name, and mistakes in their units."""
+    factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
+    first: dict[str, tuple[str, Unit]] = {}  # of each quantity, the first column with a unit
+    for name in (name for name in names if name in units):
+        kind, said, place = COLUMNS[name].kind, units[name], f"column {name}"
+        scene, given = how.units.unit(kind), how.scales.get(name)
+        if given is not None and scene is None:
+            continue
+        way = f"--scale {name}=" if how.scalable and name not in how.shared else ""
+        try:
+            found = known_unit(place, said, kind)
+        except InputError as error:
+            if given is None and (scene or "a unit of" in str(error.found)):
+                taken = f", or {way}1 to take the numbers as they are" if way else ""
+                mistakes.append(f"{error}{taken}")
+            continue  # text in brackets need not be a unit
+        assert found is not None
+        other, wanted = first.setdefault(kind, (name, found))
+        if scene is None:
+            if how.alike and found.size != wanted.size:
+                mistakes.append(f"{place}: found {said}, expected {units[other]}, as {other}")
+            continue
+        factor = found.into(scene)
+        equal = f"1 {said} is {factor:.15g} {scene.name}"
+        if given is not None:
+            if abs(abs(given) / factor - 1) > SAME:
+                mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as "
+                                f"{equal}")  # fmt: skip
+        elif factor != 1 and how.convert:
+            factors[name] = factor
+        elif factor != 1:
+            advice = f"{way}{factor:.15g} or " if way else ""
+            mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
+                            f"{equal}: {advice}convert = true in [units] of the scene")  # fmt: skip
+    for name in names:
+        there = first.get(COLUMNS[name].kind)
+        if there and there[0] in factors and name not in units and name not in how.scales:
+            mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
+    return factors, mistakes
+
+
+def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
+    """A mistake for each text of `said` that names another unit than the scene's.
+
+    said  : pairs of the place in the file and the text
+    names : columns that have no unit in the header, so that the text may be about them
+    """
+    kinds = {COLUMNS[name].kind for name in names}
+    for place, text in said:
+        for name in in_text(text):
+            found = parsed(name)
+            kind = found.kind if found else "length"
+            scene = how.units.unit(kind)
+            if kind in kinds and not (found and scene and found.size == scene.size):
+                expected = f"units in the header, as NAME [{name}], or no such {place.split()[0]}"
+                yield f"{place}: found {shortened(text)!r}, expected {expected}"
+                break
+
+
+def shortened(text: str) -> str:
+    """The text without control characters, cut after `MOST_SHOWN` characters."""
+    text = "".join(each if each.isprintable() else " " for each in text[: MOST_SHOWN + 1])
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
