@@ -22,9 +22,10 @@ from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
+from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import ALL_SHARP, NormalProblem, Units
+from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 from convexrough.plottable import Plottable

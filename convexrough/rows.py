@@ -7,7 +7,6 @@ are not proved in this way are left out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -17,14 +16,14 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
 from convexrough.normal.boxes import Box
+from convexrough.normal.exact import Data, twofold_offsets
 from convexrough.normal.level import Rows
 from convexrough.normal.levels import MOST, NUMBERS, solved
-from convexrough.normal.problem import Data, NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.normal.stack import Stack
 from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -187,12 +186,10 @@ def _repeated(values: Array, shape: tuple[int, int]) -> Array:
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
     """(m, n) the offsets of scenes of one family, with error bounds."""
-    scene, length = problem.scene, problem.units.length
-    if len(rows) == 1 and rows[0] is scene:
+    if len(rows) == 1 and rows[0] is problem.scene:
         return problem.exact.offsets[None, :]
-    bare = replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, 0.0))
-    drops = replace(problem, scene=bare).twofold_offsets()  # at most 0
-    heights = np.array([each.asperities.heights for each in rows]) / length
-    offsets = Pair.exact(heights) + Pair(*(part[None, :] for part in drops))
-    sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(drops.high))
+    heights = np.array([each.asperities.heights for each in rows])
+    offsets = twofold_offsets(problem.scene, problem.candidates, problem.units, heights)
+    heights /= problem.units.length
+    sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(offsets.high - heights))
     return Ball.around(offsets, 2.0**-98 * sizes)

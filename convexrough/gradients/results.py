@@ -31,9 +31,9 @@ from convexrough.friction.shear import ShearState
 from convexrough.gradients.along import NONE, Along
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.parts import ZERO, Moves, Part, product
+from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import Units
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 

@@ -16,26 +16,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from functools import cached_property, lru_cache, partial
-from typing import Any, NamedTuple, Self
+from functools import cached_property, partial
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, evenly, frozen, largest, taken
 from convexrough.convex.newton_step import correct
-from convexrough.errors import InputError
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 from convexrough.influence.sliced_matrix import MatrixSums
+from convexrough.normal.exact import Data, Units, exact_data
 from convexrough.normal.load_control import approach_bound, highest_approach
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
@@ -48,54 +46,8 @@ ALL_SHARP = 700
 #: stored, A P is always updated in this way.
 NEARBY = 1e-13
 
-#: 1 / pi to 66 digits.
-INVERSE_PI = Fraction("0.318309886183790671537767526745028724068919291480912897495334688118")
-
-
 #: Factor by which one correction by conjugate gradients reduces the residual.
 REDUCTION = 1e-7
-
-
-@dataclass(frozen=True)
-class Units:
-    """Units of length and force in which the numbers of a problem are about 1.
-
-    They are the units of the scene times a power of two (length) and a power of eight (force). So
-    it causes no rounding to scale a float64 number, or a force to the power 2/3.
-    """
-
-    length: float  # [length] the scaled unit of length
-    force: float  # [force] the scaled unit of force
-
-    @property
-    def local(self) -> float:
-        """force^(2/3) / length, a power of two: k in scaled units is k times this factor."""
-        return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
-
-    @classmethod
-    def of(cls, approach: float, coefficient: float) -> Units:
-        """Units close to `approach` [length] and to the load that causes this indentation.
-
-        coefficient : k of Hertz's law, indentation = k load^(2/3)
-
-        Raises InputError if the approach is not positive and finite.
-        """
-        if not 0 < approach < math.inf:
-            raise InputError("scene", found=f"indentations of {approach:g}", expected=checks.SIZED)
-        length = 2.0 ** round(math.log2(approach))
-        return cls(length, 8.0 ** round(math.log2(length / coefficient) / 2.0))
-
-
-class Data(NamedTuple):
-    """The numbers of a problem as balls (numbers with error bounds), in scaled units.
-
-    coefficients : (n,) k, or (1,) if all are equal;  offsets : (n,) d
-    scale        : () 1 / (pi E*)
-    """
-
-    coefficients: Ball
-    offsets: Ball
-    scale: Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,21 +92,8 @@ class NormalProblem:
     @cached_property
     def exact(self) -> Data:
         """The coefficients k, the offsets d and 1 / (pi E*) to about thirty digits."""
-        scene, units = self.scene, self.units
-        constants = (
-            scene.sphere_radius,
-            scene.material.contact_modulus,
-            units.local,
-            units.force / units.length,
-        )
-        tips = taken(scene.asperities.tip_radii, self.candidates)
-        if len(tips) and (tips.strides == (0,) or (tips == tips[:1]).all()):
-            k = _even_coefficient(float(tips[0]), *constants)
-        else:
-            k = _exact_coefficients(tips, *constants)
-        offsets = self.twofold_offsets()
-        sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
-        return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
+        sizes = self.offset_errors / ROUNDOFF
+        return exact_data(self.scene, self.candidates, self.units, sizes)
 
     @cached_property
     def approach_bound(self) -> float:
@@ -394,21 +333,6 @@ class NormalProblem:
         """
         return float(convexity_number(self.shells, self.compliance(loads)))
 
-    def twofold_offsets(self) -> Pair:
-        """(n,) offsets z - x^2 / (2 Rx) - y^2 / (2 Ry) as pairs of float64 numbers."""
-        return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
-
-    def _twofold_offsets(self, which: Indices) -> Pair:
-        scene, length = self.scene, self.units.length
-        points, further = scene.asperities.positions[which] / length, np.zeros(1)
-        if scene.geometry == "closest":
-            further = scene.asperities.tip_radii[which] / length
-        offsets = Pair.exact(scene.asperities.heights[which] / length)
-        for R, axes in scene.curved:
-            far = Pair(*two_sum(R / length, further))
-            offsets = offsets - square_sum(*points[:, axes].T) / (far + far)
-        return offsets
-
     def overhang(self, weights: Array, displacement: Array) -> Any:
         """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
@@ -450,31 +374,6 @@ def _about(
 def convexity_number(shells: Array, compliance: Array) -> Any:
     """The largest of shells / compliance: one number for (n,); (m, 1), one per row, for (m, n)."""
     return largest(shells / compliance) * (1 + SAFETY)
-
-
-@lru_cache
-def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Three balls: the mean curvature of the pressed body; and, in scaled units, k^3 of an asperity
-    whose relative curvature is 1, and 1 / (pi E*).
-
-    base : the radius of the pressed body;  modulus : E*
-    local, unit : factors that scale k and 1 / (pi E*)
-    """
-    curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
-    cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
-    scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)
-    return Ball.exact(curvature), Ball.exact(cubed), Ball.exact(scale)
-
-
-def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
-    curvature, cubed, _ = _constants(*constants)
-    return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
-
-
-@lru_cache
-def _even_coefficient(tip: float, *constants: Any) -> Ball:
-    """(1,) the local coefficient of one tip radius, cached because scenes often share it."""
-    return _exact_coefficients(np.array([tip]), *constants)
 
 
 def _numbers(control: Ball) -> Any:

@@ -15,7 +15,8 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.normal.problem import Data, NormalProblem
+from convexrough.normal.exact import Data
+from convexrough.normal.problem import NormalProblem
 
 
 @dataclass(frozen=True, eq=False)
