@@ -23,6 +23,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import largest, proved_margin, proved_sparse_margin
 from convexrough.influence.coupling import Influence
@@ -135,13 +136,13 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
     return Box("global", problem.shells, corner, h, number, nowhere, none)
 
 
-def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
+def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Iterator[Box]:
     """At most one box on which convexity is proved.
 
     It is the global box, which contains every solution, or else a local box, which contains
     `loads`.
 
-    displacement : (n,) upper bounds on A P for P = `loads`
+    displacement : (n,) A P for P = `loads`
     """
     highest = problem.overhang(loads, displacement)
     box = widest(problem, loads, highest)

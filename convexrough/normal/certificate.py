@@ -209,7 +209,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     if box.scope != "global":
         assert level.trial is not None
         # `overhang` needs weights and the displacement that exactly these weights cause.
-        highest = problem.overhang(level.trial.loads.high, level.trial.product.upper)
+        highest = problem.overhang(level.trial.loads.high, level.trial.product)
         others = OtherSolutions.of(problem, level.loads.upper, highest)
     load_errors = _load_errors(problem, loads, level)
     moved = _apart(start.loads.high, level) + np.abs(start.loads.low)

@@ -143,7 +143,7 @@ def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool
     state = refined_loads(stack, finite)
     if box is None:
         loads = state.loads.high
-        box = widest(stack, loads, stack.overhang(loads, state.product.upper))
+        box = widest(stack, loads, stack.overhang(loads, state.product))
     inside, _, level = solution_in(stack, box, state)
     good = inside & np.ravel(box.convexity_number < 1)
     good &= np.isfinite(level.loads.radius).all(axis=1) & (level.touching | level.open).all(axis=1)

@@ -333,19 +333,19 @@ class NormalProblem:
         """
         return float(convexity_number(self.shells, self.compliance(loads)))
 
-    def overhang(self, weights: Array, displacement: Array) -> Any:
+    def overhang(self, weights: Array, displacement: Ball) -> Any:
         """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
         It is `highest` or, under load control, the result of `load_control.approach_bound` if that
         is smaller.
 
         weights      : (n,) approximate loads, not negative, not all 0
-        displacement : (n,) upper bounds on A times weights
+        displacement : (n,) A times weights
         """
         if not self.by_load:
             return self.highest
         given = self.coefficients, self.offsets - self.offset_errors, self.load
-        return np.minimum(self.highest, approach_bound(weights, displacement, *given))
+        return np.minimum(self.highest, approach_bound(weights, displacement.upper, *given))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""

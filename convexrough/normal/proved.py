@@ -50,7 +50,7 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
         drop this assumption for asperities whose gaps are not proved
     """
     loads = state.loads.high
-    for box in boxes or tried(problem, loads, state.product.upper):
+    for box in boxes or tried(problem, loads, state.product):
         inside, _, found = solution_in(problem, box, state)
         if inside and not (box.fixed_open.any() and (box.fixed_open & ~found.open).any()):
             return found

@@ -206,7 +206,7 @@ class BristleProgram:
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
     """The upper ends B (n,); a mask (n,), True where B was cut; and the matrix A + diag(h)."""
     trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
-    approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)).upper)
+    approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)))
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
     box = problem.bounds(approach_bound)

@@ -25,6 +25,7 @@ from scenes import (
 )
 
 import convexrough as cr
+from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.coupling import Kind
 from convexrough.normal.boxes import MARGINS, box_of_touching, convex_margin, tried
 from convexrough.normal.problem import NormalProblem
@@ -157,7 +158,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
     radii[touching] = 1e-3 * rng.uniform(0.6, 0.75, len(touching))
     problem = NormalProblem.assemble(scene, approach=1e-3, influence=operator)
     loads = 4 / 3 * radii**3 / scene.relative_radii / problem.units.force
-    boxes = list(tried(problem, loads, problem.influence.apply(loads)))
+    boxes = list(tried(problem, loads, problem.plain_product(Pair.exact(loads))))
     for room in (0.0, 0.1):
         touching = box_of_touching(problem, loads, loads > 0, room * loads)
         boxes += [] if touching is None else [touching]

@@ -24,6 +24,7 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.convex.newton import descend
 from convexrough.influence import Kind
 from convexrough.normal.boxes import tried
@@ -67,7 +68,7 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     problem = assembled(scene, load=contact.load, influence=kind)
     assert set(np.flatnonzero(contact.loads)) <= set(problem.candidates)
     weights = np.random.default_rng(seed).random(len(problem)) ** 9
-    bound = problem.overhang(weights, problem.influence.apply(weights))
+    bound = problem.overhang(weights, problem.plain_product(Pair.exact(weights)))
     assert bound * problem.units.length >= approach * (1 - 1e-12)
 
 
@@ -172,7 +173,7 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 def test_no_proof_where_loads_lie_beyond_a_face_of_the_box() -> None:
     problem = assembled(paper(), load=3.6e-7)
     state = refined_loads(problem, Newton().solve(problem).loads)
-    box = next(tried(problem, state.loads.high, state.product.value))
+    box = next(tried(problem, state.loads.high, state.product))
     assert proved(problem, state, iter((box,))).box is box
     lower = box._replace(faces=0.9 * state.loads.high)
     assert proved(problem, state, iter((lower,))).box is None
@@ -184,7 +185,7 @@ def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     total = problem.load
     assert total is not None
     state = refined_loads(problem, Newton().solve(problem).loads)
-    box = next(tried(problem, state.loads.high, state.product.value))
+    box = next(tried(problem, state.loads.high, state.product))
     wide, higher = (
         proved(each, refined_loads(each, state.loads.high), iter((box,)))
         for each in (
