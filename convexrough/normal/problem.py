@@ -65,7 +65,7 @@ class NormalProblem:
         a bound when one is needed
 
     A stack (`normal.stack.Stack`) is many problems, one per row. Its arrays are (m, n), or (n,)
-    where all rows are equal, and its `control` is (m, 1).
+    where all rows are equal, and `control` and `highest` are (m, 1).
     """
 
     scene: Scene
@@ -78,7 +78,7 @@ class NormalProblem:
     shells: Array
     control: Ball
     by_load: bool
-    highest: float
+    highest: Any
 
     def __post_init__(self) -> None:
         # A solver, which may be any class, gets these arrays, and later the proof uses them.

@@ -45,7 +45,7 @@ class Stack(NormalProblem):
             "coefficients": exact.coefficients.value,
             "offsets": exact.offsets.value,
             "offset_errors": exact.offsets.error,
-            "highest": np.inf if by_load else control.upper,
+            "highest": np.full(control.shape, np.inf) if by_load else control.upper,
             "shells": shells,
             "control": control,
             "by_load": by_load,
