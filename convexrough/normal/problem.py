@@ -78,7 +78,7 @@ class NormalProblem:
     shells: Array
     control: Ball
     by_load: bool
-    highest: Any
+    highest: float
 
     def __post_init__(self) -> None:
         # A solver, which may be any class, gets these arrays, and later the proof uses them.
