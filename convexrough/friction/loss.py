@@ -22,7 +22,7 @@ from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, Rows, energies
 from convexrough.normal.levels import NUMBERS
 from convexrough.roundoff import SAFETY
-from convexrough.sphere import annulus
+from convexrough.sphere import mindlin
 
 #: The load P and the level L of the front at one moment of a path [force].
 Moment: TypeAlias = tuple[Fraction, Fraction]
@@ -41,7 +41,7 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
     own, gaps = high.indentation.positive_part(), (-low.indentation).positive_part()
     s = (low.loads / P).cbrt()
     x = (P - low.loads) / P / (1.0 + s + s * s)
-    slip, slide = P * own * annulus.loss(x) * Fraction(6, 5), P * gaps
+    slip, slide = P * own * mindlin.loss_at(x) * Fraction(6, 5), P * gaps
     doubtful = ~high.touching & ~high.open & np.isfinite(high.loads.upper)
     if doubtful.any():
         most = Ball.between(nothing.value, high.loads.upper)

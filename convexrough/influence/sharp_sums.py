@@ -136,7 +136,7 @@ class SharpPairs:
 
         upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
         ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
-        sums = _sizes(product, ones)
+        sums, _ = _sizes(product, ones)
         # Sums of first slices must be exact up to 16 times the median of `sums`.
         bits = (49 - terms.bit_length()) // 2
         unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
@@ -173,11 +173,10 @@ class SharpPairs:
         left = left + _applied(self.second, first + second)
         own = ordered * Pair(-self.centre.high, -self.centre.low)
         sizes = np.abs(ordered.high)
-        every = _sizes(product, sizes)
+        every, around = _sizes(product, sizes)
         terms = product.near.terms
         rest = self.loads * self.sums + self.unit * terms
         inexact = np.where(every + rest < 2.0**52 * self.unit * self.loads, 0.0, every + rest)
-        around = within(product.order.points, sizes, product.splitting.cut)
         errors = (terms + 4) * ROUNDOFF * (rest + inexact) + self.error * around
         errors += 2.0**-88 * (every + kernel.centre * around)
         return Pair(*two_sum(exact, left)) + own, 1.01 * errors
@@ -189,12 +188,12 @@ def _applied(upper: Any, loads: Array) -> Array:
     return result
 
 
-def _sizes(product: Product, strengths: Array) -> Array:
-    """(n,) bounds on the sums over j of |S_ij| s_j, for the strengths s."""
+def _sizes(product: Product, strengths: Array) -> tuple[Array, Array]:
+    """(n,) bounds on the sums over j of |S_ij| s_j, and of s_j for near pairs, with strengths s."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)
-    return np.asarray(1.01 * (ordered + 2.0 * kernel.centre * around))
+    return 1.01 * (ordered + 2.0 * kernel.centre * around), around
 
 
 class Slices(NamedTuple):

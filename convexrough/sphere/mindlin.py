@@ -2,8 +2,14 @@
 
 The argument t is Q / (f P), the shear force divided by the friction limit. The indentation is
 n = k P^(2/3), by Hertz's law, and `ratio` gives c_t. Displacements are in units of c_t f n, and the
-potential energy is in units of c_t f^2 P n. The polynomials of `annulus` keep the relative accuracy
-of each result, even where it is small and proportional to t^3.
+potential energy is in units of c_t f^2 P n. In partial slip, with the stick radius c and the
+contact radius a, s = c / a and
+
+    t = 1 - s^3,    phi = 1 - s^2.
+
+All results are polynomials of the width x = 1 - s of the slip annulus; the sphere slides at x = 1.
+The code writes them as sums of positive terms, so that each keeps its relative accuracy down to
+x = 0, even where it is small and proportional to t^3.
 Source: Johnson, Contact Mechanics (1985), chapter 7.
 """
 
@@ -12,7 +18,6 @@ from __future__ import annotations
 import numpy as np
 
 from convexrough.arrays import Number
-from convexrough.sphere import annulus
 
 
 def ratio(poisson_ratio: Number) -> Number:
@@ -20,14 +25,33 @@ def ratio(poisson_ratio: Number) -> Number:
     return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
 
 
+def width(force: Number) -> Number:
+    """The width x under a force t of either sign; 1 for |t| >= 1."""
+    size = np.minimum(np.abs(force), 1.0)
+    return width_between(size, 1.0 - size)
+
+
+def width_between(force: Number, left: Number) -> Number:
+    """The width x under a force t >= 0; `left` is 1 - t, given to full relative accuracy."""
+    s = np.cbrt(np.maximum(left, 0.0))
+    return np.minimum(force, 1.0) / (1.0 + s + s * s)
+
+
 def deflection(t: Number) -> Number:
     """The deflection phi(t) = 1 - (1 - t)^(2/3) for t >= 0; phi(-t) = -phi(t)."""
-    return np.copysign(annulus.deflection(annulus.width_under(t)), t)
+    return np.copysign(deflection_at(width(t)), t)
+
+
+def deflection_at(x: Number) -> Number:
+    """The deflection phi = 1 - s^2 for the width x."""
+    return x * (2.0 - x)
 
 
 def potential(t: Number) -> Number:
     """The integral of phi from 0 to t:  t - (3/5) [1 - (1 - t)^(5/3)]  for t >= 0."""
-    return annulus.potential(annulus.width_under(t))
+    x = width(t)
+    s = 1.0 - x
+    return x * x * (0.4 + s * (0.8 + s * (1.2 + s * 0.6)))
 
 
 def loss(t: Number) -> Number:
@@ -37,4 +61,10 @@ def loss(t: Number) -> Number:
     (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)) in both bodies, with the shear modulus G and the
     contact radius a.
     """
-    return annulus.loss(annulus.width_under(t))
+    return loss_at(width(t))
+
+
+def loss_at(x: Number) -> Number:
+    """The loss e for the width x."""
+    s = 1.0 - x
+    return x * x * x * (1.0 + s * (3.0 + s)) / 6.0

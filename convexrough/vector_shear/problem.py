@@ -34,7 +34,7 @@ from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
-from convexrough.sphere import annulus, mindlin
+from convexrough.sphere import mindlin
 
 #: Margins of convexity for which a Cholesky factorisation is tried, the largest first.
 MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
@@ -179,8 +179,8 @@ class FrictionProblem:
     def deflections(self, increments: Array) -> Array:
         """(n,) the deflections under the shear forces u = `increments`, 0 <= u <= P."""
         left = (self.loads - increments) / self.loads
-        x = annulus.width_between(increments / self.loads, left)
-        eta: Array = self.thresholds * annulus.deflection(x)
+        x = mindlin.width_between(increments / self.loads, left)
+        eta: Array = self.thresholds * mindlin.deflection_at(x)
         return eta
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
