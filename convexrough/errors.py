@@ -187,4 +187,9 @@ class WorkerError(ConvexroughError):
     """Workers of a sweep stopped, or run another version of a package.
 
     Computed rows are kept; `cr.sweep` with `resume=True` computes the rest.
+
+    >>> try:
+    ...     table = cr.sweep([scene], load=3e-7, measure=["load"], out=folder / "c", workers=1)
+    ... except cr.WorkerError:
+    ...     table = cr.sweep([scene], load=3e-7, measure=["load"], out=folder / "c", resume=True)
     """

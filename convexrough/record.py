@@ -88,7 +88,13 @@ class Record:
 class Table(Record):
     """A result with arrays that have an entry for each asperity, step or point.
 
-    Columns of data frames and files are named in the singular: `load` for `loads`.
+    Columns of data frames and files are named in the singular: `load` for `loads`. `contact` is a
+    result of `press` here:
+
+    >>> list(contact.columns("loads", "gaps"))
+    ['load', 'gap']
+    >>> contact.to_dataframe()["load"].gt(0).sum(), contact.to_xarray()["load"].dims
+    (np.int64(37), ('asperity',))
     """
 
     #: Rows of a data frame belong to the dimension of the first key.

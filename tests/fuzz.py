@@ -72,7 +72,7 @@ reference = 1e-8
 ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}
 reference = 1e-8
 [shakedown]
-loads = 1e-8
+load = 1e-8
 force_amplitudes = [1e-9]
 kind = "elastic"
 """

@@ -47,7 +47,7 @@ ellipse = {{ load = 0.7, load_amplitude = 0.28, force_amplitude = 0.175, chords 
 reference = 3.6085338874666633e-07
 phases = [0.5]
 [shakedown]
-loads = 3.6085338874666633e-07
+load = 3.6085338874666633e-07
 force_amplitudes = [1.8042669437333e-07, -1.8042669437333e-07]
 [gradient]
 of = "loss"

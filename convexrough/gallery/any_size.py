@@ -17,7 +17,7 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact with a known answer, up to the rounding of its heights to float64.
+    """A contact with a known answer, up to the rounding of its heights to float64: `manufactured`.
 
     `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
     and proves the statuses.

@@ -35,7 +35,9 @@ REVERSALS = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Checked(Record):
-    """Comparison of loads or forces with the answer. Indices are those of the scene's asperities.
+    """Comparison of loads or forces with the answer: `HardCase.check` and `check_shear`.
+
+    Indices are those of the scene's asperities.
 
     wrongly_open   : (m,) asperities that touch and have no given load (or shear force)
     wrongly_loaded : (m,) asperities that are open and have a given load (or shear force)

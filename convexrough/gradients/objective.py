@@ -50,11 +50,15 @@ class Objective(Record):
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
     For scipy, divide value and gradient by the initial value: scipy's tolerances are absolute, and
     a loss may be 1e-13. `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
+    docs/theory/gradients.md derives the gradient.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
     >>> value, slopes = loss(loss.start)
     >>> print(f"{value:.4g}", len(slopes))
     1.364e-13 61
+    >>> from autograd import grad
+    >>> bool((grad(loss.to_autograd())(loss.start) == slopes).all())
+    True
     """
 
     scene: Scene

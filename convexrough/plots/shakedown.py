@@ -31,7 +31,7 @@ def shakedown_figures(found: Shakedown) -> Figures:
         the kind "exact", and if more than one asperity has a factor
 
     >>> swing = 0.5 * contact.load * np.array([1.0, -1.0])
-    >>> found = cr.shakedown(scene, loads=contact.load, force_amplitudes=swing)
+    >>> found = cr.shakedown(scene, load=contact.load, force_amplitudes=swing)
     >>> print(*cr.plots.shakedown_figures(found))
     shakedown shakedown_map
     """

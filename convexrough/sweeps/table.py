@@ -57,8 +57,8 @@ class SweepTable(Record):
 
     >>> loads = [1e-7, 2e-7, 3e-7]
     >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
-    >>> print(table.read(["normal.load", "contact"])["contact"], table.complete)
-    [19. 31. 37.] True
+    >>> print(table.read(["normal.load", "contact"])["contact"], table.complete, table.counts())
+    [19. 31. 37.] True {'certified': 3, 'undecided': 0, 'failed': 0}
     >>> [block["contact"].tolist() for block in table.blocks(["contact"])]
     [[19.0, 31.0, 37.0]]
     >>> print(table.quantiles(["contact"], at=[0.5])["0.5"])

@@ -46,8 +46,8 @@ class Verdict(Claim, Table, Plottable):
         own start, with its own certificate; None where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
-    >>> verdict.holds, verdict.decided_alone, list(verdict.hints())
-    (True, True, [])
+    >>> verdict.holds, verdict.decided_alone, list(verdict.hints()), verdict.nearby()
+    (True, True, [], None)
     """
 
     one = "load"

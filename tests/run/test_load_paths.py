@@ -38,7 +38,7 @@ loads = [0.8, 1.0]
 forces = [-0.1, 0.1]
 reference = LOAD
 [shakedown]
-loads = 1.0
+load = 1.0
 force_amplitudes = [0.1, -0.1]
 reference = LOAD
 """

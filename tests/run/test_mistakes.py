@@ -21,7 +21,7 @@ def stage(table: str) -> str:
     return scene_text(WITHIN, "load = 3.6e-7", FRICTION + table)
 
 
-VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
+VECTOR = '[shakedown]\nload = 1\nkind = "vector"\nforce_amplitudes = '
 LOOPS = "[cycle]\nmaximum_fraction = [0.5]\nloop_"
 PASCALS = '[units]\nlength = "m"\npressure = "Pa"\n'
 DEGREES = "expected a phase in radians, from -pi to pi; 90 degrees are 1.5708"
@@ -81,19 +81,19 @@ MISTAKES = [
     (stage(f"[steady]\n{ELLIPSE}90}}"), f"[steady] ellipse.phase: found 90, {DEGREES}"),
     (stage(f"[steady]\n{ELLIPSE}0.0}}\nphases = [3.1416, 180.0]"),
      f"[steady] phases[1]: found 180.0, {DEGREES}"),
-    (stage("[shakedown]\nloads = 1e-8\nforce_amplitudes = [0.0]"),
+    (stage("[shakedown]\nload = 1e-8\nforce_amplitudes = [0.0]"),
      "[shakedown]: force_amplitudes: found one point, expected a path that moves"),
-    (stage('[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"'),
+    (stage('[shakedown]\nload = 1\nforce_amplitudes = [1]\nkind = "x"'),
      "[shakedown] kind: found 'x', expected \"exact\", \"elastic\" or \"vector\""),
-    (stage("[shakedown]\nloads = 1\nforce_amplitudes = [[1, 0]]"),
+    (stage("[shakedown]\nload = 1\nforce_amplitudes = [[1, 0]]"),
      "[shakedown] force_amplitudes[0]: found [1.0, 0.0], expected a finite number, or with kind"),
-    *((stage(f"[shakedown]\nloads = 1\nforces = {it}\nforce_amplitudes = [1, -1]"),
-       f"[shakedown] forces: found {it}, expected a finite number, or with kind = \"vector\"")
+    *((stage(f"[shakedown]\nload = 1\nforce = {it}\nforce_amplitudes = [1, -1]"),
+       f"[shakedown] force: found {it}, expected a finite number, or with kind = \"vector\"")
       for it in ("[0.2]", "[0.2, 0.1]")),
-    (stage("[shakedown]\nloads = 1\nforce_amplitudes = 1.0"),
+    (stage("[shakedown]\nload = 1\nforce_amplitudes = 1.0"),
      "[shakedown] force_amplitudes: found 1.0, expected a valid list"),
-    (stage(f"{VECTOR}[[1, 0]]\nforces = 0.1"),
-     "[shakedown] forces: found 0.1, expected a pair [x, y]"),
+    (stage(f"{VECTOR}[[1, 0]]\nforce = 0.1"),
+     "[shakedown] force: found 0.1, expected a pair [x, y]"),
     (stage('[gradient]\nof = "los"'),
      "[gradient] of: found 'los', expected one of: loss, displacement, approach, load"),
     (stage('[gradient]\nof = "load"\nfraction = 0.1'),

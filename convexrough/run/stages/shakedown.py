@@ -26,8 +26,8 @@ class ShakedownStage(Stage):
     name = "shakedown"
     numbers = ("factor", "lower", "upper", "gross")
 
-    loads: Positive
-    forces: Force = 0.0
+    load: Positive
+    force: Force = 0.0
     load_amplitudes: list[Finite] | None = None
     force_amplitudes: list[Force]
     kind: Kind = "exact"
@@ -39,8 +39,8 @@ class ShakedownStage(Stage):
             yield "load_amplitudes", f"{found}, expected {len(self.force_amplitudes)}"
         pairs = self.kind == "vector"
         expected = 'a pair [x, y] with kind = "vector"' if pairs else NUMBER_OR_PAIR
-        if isinstance(self.forces, list) != pairs and self.forces != 0.0:
-            yield "forces", f"found {self.forces}, expected {expected}"
+        if isinstance(self.force, list) != pairs and self.force != 0.0:
+            yield "force", f"found {self.force}, expected {expected}"
         for i, force in enumerate(self.force_amplitudes):
             if isinstance(force, list) != pairs:
                 yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
@@ -48,15 +48,15 @@ class ShakedownStage(Stage):
     @property
     def highest_load(self) -> float:
         """[force] the largest load where the factor on the amplitudes is 1."""
-        return self.reference * (self.loads + max([0.0, *(self.load_amplitudes or [])]))
+        return self.reference * (self.load + max([0.0, *(self.load_amplitudes or [])]))
 
     def compute(self, contact: Contact) -> ShakedownResult:
         swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
         with blamed_on(f"[{self.name}]"):
             found = shakedown(
                 contact.scene,
-                load=self.reference * self.loads,
-                force=self.reference * np.array(self.forces),
+                load=self.reference * self.load,
+                force=self.reference * np.array(self.force),
                 load_amplitudes=self.reference * np.array(swings),
                 force_amplitudes=self.reference * np.array(self.force_amplitudes),
                 kind=self.kind,
