@@ -19,6 +19,9 @@ from convexrough.tabular.units import bare, parsed
 RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
            "area", "contact")  # fmt: skip
 
+#: Largest number of columns that a message names.
+MOST_NAMED = 5
+
 #: Relative rounding error up to which a last row counts as the means or sums of a table.
 ROUNDED = 1e-3
 
@@ -42,7 +45,8 @@ def read_summits(
     unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
     if "height" not in columns and unread:
         named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
-        raise InputError("columns", found=f"{', '.join(unread)}, but no height",
+        more = ", ..." if len(unread) > MOST_NAMED else ""
+        raise InputError("columns", found=f"{', '.join(unread[:MOST_NAMED])}{more}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip
     for name, said in table.units.items():
         if parsed(said) and not how.units.length:

@@ -129,6 +129,8 @@ def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | No
 
     Raises InputError for holes unless `fill` is true, and if all pixels are holes.
     """
+    if heights.size == 0:
+        return heights, None  # `Surface` refuses it
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     marks = known | np.isin(heights, (np.fmin.reduce(heights, None), np.fmax.reduce(heights, None)))
     if (rest := heights[~marks & ~np.isnan(heights)]).size:

@@ -276,6 +276,15 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
     assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())
 
 
+@pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0,)])
+def test_arrays_without_numbers(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    np.save(tmp_path / "empty.npy", np.zeros(shape))
+    with pytest.raises(
+        cr.InputError, match=r"heights: found shape .* rows and columns, at least 3"
+    ):
+        cr.surface.read(tmp_path / "empty.npy", pixel=1.0)
+
+
 @pytest.mark.parametrize(
     "said",
     [

@@ -308,6 +308,10 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
             "x,y,elevation,load,id\n0,0,1,2,3\n",
             "columns: found elevation, but no height, expected a",
         ),
+        (
+            "x,y,a,b,c,d,e,f\n0,0,1,2,3,4,5,6\n",
+            "columns: found a, b, c, d, e, ..., but no height, expected a",
+        ),
         ("x,y\n0,0\n", "tip radii: found neither"),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
         ("0,0\n1,1\n", "found no header and 2 columns, expected a column 'x'"),
