@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.scene.asperities import Asperities
-from convexrough.tabular.roles import AS_IT_IS, Reading, is_index
+from convexrough.tabular.roles import AS_IT_IS, Reading, is_index, shortened
 from convexrough.tabular.table import read_table
 from convexrough.tabular.units import bare, parsed
 
@@ -44,9 +44,10 @@ def read_summits(
     columns = table.columns
     unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
     if "height" not in columns and unread:
-        named = 'columns = {height = "' + unread[0] + '"} in [asperities], or no such column'
+        some = [shortened(it) for it in unread[:MOST_NAMED]]
+        named = 'columns = {height = "' + some[0] + '"} in [asperities], or no such column'
         more = ", ..." if len(unread) > MOST_NAMED else ""
-        raise InputError("columns", found=f"{', '.join(unread[:MOST_NAMED])}{more}, but no height",
+        raise InputError("columns", found=f"{', '.join(some)}{more}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip
     for name, said in table.units.items():
         if parsed(said) and not how.units.length:

@@ -279,9 +279,7 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
 @pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0,)])
 def test_arrays_without_numbers(tmp_path: Path, shape: tuple[int, ...]) -> None:
     np.save(tmp_path / "empty.npy", np.zeros(shape))
-    with pytest.raises(
-        cr.InputError, match=r"heights: found shape .* rows and columns, at least 3"
-    ):
+    with pytest.raises(cr.InputError, match=r"heights: found shape .* at least 3 of each"):
         cr.surface.read(tmp_path / "empty.npy", pixel=1.0)
 
 
