@@ -63,7 +63,7 @@ OPTIONS = {
     "out": click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
     "no_figures": click.option("--no-figures", is_flag=True, help="Do not write figures."),
     "force": click.option(
-        "--force", is_flag=True, help="Replace the files of an earlier run in this folder."),
+        "--force", is_flag=True, help="Replace the files of an earlier run."),
     "as_json": click.option(
         "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."),
 }  # fmt: skip

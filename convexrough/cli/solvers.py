@@ -89,11 +89,11 @@ def compare(
 def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
     """Write a scene as cone and quadratic programs for other solvers.
 
-    The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
-    contact law, and its dual, which bounds the energy from below. The format mps and a second npz
-    (qpsolvers) contain the quadratic program of bristles (springs that together approximate Hertz's
-    law). For each program, index.json gives the minimum, the unit of its loads, and the indices of
-    its asperities.
+    The cone program, which is equivalent to the contact law, and its dual, which bounds the energy
+    from below, are written as cbf, json (Clarabel) and npz, one file each. The quadratic program of
+    bristles (springs that together approximate Hertz's law) is written as mps and npz (qpsolvers).
+    For each program, index.json gives the minimum of the objective, the units of energy and load,
+    and the indices of the asperities.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

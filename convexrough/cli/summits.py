@@ -110,7 +110,7 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Fit a paraboloid to N by N pixels about each maximum; N is odd.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Remove hills whose prominence is below the fraction PART of the "
+              help="Merge hills whose prominence is below the fraction PART of the "
                    "height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
@@ -132,7 +132,8 @@ def summits(
     reports contacts, certificate, crowding (a value above 1 means that contact discs overlap) and
     model error for several values of --prune, and recommends one of these values. With --whole it
     also computes, for comparison, the contact of the whole map at the same approach, by boundary
-    elements, one per pixel. It writes summits.csv, a summary and figures. Results of a.npz go to
+    elements, one per pixel. In every case the command writes summits.csv, a
+    summary and figures. Results of a.npz go to
     the folder a-summits unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.

@@ -31,8 +31,8 @@ class Loop(Table):
     displacements : (m,) [length] relative tangential displacement of distant points of the two
         bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] own deflection (the displacement that its own force
-        causes) plus drift of each asperity: docs/theory/paths.md
+    asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
+        own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -67,12 +67,15 @@ def loop_through(
     *,
     by_steps: bool,
 ) -> Loop:
-    """The loop through T = top - 2 w / f as Q falls, and bottom + 2 w / f as it rises.
+    """The loop through the points at which Q has changed by 2 w since its last turning point.
+
+    There T is top - 2 w / f as Q falls, and bottom + 2 w / f as Q rises.
 
     top, bottom : [force] the largest and the smallest T
-    way      : the values of w [force]
+    way      : the values of w [force], half of the change of Q
     chosen   : indices of the asperities whose own loops are given
-    by_steps : True if general steps give the results, one for each point
+    by_steps : True if order fails, so that general steps (docs/theory/without-order.md) give the
+        results, one step from each point to the next
     """
     f = Fraction(checks.friction(levels.scene.friction))
     LOGGER.info(f"computing {len(way) + 1} levels of a loop")

@@ -4,7 +4,7 @@ docs/theory/losses.md derives the formulas. Losses are divided by c_t f^2, with 
 friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
 level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
 L, and c the direction of slip, 1 or -1. B is the sum of the B_i(P, L) of (2) on that page. All of
-this assumes order: no indentation falls as the load rises.
+this assumes order (docs/theory/states.md, "Order").
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 docs/theory/states.md, "The proof of order", states and proves the theorem and defines its symbols;
 (3), (4), the theorem and the corollary in this module are those of that section. C~ and delta are
-diagonal matrices. Weights come from an inverse or, if too many asperities touch for that, from
-`friction.sweeping`.
+diagonal matrices. Weights come from an inverse if at most `SWEPT` asperities touch. If more touch,
+they come from `friction.sweeping`; if this proves nothing and at most `INVERTED` touch, from an
+inverse.
 """
 
 from __future__ import annotations
@@ -28,17 +29,16 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
 #: falls from a level in use to the next higher one, and no rate at the tested levels is negative;
-#: each state solves one step of `general_step`. "fails": some indentation falls as the load rises,
-#: or nothing is proved.
+#: each friction state solves one step of `general_step`. "fails": a computed rate is negative, or
+#: it is not proved that no load P_i falls from one level to the next.
 Order = Literal["proved", "proved for one step", "fails"]
 
 #: A computed rate below -RATE_ROUNDING counts as negative. Rates are solved for to the relative
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: If more than SWEPT asperities touch, `sweeping` finds weights. If at most INVERTED touch, and
-#: `sweeping` is not used or proves nothing, an inverse gives them. Unless a proof is asked for, it
-#: is tried only if at most MOST asperities touch.
+#: Numbers of touching asperities that decide where weights come from (see above); and the largest
+#: number for which a proof is tried. `cr.prove_order` has a limit of its own.
 SWEPT, INVERTED, MOST = 400, 800, 20_000
 
 #: Largest number of intermediate levels of the bisection, with an inverse and without one.
@@ -77,7 +77,7 @@ def order_between(
         middle = (high + low) / 2
         try:
             level = at(middle)
-        except SolverError:  # no intermediate level exists to test
+        except SolverError:  # the intermediate level could not be computed
             return "proved for one step"
         if _falls(at(high), level, rising) or _falls(level, at(low), rising):
             return "fails"
@@ -173,7 +173,8 @@ class _Span(NamedTuple):
     def of(cls, high: Rows, low: Rows, k: Ball, box: Box) -> _Span:
         support = ~high.open
         c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
-        # H + A >= (1 - theta) H gives C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
+        # theta = `box.convexity_number`, H^-1 = diag(`box.compliance`): as H + A >= (1 - theta) H,
+        # C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
         e = np.where(support, c * box.compliance, 0.0).max(axis=1, keepdims=True)
         drop, depth = (high.approach - low.approach).upper[:, None], high.indentation.lower
         gaps = np.maximum(-high.indentation.upper, 0.0)

@@ -29,8 +29,8 @@ def cycle(
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
 
-    As in `shear`, forces and displacements count as those of gross sliding if they differ from
-    these only by rounding; the result contains those of gross sliding.
+    As in `shear`, a force or displacement that differs only by rounding from the value at the
+    onset of gross sliding is replaced by that value, also in the result.
 
     Raises InputError if the scene has no friction, if the minimum exceeds the maximum, if a force
     exceeds the friction limit f P, or if the displacement exceeds that of gross sliding.

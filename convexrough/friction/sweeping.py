@@ -3,20 +3,21 @@ r"""Proof of order for many asperities: charges at near neighbours bound the rat
 docs/theory/states.md, "The proof of order", derives (6), defines its symbols, and compares the
 weights w_k with charges on shells, onto which a unit charge at asperity i is swept. For weights
 that satisfy (6), 1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is
-positive for all i on the support. The shells have the radii R_k = scale C~_k with
-scale = 1 / (pi E*).
+positive for all i on the support. The shells have the radii R_k = c~_k / (pi E*); `scale` is
+1 / (pi E*).
 
-The weights are those of least electrostatic energy, together with a charge -1 at i, for which some
-moments vanish. Let the complex number d_k be the vector from i to k, divided by the direction from
-the middle of the support to i. The moments are:
+The weights are those for which some moments vanish and which, together with a charge -1 at i, have
+the least electrostatic energy. Let the complex number z_k be the vector from i to k, divided by the
+direction from the middle of the support to i. The moments are:
 
-- all around i: sum w_k d_k and sum w_k d_k^2; then (7) of that page proves (6) for far asperities;
-- at an edge: the imaginary part of sum w_k d_k, along the edge, and
-  sum w_k (|d_k|^2 - 3 Re(d_k)^2), the term of second order of the potential towards the middle;
-- at a corner: the imaginary part of sum w_k d_k.
+- if neighbours lie all around i: sum w_k z_k and sum w_k z_k^2. Then (7) of that page proves (6)
+  for far asperities;
+- if i is at an edge: the imaginary part of sum w_k z_k, along the edge, and
+  sum w_k (|z_k|^2 - 3 Re(z_k)^2), the term of second order of the potential towards the middle;
+- if i is at a corner: the imaginary part of sum w_k z_k.
 
-For an asperity outside the contact one neighbour alone suffices, if the whole support is nearer to
-this neighbour than to i.
+For an asperity i outside the contact one neighbour alone suffices if the whole support is nearer to
+this neighbour than to i, and the neighbour's shell does not reach i.
 """
 
 from __future__ import annotations
@@ -55,24 +56,24 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 # All numbers here are heuristics.
 
-#: Numbers of neighbours and moments of the weights that are tried, until (6) is proved. A try also
-#: uses those asperities at which earlier weights violated (6) most. Tries with more than MORE
-#: neighbours are made for at most FEW asperities.
+#: Numbers of neighbours and moments of the weights that are tried, until the bound 1 - q_i
+#: suffices. A try also uses the asperities that determined q_i in earlier tries. Tries with more
+#: than MORE neighbours are made only if at most FEW asperities remain.
 TRIES: tuple[tuple[int, Moments], ...] = (
     (12, around), (10, edge), (14, corner), (32, around), (32, edge),
     *3 * ((60, around), (60, edge)),
 )  # fmt: skip
 MORE, FEW = 32, 300
 
-#: Number of neighbours of an asperity outside the contact of which one alone is tried.
+#: Number of nearest neighbours of an asperity outside the contact that are tried, each alone.
 ALONE = 14
 
-#: Number of nearest asperities, per neighbour with a weight, for which (6) is computed where (7)
-#: proves it for all others.
+#: If (7) proves (6) for all far asperities, (6) is computed only for the nearest ones: NEAR times
+#: as many as the weights have neighbours.
 NEAR = 9
 
 #: Largest number of systems that are solved for weights; each leaves out the neighbours whose
-#: weights are negative.
+#: weights were negative in an earlier one.
 SEARCHES = 15
 
 #: DIRECTIONS: number of directions in which the extent of the support is computed. ROWS: number of
@@ -214,11 +215,11 @@ class _Swept:
             system[:, :s, s:] = sums[todo].mT
             system *= used[:, :, None] * used[:, None, :]
             dropped = 1.0 - used
-            dropped[:, s:] = -1e-13  # moments that depend on each other do no harm
+            dropped[:, s:] = -1e-13  # not singular if moments depend on each other
             system[:, range(s + rows), range(s + rows)] += dropped
             try:
                 found = np.linalg.solve(system, (target[todo] * used)[:, :, None])[:, :s, 0]
-            except np.linalg.LinAlgError:  # of shells that overlap; these weights remain 0
+            except np.linalg.LinAlgError:  # possible if shells overlap; weights remain 0
                 break
             fits = (found >= 0).all(axis=1)
             weights[todo[fits]] = found[fits]
@@ -233,7 +234,11 @@ class _Swept:
     def rates(
         self, which: Indices, near: Indices, weights: Array, least: Array
     ) -> tuple[Array, Indices]:
-        """(m,) bounds 1 - q_i, and the k that determine q_i; -inf where not above `least` (m,)."""
+        """(m,) lower bounds 1 - q_i, and the k that determine q_i.
+
+        A bound is -inf where no weights were found, and where (7) fails and near asperities already
+        show that it is not above `least` (m,).
+        """
         rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
         known = np.flatnonzero(weights.any(axis=1))
         mine, near = which[known], near[known]
@@ -267,7 +272,7 @@ class _Swept:
         with np.errstate(divide="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
         s = square / 4 - first - 3 / 4 * total(d**2) - (third + rest) / r
-        # s exceeds square / 32 by far more than it is wrong by rounding.
+        # Where s > square / 16, s - square / 32 is far larger than the rounding error of s.
         return np.asarray(np.where(s > square / 16, square / 32 / self.extent**2, 0.0))
 
     def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:

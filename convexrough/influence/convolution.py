@@ -16,8 +16,8 @@ from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
 
 #: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
-#: docs/theory/operators-lattice.md, "Rounding". A pass of radix 4 has a smaller error than two
-#: passes of radix 2, and a pass of radix 8 has a smaller error than three passes of radix 2.
+#: docs/theory/operators-lattice.md, "Rounding". Radices 4 and 8 are
+#: counted as two and three passes of radix 2, which have a larger error.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed in groups with this many bytes in each row, which fit in the cache.
@@ -27,9 +27,9 @@ ROW = 512
 LAID_OUT = 2**17
 
 
-#: A function of the differences i of two sites in rows, of their differences j in columns, and of
-#: the squared distances [spacing^2] for all (i, j). It returns for each kernel an array of values
-#: (len(i), len(j)).
+#: A function of i, j and squares: i are differences of the row numbers of two sites, j those of
+#: their column numbers, and squares (len(i), len(j)) the squared distances [spacing^2]. It returns
+#: for each kernel an array of values (len(i), len(j)).
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
 #: A function of the transforms of some fields in a slice of columns, and of this slice. It returns
@@ -43,7 +43,8 @@ class SiteBox:
 
     shape  : numbers of rows and of columns of sites
     basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
-    extent : [spacing] upper bound on the distance of two occupied sites, which are sites of points
+    extent : [spacing] upper bound on the distance between any two occupied sites (sites with a
+        point)
     """
 
     shape: tuple[int, int]
@@ -95,7 +96,7 @@ class SiteBox:
         return self.kernels(values, dtype)[0]
 
     def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
-        """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two sites.
+        """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two occupied sites.
 
         over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
             small r (`influence.softened`)
@@ -171,7 +172,11 @@ class SiteBox:
         return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Slices of `taken` and of columns of the padded box, with the differences i, j there."""
+        """Yield blocks of the rows `taken` of the padded box.
+
+        A block is a slice of these rows (from the first one taken), a slice of columns, and the
+        differences i and j of sites that belong to these rows and columns.
+        """
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):

@@ -56,9 +56,10 @@ FACTORISED = 1500
 CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
-#: WIDTHS are radii of shells divided by t, the cheapest first. WIDENED is a factor for the shells
-#: of nearly singular pairs. Each radius is raised to at least the radii of the neighbours, less
-#: LESS times the distance. Heuristics: any radii give valid bounds.
+#: WIDTHS are radii of shells divided by t, the cheapest first. Where s = (t_i t_j)^(1/2) / r_ij of
+#: a pair is close to 1, the radii are at least WIDENED t / (1 - s)^(1/2). Each radius is then
+#: raised to the radius of each near neighbour minus LESS times its distance, if that is larger.
+#: Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -70,8 +71,8 @@ MOST_PAIRS = 200
 #: Overlaps of shells wider than this many times the median are searched one by one, for speed only.
 WIDE = 2.0
 
-#: Largest number of asperities for which a proof is tried: it needs several eliminations, and one
-#: takes 5 s for 100,000 asperities.
+#: Largest number of asperities for which a proof by overlapping shells is tried. Such a proof needs
+#: several eliminations, and one takes 5 s for 100,000 asperities.
 MOST_ELIMINATED = 200_000
 
 
@@ -98,7 +99,7 @@ class Box(NamedTuple):
         )
 
     def convexity_at(self, compliance: Array) -> Any:
-        """The convexity number that the shells prove where this is the compliance."""
+        """The convexity number by the shells on a box with this compliance at its upper ends."""
         return convexity_number(self.shells, compliance)
 
     @np.errstate(divide="ignore", invalid="ignore")

@@ -39,7 +39,7 @@ class Stack(NormalProblem):
         control: Ball,
         by_load: bool,
     ) -> Stack:
-        """The stack with the numbers `exact`, of which the coefficients may be (1,) or (m, 1)."""
+        """The stack with coefficients, (1,) or (m, 1), and offsets (m, n) from `exact`."""
         first = coupled[0][1]
         given = {each.name: getattr(first, each.name) for each in fields(first)} | {
             "coefficients": exact.coefficients.value,
@@ -101,7 +101,10 @@ class Stack(NormalProblem):
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P for P = `others`, to about thirty digits; other arguments are not used."""
+        """(m, n) A P for P = `others`, to about thirty digits.
+
+        The first two arguments are not used.
+        """
         return self.product(others)
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:

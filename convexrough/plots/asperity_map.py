@@ -1,4 +1,4 @@
-"""The map of asperities that all figures use: discs in true size, or one image if many touch."""
+"""The map of asperities that all figures use: discs in true size, or one image for many."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from convexrough.plots.measure import Measure, Scale
 from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
-#: mosaic, an image that has one colour per pixel.
+#: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.
@@ -206,7 +206,7 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 
 
 def _square(points: Array, radii: Array, outline: Sequence[float]) -> tuple[Array, Array]:
-    """Two corners of the square about the discs (or all points without discs) and the outline."""
+    """Two corners of the square about the outline and the discs (if there are none, all points)."""
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
     ends = [points[there] - radii[there, None], points[there] + radii[there, None]]
     if outline:
@@ -247,7 +247,9 @@ def _draw_mosaic(
     width = high[0] - low[0]
     steps = width * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(low[0] + steps, low[1] + steps), axis=-1)
-    cell = width / np.sqrt(np.count_nonzero(shown))  # larger distances are outside
+    cell = width / np.sqrt(
+        np.count_nonzero(shown)
+    )  # pixels farther than this from every point stay empty
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
     visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
     image = np.vstack((visible, np.zeros(4)))[nearest]

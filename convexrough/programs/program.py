@@ -42,7 +42,7 @@ WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
 
 #: File endings, with the contents and the software that reads them.
 FORMATS = {
-    "cbf": "the cone program and its dual in the Conic Benchmark Format: MOSEK, PICOS, ...",
+    "cbf": "the cone program, and its dual, in the Conic Benchmark Format: MOSEK, PICOS, ...",
     "json": "the same for clarabel.load_from_file",
     "mps": "the quadratic program of bristles: HiGHS (which has no cones), Gurobi, CPLEX, ...",
     "npz": "all programs: cones as sparse matrices, bristles for qpsolvers.Problem.load",
@@ -166,8 +166,8 @@ def program(
     """The contact problem of a scene as a convex program in standard form.
 
     form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
-        program; if asperities did not interact, loads would have errors of about 0.4 / bristles^2
-        of the largest; `load_error_estimate` includes the interaction)
+        program; if asperities did not interact, errors would be about 0.4 / bristles^2 times the
+        largest load; `load_error_estimate` includes the interaction)
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 

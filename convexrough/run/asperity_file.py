@@ -22,7 +22,8 @@ RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "forc
 #: Largest number of columns that a message names.
 MOST_NAMED = 5
 
-#: Relative rounding error up to which a last row counts as the means or sums of a table.
+#: A last row counts as the means or sums of a table if it differs from them by at most this part of
+#: the range (largest minus smallest value) of each column.
 ROUNDED = 1e-3
 
 
@@ -78,7 +79,7 @@ def _summary_in_last_row(columns: list[Array]) -> str:
     """ "means" or "sums" if the last row contains those of the rows above; else ""."""
     own = columns[2:]
     if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
-        return ""  # the mean of a regular array is an asperity in its middle
+        return ""  # perhaps an asperity in the middle of a regular array
     for what, of in (("means", np.mean), ("sums", np.sum)):
         if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
             return what

@@ -99,7 +99,7 @@ class ConicCVXPY(ConeSolver):
         """The program in CVXPY, with four or five cones, to be read, changed or solved again.
 
         problem : the contact problem, from `NormalProblem.assemble`
-        five    : True for five cones per asperity, which are exact for larger loads
+        five    : True for five cones per asperity, which are exact up to larger loads than four
         """
         return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
@@ -112,7 +112,7 @@ class ConicCVXPY(ConeSolver):
             options = dict.fromkeys(names.tolerances, self.tolerance) | {names.limit: steps}
         advice = "try more max_iterations, a larger tolerance, or another solver"
         try:
-            with warnings.catch_warnings():  # the contact law shows the accuracy
+            with warnings.catch_warnings():  # loads are checked in the contact law later
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
                 program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
@@ -208,7 +208,7 @@ class LiftedModel:
         return cls(settings, normal, boxes, program, D0, p, link, total)
 
     def invert(self, raw: Any) -> ProgramAnswer:
-        """The loads and the approach, read from the variables of the program."""
+        """The loads, from the variable p, and the approach, from D0 or the multiplier."""
         return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     def solve(self, approach: float | None = None) -> Solution:
@@ -217,7 +217,9 @@ class LiftedModel:
         approach : a new approach in scaled units, at most `normal.approach_bound`; default:
             unchanged
 
-        Raises InputError for other approaches; SolverError and TooDenseError if a check fails.
+        Raises InputError for an approach above this limit, or if the load is prescribed;
+        SolverError if the solver or a check fails; TooDenseError if the box is too small for the
+        loads.
         """
         normal = self.normal
         if approach is not None:

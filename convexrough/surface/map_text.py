@@ -1,6 +1,7 @@
 """Maps in text files: a matrix of heights, or columns x, y and height.
 
-Comments above a matrix may state the width and height with a unit, and the unit of the values.
+Comments above a matrix may state the width and height of the map (its sizes along x and y) with a
+unit, and the unit of the values (the heights).
 """
 
 from __future__ import annotations
@@ -36,7 +37,10 @@ MOST_COLUMNS = 6
 
 
 def text_map(path: Path) -> HeightGrid:
-    """The map in a text file. A file with three columns is read as x, y and height.
+    """The map in a text file.
+
+    A file with three columns or with names of columns is read as x, y and height, any other as a
+    matrix.
 
     Raises FileError if the file is not text, and InputError with row and column if it contains no
     map.
@@ -64,7 +68,7 @@ def _unclear(comment: str) -> bool:
 
 
 def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
-    """The matrix of heights, with the pixel and the units that the comments state."""
+    """The matrix of heights, with the pixel size and the units that the comments state."""
     _refuse_gaps([row.number for row in table.rows])
     heights = matrix(path, table)
     for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
@@ -110,7 +114,7 @@ def _even(line: Array) -> bool:
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix `heights`, with the pixel and the units that the comments state."""
+    """The matrix `heights`, with the pixel size and the units that the comments state."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
         said[found[1].lower().rstrip("s")] = found[2]
@@ -132,7 +136,8 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes.
 
-    Other columns could be a mask or a factor. They are an error, except an index.
+    Other columns are an error, because they could be a mask or a factor of the heights. Exceptions
+    are those of `_is_label`.
     """
     names, number = cells.header.cells if cells.header else [], cells.style.number
     if names and all(number(name.replace(",", ".")) is not None for name in names):
@@ -159,7 +164,7 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
 
 
 def _is_label(name: str, cells: NDArray[Any]) -> bool:
-    """True for an index, and for the same text in every row, which cannot change heights."""
+    """True for a column that cannot change heights: an index, or the same text in every row."""
     count = len(np.unique(cells))
     if is_index(name):
         return count == len(cells)

@@ -31,7 +31,8 @@ class Origin(Record):
     prune      : least prominence of a hill, as a fraction of Sz
     fit        : number of pixels along a side of the square to which each paraboloid is fitted
     maxima     : number of pixels higher than their eight neighbours
-    pruned     : number of these maxima whose hills were merged into taller ones
+    pruned     : number of these maxima whose hills were merged into taller ones. After
+        `Summits.pruned`, maxima that were left out before for other reasons still count there
     at_edge    : number left out because they are too near to the edge of the map
     without_top : number left out because their paraboloid has no top in its square
 
@@ -85,7 +86,8 @@ class Summits(Table, Asperities, Plottable):
     positions, heights : [length] (n, 2) positions and (n,) heights of tops of fitted paraboloids
     tip_radii   : (n,) [length] 1 / sqrt(k1 k2), with the principal curvatures k1 and k2 of the
         paraboloid
-    prominences : (n,) [length] height of the maximum above the highest pass to a taller one
+    prominences : (n,) [length] height of the maximum above the highest saddle over which a
+        taller maximum can be reached; for the tallest one, above the lowest pixel
     largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2
     deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
     pixels      : (n, 2) row and column of the maximum
@@ -188,10 +190,10 @@ class Summits(Table, Asperities, Plottable):
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about n maxima, without the others.
+    """Paraboloids fitted about those n of the given maxima for which `whole` is True.
 
-    whole      : True for each maximum whose paraboloid curves downwards in every direction and has
-        its top within the fitted pixels; the n maxima are these
+    whole      : for each of the given maxima, True if its paraboloid curves downwards in every
+        direction and has its top within the fitted pixels; all other fields are about these n only
     offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first
@@ -213,7 +215,7 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so terms are about 1
     terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
     around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
     fitted = np.linalg.pinv(terms) @ around.T

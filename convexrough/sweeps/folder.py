@@ -1,4 +1,4 @@
-"""The folder of a sweep: a manifest that never changes, and parts.
+"""The folder of a sweep: a manifest and parts, which are replaced only together.
 
 The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
 named by its first scene. All parts except the last have the same number of rows, which the manifest
@@ -23,7 +23,8 @@ from convexrough.sweeps.batch import Columns, different
 
 MANIFEST, PARTS = SWEEP_MANIFEST, SWEEP_PARTS
 
-#: What to do, in messages: the arguments in Python, and the options of the command.
+#: What a user can do, in messages: an argument in Python, and the option of the command in
+#: brackets.
 RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
 
 
@@ -88,7 +89,8 @@ class Folder:
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
         """The parts of `wanted` that are still to be computed, and a message on what was found.
 
-        Damaged parts are removed. Raises FileError if parts exist and `resume` is false.
+        Damaged parts and unfinished files of these parts are removed. Raises FileError if some of
+        `wanted` exist and `resume` is false.
         """
         known = {part.start for part in self.parts()}
         there = [part for part in wanted if part.start in known]
@@ -139,9 +141,9 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     overwrite : remove an earlier sweep in the folder, and files written by `sweep --summary`; other
         files stay
 
-    Raises FileError if the folder contains another sweep, a sweep begun with other versions of
-    packages, or files but no sweep, or if it cannot be written; ExtraError if pyarrow is not
-    installed.
+    Raises FileError if the folder cannot be written, or contains files but no manifest; without
+    `overwrite`, also if it contains another sweep, or one begun with other versions of packages.
+    Raises ExtraError if pyarrow is not installed.
     """
     arrow()
     with file_errors(path, "hold results"):

@@ -54,7 +54,8 @@ def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = Non
 
     measure : names of numbers to measure in place of those in the file
 
-    Raises FileError if the file cannot be read or is not TOML; SceneFileError with every mistake.
+    Raises FileError if the file cannot be read or is not TOML; SceneFileError, which lists every
+    mistake; and as `plan_of`.
     """
     path = Path(path)
     text = read_text(path)
@@ -68,7 +69,8 @@ def plan_of(
 
     path : the sweep file, for messages; paths in the tables are relative to its folder
 
-    Raises SceneFileError with every mistake.
+    Raises SceneFileError, which lists every mistake; InputError for an unknown measure; and the
+    error of the last scene tried if the first `TRIED` scenes fail.
     """
     tables = {name: table for name, table in contents.items() if name != "sweep"}
     table = contents.get("sweep")
@@ -215,9 +217,11 @@ def _planned(
     manifest = {
         "schema": 2,
         "version": __version__,
-        "sweep": hashlib.sha256(text.encode()).hexdigest(),  # of all that numbers depend on
+        "sweep": hashlib.sha256(
+            text.encode()
+        ).hexdigest(),  # hash of all input on which the numbers depend
         "scenes": source.count,
-        "each": grid.each if grid else 1,  # scenes that differ only in the seed
+        "each": grid.each if grid else 1,  # number of scenes that differ only in the seed
         "batch": max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few)),
         "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
         "drawn": [*grid.draw] if grid else [],
@@ -231,7 +235,7 @@ def _planned(
 
 
 def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables with loads that do not follow a swept load or approach of [normal]."""
+    """The measured tables that state loads of their own, although [normal] is swept."""
     if not {"normal.load", "normal.approach"} & {*swept}:
         return []
     own = [name for name, stage in stages.items() if name in used and stage.highest_load]

@@ -97,7 +97,7 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
 def places_of(
     wanted: Sequence[str], names: Sequence[str], how: Reading, found: str
 ) -> tuple[dict[str, int], list[str]]:
-    """The number of the column of each wanted name that the file has, and mistakes.
+    """The number of the column of each wanted name that the file has, from 0; and mistakes.
 
     names : the headers of the file;  found : what messages say about them
     """
@@ -109,7 +109,7 @@ def places_of(
         called = how.columns.get(name)
         if called is None:
             alike = [i for i, each in enumerate(lowered) if each in (name, *COLUMNS[name].also)]
-        else:  # the header as it is, else without its unit, else in any case
+        else:  # the header as it is, without its unit, in lower case
             ways = ((names, called), (bared, called), (lowered, called.lower()))
             ranks = ([i for i, each in enumerate(known) if each == it] for known, it in ways)
             alike = next(filter(None, ranks), [])
@@ -135,7 +135,7 @@ def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
 
     for name, each in product(unread, missing):
         alike = SequenceMatcher(None, name.lower(), each).ratio()
-        if LOOKS_LIKE < alike < 1:  # 1: `Reading.columns` names another column instead
+        if LOOKS_LIKE < alike < 1:  # 1: assigned otherwise by `Reading.columns`
             yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
 
 

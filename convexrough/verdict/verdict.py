@@ -1,8 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-If the loads are too inaccurate to prove every status, Newton's method starts from them and finds a
-solution, and the certificate of that solution shows which loads are wrong. `friction.verdict`
-does the same for shear forces.
+If the certificate of the loads does not prove the whole claim, Newton's method looks for a
+solution, first from these loads, then from its default start. The certificate of that solution
+shows which loads are wrong. `friction.verdict` does the same for shear forces.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: Hints call loads "noise" if they are at most this fraction of the largest load.
+#: A hint proposes --floor if all loads on asperities proved open are at most this fraction of the
+#: largest load.
 NOISE = 1e-6
 
 
@@ -39,11 +40,12 @@ class Verdict(Claim, Table, Plottable):
     scene       : the scene of the loads
     loads       : (n,) [force] the given loads
     floor       : [force] a load up to this size counts as 0, and its asperity as open
-    within      : largest error allowed, as a fraction of the largest load
+    within      : largest error allowed, as a fraction of the largest load or, for a prescribed
+        total, of this total
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
-    solution    : the solution that Newton's method finds from the given loads, or else from its
-        own start, with its own certificate; None where it is not needed or not found
+    solution    : the solution, with its certificate, that Newton's method finds from the given
+        loads or, failing that, from its default start; None where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone, list(verdict.hints()), verdict.nearby()
@@ -136,7 +138,7 @@ def verify(
 ) -> Verdict:
     """The verdict on loads from any source: their contact set and their errors, as proved.
 
-    scene : the scene, whose asperities the loads are about
+    scene : the scene whose asperities carry the loads
     loads : (n,) [force] the loads in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
     within : largest error allowed: of a load, as a fraction of the largest load, and of a
