@@ -8,7 +8,8 @@ positive for all i on the support. The shells have the radii R_k = c~_k / (pi E*
 
 The weights are those for which some moments vanish and which, together with a charge -1 at i, have
 the least electrostatic energy. Let the complex number z_k be the vector from i to k, divided by the
-direction from the middle of the support to i. The moments are:
+outward direction: from the middle of the support to i or, in a second try, from the mean of the
+neighbours to i. The moments are:
 
 - if neighbours lie all around i: sum w_k z_k and sum w_k z_k^2. Then (7) of that page proves (6)
   for far asperities;
@@ -16,7 +17,8 @@ direction from the middle of the support to i. The moments are:
   sum w_k (|z_k|^2 - 3 Re(z_k)^2), the term of second order of the potential towards the middle;
 - if i is at a corner: the imaginary part of sum w_k z_k.
 
-For an asperity i outside the contact one neighbour alone suffices if the whole support is nearer to
+Where such weights fail, a linear program finds those with the least q_i, for few asperities. For an
+asperity i outside the contact one neighbour alone suffices if the whole support is nearer to
 this neighbour than to i, and the neighbour's shell does not reach i.
 """
 
@@ -31,7 +33,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
-from convexrough.arithmetic.balls import TINY
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
@@ -56,12 +57,14 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 # All numbers here are heuristics.
 
-#: Numbers of neighbours and moments of the weights that are tried, until the bound 1 - q_i
-#: suffices. A try also uses the asperities that determined q_i in earlier tries. Tries with more
-#: than MORE neighbours are made only if at most FEW asperities remain.
-TRIES: tuple[tuple[int, Moments], ...] = (
-    (12, around), (10, edge), (14, corner), (32, around), (32, edge),
-    *3 * ((60, around), (60, edge)),
+#: Numbers of neighbours, moments of the weights (None for the linear program), and whether the mean
+#: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
+#: also uses the asperities that determined q_i in earlier tries. Tries with more than MORE
+#: neighbours are made only if at most FEW asperities remain.
+TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
+    (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
+    (32, around, False), (32, edge, False), (32, edge, True),
+    (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
 )  # fmt: skip
 MORE, FEW = 32, 300
 
@@ -75,6 +78,9 @@ NEAR = 9
 #: Largest number of systems that are solved for weights; each leaves out the neighbours whose
 #: weights were negative in an earlier one.
 SEARCHES = 15
+
+#: The linear program considers about twice as many asperities as this.
+SAMPLE = 300
 
 #: DIRECTIONS: number of directions in which the extent of the support is computed. ROWS: number of
 #: asperities that are treated together. NUMBERS: about the number of float64 numbers in an array.
@@ -100,14 +106,17 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
     for group in (support, others):
         left = group[~(rates[group] > least[group])]
         worst = np.empty((len(left), 0), dtype=np.intp)
-        for count, moments in TRIES:
+        for count, moments, by_near in TRIES:
             if len(left) == 0 or (count > MORE and len(left) > FEW):
                 break
             failed = np.empty(len(left), dtype=np.intp)
             for some in threads.chunks(len(left), ROWS):
                 which = left[some]
                 near = np.column_stack((swept.neighbours(which, count), worst[some]))
-                weights = swept.weights(which, near, moments)
+                if moments is None:
+                    weights = swept.lightest(which, near)
+                else:
+                    weights = swept.weights(which, near, moments, by_near)
                 rates[which], failed[some] = swept.rates(which, near, weights, least[which])
             todo = ~(rates[left] > least[left])
             left, worst = left[todo], np.column_stack((worst, failed))[todo]
@@ -190,18 +199,23 @@ class _Swept:
         found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
-    def weights(self, which: Indices, near: Indices, moments: Moments) -> Array:
-        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
-        cost = (near.shape[1] + 5) ** 2
-        return _in_parts(partial(self._weights, moments), cost, which, near)
+    def weights(self, which: Indices, near: Indices, moments: Moments, by_near: bool) -> Array:
+        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found.
 
-    def _weights(self, moments: Moments, which: Indices, near: Indices) -> Array:
+        by_near : True if outward is the direction from the mean of the neighbours
+        """
+        cost = (near.shape[1] + 5) ** 2
+        return _in_parts(partial(self._weights, moments, by_near), cost, which, near)
+
+    def _weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
         (m, s), here = near.shape, self.places[which]
-        outwards = np.where(here == self.middle, 1.0, here - self.middle)
+        middle = self.places[near].mean(axis=1) if by_near else self.middle
+        outwards = np.where(here == middle, 1.0, here - middle)
         away = (self.places[near] - here[:, None]) / (outwards / np.abs(outwards))[:, None]
         least = np.abs(away).min(axis=1)[:, None]
         sums = np.stack([np.ones((m, s)), *moments(away / least)], axis=1)
-        sums /= np.maximum(np.abs(sums).max(axis=2, keepdims=True), TINY)
+        size = np.abs(sums).max(axis=2, keepdims=True)
+        sums = np.where(size > 1e-9, sums, 0.0) / np.maximum(size, 1e-9)  # less is rounding
         rows = sums.shape[1]
         coupled = self.potentials(near[:, :, None], near[:, None, :]) * least[:, :, None]
         target = np.zeros((m, s + rows))
@@ -229,6 +243,22 @@ class _Swept:
                 break
         off = np.abs((sums @ weights[:, :, None])[:, :, 0] - target[:, s:]).max(axis=1)
         weights[off > 1e-9] = 0.0
+        return weights
+
+    def lightest(self, which: Indices, near: Indices) -> Array:
+        """(m, s) weights of the neighbours `near` with the least q_i at a sample of asperities."""
+        from scipy.optimize import linprog
+
+        weights = np.zeros(near.shape)
+        sample = self.support[:: -(-len(self.support) // SAMPLE)]
+        closest = self.neighbours(which, SAMPLE)
+        for k, i in enumerate(which):
+            seen = np.setdiff1d(np.concatenate((near[k], closest[k], sample)), [i])
+            apart = np.abs(self.places[seen] - self.places[i])
+            ratios = self.potentials(near[k][:, None], seen) * apart
+            found = linprog(np.ones(len(near[k])), -ratios.T, -np.ones(len(seen)))
+            if found.status == 0:
+                weights[k] = found.x
         return weights
 
     def rates(
