@@ -162,11 +162,12 @@ class NearPairs:
 
     def in_parts(self, size: int) -> Iterator[tuple[slice, Indices]]:
         """Slices of about `size` entries of `upper` in whole rows, with the row of each entry."""
-        edges, n = self.upper.indptr, self.upper.shape[0]
-        for rows in threads.chunks(n, max(1, size * n // max(self.upper.nnz, 1))):
-            counts = np.diff(edges[rows.start : rows.stop + 1])
-            here = np.repeat(np.arange(rows.start, rows.stop), counts)
-            yield slice(int(edges[rows.start]), int(edges[rows.stop])), here
+        edges, start = self.upper.indptr, 0
+        while start < self.upper.shape[0]:
+            stop = max(start + 1, int(np.searchsorted(edges, edges[start] + size, "right")) - 1)
+            here = np.repeat(np.arange(start, stop), np.diff(edges[start : stop + 1]))
+            yield slice(int(edges[start]), int(edges[stop])), here
+            start = stop
 
 
 @dataclass(frozen=True, eq=False)

@@ -166,13 +166,10 @@ class ScatteredInfluence:
         """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
         if (power, dtype) not in self._products:
             tolerance = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
-            splitting = Splitting.choose(
-                self.points, power, tolerance if power == 1 else FALLOFF_TOLERANCE
-            )
-            self._products[power, dtype] = None
-            if splitting is not None:
-                found = Product.assemble(self.points, splitting, dtype, self.tails)
-                self._products[power, dtype] = found
+            tolerance = tolerance if power == 1 else FALLOFF_TOLERANCE
+            splitting = Splitting.choose(self.points, power, tolerance)
+            found = splitting and Product.assemble(self.points, splitting, dtype, self.tails)
+            self._products[power, dtype] = found or None
         return self._products[power, dtype]
 
     @property

@@ -349,7 +349,7 @@ class NormalProblem:
         """
         if not self.by_load:
             return self.highest
-        given = self.coefficients, self.offsets - self.offset_errors, self.load
+        given = self.coefficients, self.offsets - self.offset_errors, self.control.upper
         return np.minimum(self.highest, approach_bound(weights, displacement.upper, *given))
 
     def to_scene(self, values: NDArray[Any]) -> Array:

@@ -25,6 +25,9 @@ class Stack(NormalProblem):
 
     coupled : slices of the rows, each with a problem whose compliance operator is that of these
         rows. Scene and units are those of the first problem
+
+    Only what `refine`, `proved` and `levels` use is meant for stacks: not `restricted`, `widened`,
+    `approach_bound`, `places`, `to_scene` and `assemble`.
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]

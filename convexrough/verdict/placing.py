@@ -269,7 +269,7 @@ class Placing:
     def _apart(self) -> Array:
         """(n,) [length] the distance of each asperity from its neighbour, if it has any."""
         if len(self.scene) == 1:
-            return np.array([self.scene.sphere_radius])
+            return np.array([np.min(self.scene.sphere_radius)])
         return nearest_distances(self.scene.asperities.positions)
 
     @cached_property
