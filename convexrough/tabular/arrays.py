@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,9 @@ from numpy.typing import NDArray
 from convexrough.errors import ConvexroughError, FileError
 
 Columns = dict[str, list[Any]]
+
+#: Names of arrays beside the columns that can change what the numbers in the columns mean.
+FACTORS = re.compile("scale|factor|multipl|gain|offset", re.I)
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
@@ -86,13 +90,16 @@ def named_arrays(path: Path) -> dict[str, Any]:
         return arrays
 
 
-def read_arrays(path: Path, known: Sequence[str]) -> Columns:
-    """Columns of a file by name; columns without names are numbered from "1".
+def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[str, str]]]:
+    """Columns of a file by name, and the places and texts of arrays that state units.
+
+    Columns without names are numbered from "1".
 
     known : names to read, in lower case; other columns are kept only if they have the same length.
         If no column has one of these names, all columns are read
 
-    Raises FileError if the package for such files is missing or no columns are found; OSError; and
+    Raises FileError if the package for such files is missing, if no columns are found, or if the
+    file has a factor or an offset besides; OSError; and
     ValueError, or another error of corrupted files, if the file is corrupted or lengths differ.
     """
     named = named_arrays(path) or {"": np.zeros(0)}
@@ -110,7 +117,15 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     lengths = {len(columns[name]) for name in wanted}
     if len(lengths) > 1:
         raise ValueError(f"arrays of lengths {sorted(lengths)}")
-    return {name: values for name, values in columns.items() if len(values) in lengths}
+    kept = {name: values for name, values in columns.items() if len(values) in lengths}
+    said = list[tuple[str, str]]()
+    for name in (name for name in named if name not in kept):
+        values = np.ravel(np.asarray(named[name])).tolist()
+        if FACTORS.search(name) and values not in ([0], [1]):
+            raise FileError(f"{path}: found {name}, expected columns that need no factor or offset")
+        if "unit" in name.lower():
+            said.append((f"array {name}", f"{name}: {', '.join(map(str, values[:20]))}"))
+    return kept, said
 
 
 def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:

@@ -79,6 +79,7 @@ class _Source(NamedTuple):
     """Cells of a file by column. Without a header, columns are named by numbers from 1.
 
     lines : text of each row, "" in files of arrays;  mistakes : messages on rows that are left out
+    said  : places and texts, besides the header, that may name units
     """
 
     header: list[str] | None
@@ -87,7 +88,7 @@ class _Source(NamedTuple):
     lines: list[str]
     style: Style
     mistakes: Sequence[str] = ()
-    comments: Sequence[str] = ()
+    said: Sequence[tuple[str, str]] = ()
 
 
 def read_table(
@@ -140,6 +141,7 @@ def read_table(
     pixels = instead and {"x", "y"} <= places.keys()
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
+        + ("" if source.header or how.scalable else ": add a first row with names")
         + (f"; --column {each}={other} names another" if how.scalable else "")
         + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
         for each in missing
@@ -155,7 +157,7 @@ def read_table(
     units = {name: found for name, place in places.items() if (found := unit(names[place]))}
     factors, wrong = factors_of([name for name in places if COLUMNS[name].kind], units, how)
     rest = [i for i in range(len(names)) if i not in (index, *places.values())]
-    texts = [("comments", text) for text in (source.comments if table is None else ())]
+    texts = [*(source.said if table is None else ())]
     for i in (i for i in rest if "unit" in names[i].lower()):
         said = dict.fromkeys(map(str, source.columns[i]))
         texts += [(f"column {names[i]}", each) for each in said]
@@ -233,10 +235,10 @@ def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
 def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
     if path.suffix.lower() not in ARRAYS:
         return _text_source(read_text_table(path, known, required=sheet))
-    arrays = read_arrays(path, known)
+    arrays, said = read_arrays(path, known)
     count = len(next(iter(arrays.values()), []))
     rows, header = [f"entry {i}" for i in range(count)], None if "1" in arrays else list(arrays)
-    return _Source(header, list(arrays.values()), rows, [""] * count, Style("", ""))
+    return _Source(header, list(arrays.values()), rows, [""] * count, Style("", ""), said=said)
 
 
 def _text_source(table: TextTable) -> _Source:
@@ -261,7 +263,7 @@ def _text_source(table: TextTable) -> _Source:
         [row.text for row in whole],
         style if width > 1 or style.decimal == "," else style._replace(separator=""),
         mistakes,
-        table.comments,
+        [("comments", text) for text in table.comments],
     )
 
 

@@ -59,12 +59,13 @@ _ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
-#: A unit of length or force in a sentence. Short names count only after a digit, a mark or "in", as
-#: "um" is also a German word.
+#: A unit of length or force in a sentence. Short names count only after a digit, a mark, "in" or
+#: "unit", as "um" is also a German word.
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
     r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
-    r"|(?:[\d(\[,:=]|\b[Ii]n)\s*((?i:um)|[mN])(?![\w/]|\s*=)|(纳米|微米|毫米)"
+    r"|(?:[\d(\[,;:=\t]|\b(?i:in|units?|einheit(?:en)?)\b)[\s;:=]*((?i:um)|[mN])(?![\w/]|\s*=)"
+    r"|(纳米|微米|毫米)"
 )
 
 

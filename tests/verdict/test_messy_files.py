@@ -267,6 +267,17 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a unit in a comment": (
         lambda case: "# loads in mN\n" + lines(case.table()), "",
         "comments: found '# loads in mN', expected units in the header, as NAME [mN], or no "),
+    **{f"units above the header, {above!r}": (
+        lambda case, above=above: f"{above}\n" + lines(case.table()).replace(",", ";"), "",
+        f"comments: found {above.expandtabs(1)!r}, expected units in the header")
+       for above in ("# units mm, N", "Unit;um", "Einheit\tum", "Unit um", "um;um;um", "7;Unit;um")
+    },
+    "a unit as an array": (
+        lambda case: case.table() | {"unit": np.array("kN")}, "a.npz",
+        "array unit: found 'unit: kN', expected units in the header, as NAME [kN], or no such a"),
+    "a factor as an array": (
+        lambda case: case.table() | {"scale": np.array(1e-3)}, "a.npz",
+        "found scale, expected columns that need no factor or offset"),
     "a unit in a column": (
         lambda case: "".join(f"{line},{'unit' if k == 0 else 'kN'}\n"
                              for k, line in enumerate(lines(case.table()).splitlines())), "",

@@ -314,7 +314,10 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
         ),
         ("x,y\n0,0\n", "tip radii: found neither"),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
-        ("0,0\n1,1\n", "found no header and 2 columns, expected a column 'x'"),
+        (
+            "0,0\n1,1\n",
+            "found no header and 2 columns, expected a column 'x': add a first row with",
+        ),
     ],
 )
 def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
