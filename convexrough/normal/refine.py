@@ -36,7 +36,7 @@ ENOUGH = 0.1
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
 
-#: Loads whose sum misses the total by less than this part are not scaled, which saves time.
+#: Loads to be refined that miss the total by less than this part are not scaled, to save time.
 FITS = 1e-6
 
 #: Number of loads up to which `math.fsum`, which rounds once, is fastest.
@@ -143,15 +143,22 @@ def refined(problem: NormalProblem, best: Trial) -> Trial:
 
 def refined_loads(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
-    return refined(problem, trial_of(problem, loads, product))
+    return refined(problem, trial_of(problem, loads, product, roughly=True))
 
 
-def trial_of(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
+def trial_of(
+    problem: NormalProblem,
+    loads: Array,
+    product: Product | None = None,
+    *,
+    roughly: bool = False,
+) -> Trial:
     """The trial of loads (n,) >= 0, which are changed to have the prescribed total.
 
     product : function that returns A P for loads P; default `problem.product`
+    roughly : as in `completed`
     """
-    pair, missing = completed(problem, Pair.exact(loads))
+    pair, missing = completed(problem, Pair.exact(loads), roughly=roughly)
     return trial(problem, pair, missing, (product or problem.product)(pair))
 
 
@@ -174,22 +181,27 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
     grown = loads.high * (x * (1.0 + x + root + 1.0) / (1.0 + root))  # P ((1 + x)^(3/2) - 1)
     following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
     loaded = near | (ends > 0)
-    following, missing = completed(problem, Pair(*(part * loaded for part in following)))
+    following, missing = completed(
+        problem, Pair(*(part * loaded for part in following)), roughly=True
+    )
     product = problem.moved(loads, state.product, following)
     return trial(problem, following, missing, product)
 
 
-def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
-    """The loads, changed to have the prescribed total, and a ball of the remaining difference.
+def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
+    """The loads, scaled to the prescribed total, and a ball of the remaining difference.
 
-    Loads that miss the total by a small part are not scaled; the largest load takes up the rest.
+    The largest load takes up the rounding errors of the other loads.
+
+    roughly : True not to scale loads that miss the total by a small part: the largest takes up all
     """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.control
     completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
-    if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
+    missed = np.abs(summed(loads.high) - problem.load)
+    if not roughly or (missed > FITS * problem.load).any():
         power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         completed = loads * (problem.control.mid / sums(loads))
