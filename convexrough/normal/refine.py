@@ -168,6 +168,13 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
 
     enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
     """
+    following, missing = completed(problem, _stepped(problem, state, enough, todo), roughly=True)
+    product = problem.moved(state.loads, state.product, following)
+    return trial(problem, following, missing, product)
+
+
+def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
+    """The loads after the step, not yet changed to have the prescribed total."""
     loads, inside, defect = state.loads, state.inside, state.defect
     own = np.where(inside, state.local, np.minimum(-state.gap.value, 0.0))
     slopes = np.divide(1.5 * loads.high, own, out=np.zeros(own.shape), where=inside)
@@ -181,11 +188,7 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
     grown = loads.high * (x * (1.0 + x + root + 1.0) / (1.0 + root))  # P ((1 + x)^(3/2) - 1)
     following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
     loaded = near | (ends > 0)
-    following, missing = completed(
-        problem, Pair(*(part * loaded for part in following)), roughly=True
-    )
-    product = problem.moved(loads, state.product, following)
-    return trial(problem, following, missing, product)
+    return Pair(*(part * loaded for part in following))
 
 
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
