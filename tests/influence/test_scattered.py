@@ -1,6 +1,7 @@
 """The coupling on a mesh: the sum over pairs, bounds on the error."""
 
 import numpy as np
+import pytest
 from extended import inverse_sums
 from point_layouts import jittered
 
@@ -63,3 +64,17 @@ def test_presses_of_points_in_distant_clusters() -> None:
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
         scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
+
+
+def test_an_interrupted_mesh_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the operator would fall back to a matrix, which may not fit in memory."""
+    operator = ScatteredInfluence(jittered(np.random.default_rng(2)), SCALE)
+    with monkeypatch.context() as patch:
+        patch.setattr(Product, "assemble", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            operator.apply(np.ones(len(operator)))
+    assert operator._double is not None
+
+
+def interrupted(*_: object) -> None:
+    raise KeyboardInterrupt
