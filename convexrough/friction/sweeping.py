@@ -257,8 +257,8 @@ class _Swept:
             apart = np.abs(self.places[seen] - self.places[i])
             ratios = self.potentials(near[k][:, None], seen) * apart
             found = linprog(np.ones(len(near[k])), -ratios.T, -np.ones(len(seen)))
-            if found.status == 0:
-                weights[k] = found.x
+            if found.status == 0 and found.x is not None:
+                weights[k] = np.maximum(found.x, 0.0)  # solvers return some below 0
         return weights
 
     def rates(

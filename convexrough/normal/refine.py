@@ -36,7 +36,8 @@ ENOUGH = 0.1
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
 
-#: Loads to be refined that miss the total by less than this part are not scaled, to save time.
+#: Loads to be refined that miss the total by less than this part of the largest load are not
+#: scaled, to save time.
 FITS = 1e-6
 
 #: Number of loads up to which `math.fsum`, which rounds once, is fastest.
@@ -196,7 +197,8 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
 
     The largest load takes up the rounding errors of the other loads.
 
-    roughly : True not to scale loads that miss the total by a small part: the largest takes up all
+    roughly : True not to scale loads if they miss the total by a small part of the largest load,
+        which then takes up all
     """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
@@ -204,7 +206,7 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
         return loads, problem.control
     completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
     missed = np.abs(summed(loads.high) - problem.load)
-    if not roughly or (missed > FITS * problem.load).any():
+    if not roughly or (missed > FITS * largest(loads.high)).any():
         power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         completed = loads * (problem.control.mid / sums(loads))

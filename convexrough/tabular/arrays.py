@@ -19,7 +19,7 @@ from convexrough.errors import ConvexroughError, FileError
 Columns = dict[str, list[Any]]
 
 #: Names of arrays beside the columns that can change what the numbers in the columns mean.
-FACTORS = re.compile("scale|factor|multipl|gain|offset", re.I)
+FACTORS = re.compile(r"(?<![a-z])(scales?|factors?|multipliers?|gain|offsets?)(?![a-z])", re.I)
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
@@ -119,13 +119,24 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[s
         raise ValueError(f"arrays of lengths {sorted(lengths)}")
     kept = {name: values for name, values in columns.items() if len(values) in lengths}
     said = list[tuple[str, str]]()
-    for name in (name for name in named if name not in kept):
-        values = np.ravel(np.asarray(named[name])).tolist()
-        if FACTORS.search(name) and values not in ([0], [1]):
+    for name, value in named.items() if len(named) > 1 else ():
+        neutral = 0 if "offset" in name.lower() else 1
+        if FACTORS.search(name) and any(part != neutral for part in _parts(value)):
             raise FileError(f"{path}: found {name}, expected columns that need no factor or offset")
-        if "unit" in name.lower():
-            said.append((f"array {name}", f"{name}: {', '.join(map(str, values[:20]))}"))
+        if "unit" in name.lower() and name not in kept:
+            said.append((f"array {name}", f"{name}: {', '.join(map(str, _parts(value)))}"))
     return kept, said
+
+
+def _parts(value: Any) -> list[Any]:
+    """The numbers and texts in an array, or in a structure or cell array of MATLAB."""
+    if isinstance(value, dict):
+        value = [*value.values()]
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [each for part in value for each in _parts(part)]
+    return [value.decode("utf-8", "replace") if isinstance(value, bytes) else value]
 
 
 def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:

@@ -64,7 +64,8 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
     r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
-    r"|(?:[\d(\[,;:=\t]|\b(?i:in|units?|einheit(?:en)?)\b)[\s;:=]*((?i:um)|[mN])(?![\w/]|\s*=)"
+    r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
+    r"((?i:um)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"
 )
 
@@ -78,7 +79,10 @@ _WITH_UNIT = re.compile(
 
 
 def in_text(text: str) -> list[str]:
-    """The units of length and force that a sentence seems to name."""
+    """The units of length and force that a sentence, or a row of units alone, seems to name."""
+    cells = re.split(r"\s*[;,\t]\s*", text.strip(" #%"))
+    if len(cells) > 1 and all(each and parsed(each) for each in cells):
+        return cells
     return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
 
 

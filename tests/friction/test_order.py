@@ -127,6 +127,19 @@ def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
         assert (y >= bounds).all()
 
 
+def test_weights_of_the_linear_program_are_not_negative() -> None:
+    """Shells of very different sizes, for which the solver returns some weights below 0."""
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        influence = DenseInfluence.assemble(random.random((60, 2)), 1.0)
+        c = influence.separations() * 10.0 ** random.uniform(-6, -0.5, 60)
+        support = np.arange(60)
+        swept = sweeping._Swept(influence, support, c)
+        weights = swept.lightest(support, swept.neighbours(support, 40))
+        assert (weights >= 0).all()
+        assert weights.any()
+
+
 @pytest.mark.parametrize(
     ("first", "second", "approach"),
     [((1, 0), (0, 2), 4.5e-4), ((1, 0), (0, 3), 4.5e-4), ((1, 0), (0.3, 1.4), 4.5e-4),
