@@ -16,8 +16,8 @@ from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
 
 #: Error of one pass of a transform in roundoffs, relative to the 2-norm, by the radix of the pass:
-#: docs/theory/operators-lattice.md, "Rounding". Radices 4 and 8 are
-#: counted as two and three passes of radix 2, which have a larger error.
+#: docs/theory/operators-lattice.md, "Rounding". Radices 4 and 8 are counted as two and three
+#: passes of radix 2, which have a larger error.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed in groups with this many bytes in each row, which fit in the cache.

@@ -164,7 +164,8 @@ class NearPairs:
         """Slices of about `size` entries of `upper` in whole rows, with the row of each entry."""
         edges, start = self.upper.indptr, 0
         while start < self.upper.shape[0]:
-            stop = max(start + 1, int(np.searchsorted(edges, edges[start] + size, "right")) - 1)
+            end = int(np.searchsorted(edges, int(edges[start]) + size, "right")) - 1
+            stop = max(start + 1, end)
             here = np.repeat(np.arange(start, stop), np.diff(edges[start : stop + 1]))
             yield slice(int(edges[start]), int(edges[stop])), here
             start = stop

@@ -64,7 +64,7 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
     r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
-    r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
+    r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
     r"((?i:um)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"
 )
