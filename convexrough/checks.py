@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.arrays import Array, even
+from convexrough.arrays import Array, even, evenly
 from convexrough.errors import InputError
 
 #: Smallest and largest absolute value of a number in a scene's units, so that products of such
@@ -73,14 +73,18 @@ def whole(what: str, value: int, least: int = 1) -> int:
 
 
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
-    """A float64 copy, of any shape; raises InputError unless all values are real numbers."""
+    """A float64 copy, of any shape; raises InputError unless all values are real numbers.
+
+    The copy of an array that stores only one number (`arrays.even`) does so, too.
+    """
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
         found = f"{values.mask.sum()} masked values"
         raise InputError(what, found=found, expected=f"{expected} without gaps")
     try:
-        if np.asarray(values).dtype.kind not in "biufO":
+        given = np.asarray(values)
+        if given.dtype.kind not in "biufO":
             raise TypeError("no real numbers")
-        return np.array(values, dtype=np.float64)
+        return evenly(lambda some: np.array(some, dtype=np.float64), given)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(what, found=_short(values), expected=expected) from error
 

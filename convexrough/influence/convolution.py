@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -23,8 +23,9 @@ PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 #: Columns are transformed in groups with this many bytes in each row, which fit in the cache.
 ROW = 512
 
-#: Rows of a kernel are computed in groups of about this many numbers, which fit in the cache.
-LAID_OUT = 2**17
+#: Rows of a kernel are computed in groups of about LAID_OUT numbers, and rows of a field are
+#: transformed in groups of about IN_ROWS numbers, which fit in the cache.
+LAID_OUT, IN_ROWS = 2**17, 2**16
 
 
 #: A function of i, j and squares: i are differences of the row numbers of two sites, j those of
@@ -76,6 +77,11 @@ class SiteBox:
         return first, second
 
     @property
+    def stride(self) -> int:
+        """The number of columns of a field that has room for its transform."""
+        return 2 * (self.padded[1] // 2 + 1)
+
+    @property
     def workers(self) -> int:
         return threads.worthwhile(self.padded[0] * self.padded[1])
 
@@ -95,7 +101,7 @@ class SiteBox:
 
         return self.kernels(values, dtype)[0]
 
-    def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
+    def pulls(self, over_cube: Callable[[Array], Array], dtype: Any = np.float64) -> list[Kernel]:
         """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two occupied sites.
 
         over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
@@ -107,7 +113,7 @@ class SiteBox:
             x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
             return [weights * x, weights * y]
 
-        return self.kernels(values, np.float64, odd=True)
+        return self.kernels(values, dtype, odd=True)
 
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
         """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
@@ -199,26 +205,22 @@ class SiteBox:
         return x
 
     def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
-        """The field (rows, padded columns) with values (n,) at some sites, and zeros elsewhere.
+        """The field (rows, stride) with values (n,) at some sites, and zeros elsewhere.
 
         places : (n,) flat indices of these sites in the field
         """
-        field = np.zeros((self.shape[0], self.padded[1]), dtype=values.dtype)
+        field = np.zeros((self.shape[0], self.stride), dtype=values.dtype)
         field.ravel()[places] = values  # where points coincide, the last value remains
         return field
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field (rows, columns) with a kernel.
-
-        The field may have extra columns of zeros up to the padded width, which saves a copy. These
-        columns of the result have no meaning.
-        """
+        """The convolution of a field with a kernel; see `through_waves`."""
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             waves[0] *= spectrum[:, each]
             return waves
 
-        return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
+        return through_waves([field], self.padded, self.workers, multiply)[0]
 
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
@@ -247,12 +249,26 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one
+    The results are (rows, stride) fields with the stride of `SiteBox.stride`; columns beyond those
+    of a given field have no meaning.
+
+    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one.
+        A field of the shape (rows, stride) is overwritten by its result, which saves memory
     """
     from scipy import fft
 
     height, width = padded
-    halves = [fft.rfft(field, width, axis=1, workers=workers) for field in fields]
+    stride = 2 * (width // 2 + 1)
+    rooms, halves = list[NDArray[Any]](), list[NDArray[Any]]()
+    for field in fields:
+        room = field
+        if field.shape[1] != stride:
+            room = np.zeros((len(field), stride), dtype=field.dtype)
+            room[:, : field.shape[1]] = field
+        half = room.view(np.result_type(room, np.complex64))  # the transform of each row, in place
+        _row_by_row(partial(fft.rfft, axis=1), room[:, :width], half, workers)
+        rooms.append(room)
+        halves.append(half)
     rows = len(halves[0])
 
     def work(each: slice) -> None:
@@ -261,11 +277,23 @@ def through_waves(
             half[:, each] = fft.ifft(full, axis=0, overwrite_x=True)[:rows]
 
     threads.each(work, in_blocks(halves[0]), workers)
-    found: list[NDArray[Any]] = []
-    while halves:
-        half = halves.pop(0)
-        found.append(fft.irfft(half, width, axis=1, overwrite_x=True, workers=workers))
-    return found
+    for room, half in zip(rooms, halves, strict=True):
+        _row_by_row(partial(fft.irfft, n=width, axis=1), half, room[:, :width], workers)
+    return rooms
+
+
+def _row_by_row(
+    transform: Callable[[NDArray[Any]], NDArray[Any]],
+    given: NDArray[Any],
+    into: NDArray[Any],
+    workers: int,
+) -> None:
+    """Write the transforms of rows; the array `into` may use the memory of the array `given`."""
+
+    def work(some: slice) -> None:
+        into[some] = transform(given[some])
+
+    threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:

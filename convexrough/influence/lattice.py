@@ -92,14 +92,14 @@ class LatticeInfluence:
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) flat indices of the asperities' sites in an array of padded rows."""
+        """The box, and (n,) flat indices of the asperities' sites in a field of the box."""
         basis, (i, j) = self.lattice.basis / self.spacing, self.places
         if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
         i, j = i - i.min(), j - j.min()
         shape = int(i.max()) + 1, int(j.max()) + 1
         box = SiteBox(shape, basis, 2.0 * _farthest(i, j, shape, basis))
-        return box, i * np.intp(box.padded[1]) + j
+        return box, i * np.intp(box.stride) + j
 
     def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
         """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
@@ -114,7 +114,7 @@ class LatticeInfluence:
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = self._keep("boxed", (reach, box, i * np.intp(box.padded[1]) + j))
+            last = self._keep("boxed", (reach, box, i * np.intp(box.stride) + j))
         return last[1:]
 
     @property
@@ -123,9 +123,10 @@ class LatticeInfluence:
         return self._boxed[0]
 
     @property
-    def cells(self) -> Indices:
-        """(2, n) row and column of each asperity in the box."""
-        return np.stack(np.divmod(self._boxed[1], self.box.padded[1]))
+    def cells(self) -> tuple[Indices, Indices]:
+        """(n,) row and (n,) column of each asperity in the box."""
+        rows, columns = np.divmod(self._boxed[1], self.box.stride)
+        return rows, columns
 
     @cached_property
     def spacing(self) -> float:
@@ -241,14 +242,17 @@ class LatticeInfluence:
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-        field = box.laid_out(loads, places)
-        each = [box.convolve(field, 1j * kernel.spectrum) for kernel in self._pulls(box)]
-        each = [found.ravel()[places] for found in each]
+
+        def sums(pull: Kernel) -> Array:
+            field = box.convolve(box.laid_out(loads, places), 1j * pull.spectrum)
+            return np.asarray(field.ravel()[places])
+
+        each = [sums(pull) for pull in self._pulls(box, np.float64)]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
-    def _pulls(self, box: SiteBox) -> list[Kernel]:
+    def _pulls(self, box: SiteBox, dtype: Any) -> list[Kernel]:
         """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: box.pulls(cubed))
+        return self._cached(("pulls", dtype), lambda: box.pulls(cubed, dtype))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -265,14 +269,14 @@ class LatticeInfluence:
         """
         if not self._filled:
             return crowding(self.points, radii)
-        (i, j), (rows, columns) = self.cells, self.box.shape
+        (rows, columns), stride, places = self.box.shape, self.box.stride, self._boxed[1]
         most, worst = 2.0 * float(radii.max()), 0.0
         for reach in range(1, max(rows, columns)):
             if most <= worst * self._at_least(0.8 * reach):
                 break
             width = columns + reach  # the ends of rows are never mistaken for neighbours
             field = np.full(rows * width, -np.inf)
-            field[i * width + j] = radii
+            field[places + places // stride * (width - stride)] = radii
             square = np.ndindex(reach + 1, 2 * reach + 1)
             for a, b in ((a, b - reach) for a, b in square if reach in (a, abs(b - reach))):
                 distance = self._at_least(float(np.hypot(*((a, b) @ self.box.basis))))
@@ -310,11 +314,13 @@ class LatticeInfluence:
 
         slices : number of parts of 10 to 18 bits into which loads and kernel are divided
             (docs/theory/operators-lattice.md, "Slices"); default 3, and 4 for more than `MANY`
-            sites, because friction takes differences of sums
+            sites, because friction takes differences of sums. If a number is given, deviations of
+            points from their sites are treated in single precision
         """
+        dtype = np.float64 if slices is None else np.float32
         slices = slices or SLICES + int(self.sites > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
-        off_sites = self._off_sites(np.asarray(loads.high), box, places)
+        off_sites = self._off_sites(np.asarray(loads.high), box, places, dtype)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
         return sliced.sums(loads, places) + off_sites
 
@@ -339,20 +345,23 @@ class LatticeInfluence:
         norm = self._kernel.norm * unit / self.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices, dtype: Any) -> Ball:
         """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
-        x, y, unknown = self.layout.cached(off_sites)
+        away: Any = off_sites if dtype == np.float64 else off_sites_in_single
+        x, y, unknown = self.layout.cached(away)
         shrunk = [float(factor) / self.spacing for factor in self.lattice.shrink]
         x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
-        most = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)
-        unknown = max(shrunk) * unknown + 4 * ROUNDOFF * most
+        most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-6)
+        unknown *= max(shrunk)
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
-        shares, pulls = loads / top, self._pulls(box)
+        roundoff, tiny = float(np.finfo(dtype).epsneg), float(np.finfo(dtype).tiny)
+        unknown += 8 * (roundoff * most + tiny)
+        shares, pulls = (loads / top).astype(dtype, copy=False), self._pulls(box, dtype)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
@@ -361,20 +370,23 @@ class LatticeInfluence:
 
         given = (box.laid_out(weight * shares, places) for weight in (1.0, x, y))
         fields = through_waves(given, box.padded, box.workers, pull)
-        change = fields[2].ravel()[places]
-        change -= x * fields[0].ravel()[places]
-        change -= y * fields[1].ravel()[places]
+        change = fields.pop().ravel()[places].astype(np.float64)
+        size = float(np.abs(change).max())
+        for each in (y, x):
+            part = each * fields.pop().ravel()[places]
+            size += float(np.abs(part).max())
+            change -= part
         # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
-        error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
+        error = 2.0 * box.bound(norm, operations=10) * most * (float(np.linalg.norm(loads)) / top)
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
-        error += 4 * ROUNDOFF * float(np.abs(change).max())
+        error += 4 * roundoff * size
         unit = top / self.spacing
         return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> Smoother:
-        return block_smoother(self.cells, self.box.basis, self._unit, root)
+        return block_smoother(np.stack(self.cells), self.box.basis, self._unit, root)
 
 
 def _largest_sum(values: Array, apart: int) -> float:
@@ -412,6 +424,12 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     most = float(np.abs(sites).max(initial=0))
     largest = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
     return away[0], away[1], 96 * ROUNDOFF**2 * largest
+
+
+def off_sites_in_single(layout: Layout) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """The same in single precision; the error bound does not include this rounding."""
+    x, y, unknown = off_sites(layout)
+    return x.astype(np.float32), y.astype(np.float32), unknown
 
 
 def _least_symbol(lattice: Lattice) -> float:

@@ -256,7 +256,7 @@ class MeshSums:
         self.pairs = SharpPairs.of(product)
         values, norm = SoftValues.between(product, unit), unit * product.kernel.norm
         self.sliced = Sliced.of(mesh, values, norm, unit, SLICES)
-        self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.padded[1], range(mesh.shape[1]))
+        self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.stride, range(mesh.shape[1]))
 
     def __call__(self, loads: Pair) -> Ball:
         product = self.product

@@ -133,7 +133,7 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
     """
     corner = np.maximum(problem.bounds(highest), loads)
     h, none = problem.compliance(corner), np.zeros(corner.shape, dtype=bool)
-    number, nowhere = convexity_number(problem.shells, h), np.full(corner.shape, np.inf)
+    number, nowhere = convexity_number(problem.shells, h), np.broadcast_to(np.inf, corner.shape)
     return Box("global", problem.shells, corner, h, number, nowhere, none)
 
 

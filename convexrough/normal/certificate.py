@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
@@ -197,24 +198,17 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
-    screened = _screened(problem, start)
-    here = box is not None and start is level.trial
-    known = level.indentation if here else start.indentation
-    indentation = problem.to_scene(known.value)
-    indentation[screened.which] = screened.indentation
-    gaps, approach = frozen(np.maximum(-indentation, 0.0) * length), float(start.approach.value)
     if box is None:
-        return _unproved(level, start, gaps)
-    others = NO_OTHERS
-    if box.scope != "global":
-        assert level.trial is not None
-        # `overhang` needs weights and the displacement that exactly these weights cause.
-        highest = problem.overhang(level.trial.loads.high, level.trial.product)
-        others = OtherSolutions.of(problem, level.loads.upper, highest)
+        known, screened = start.indentation, _screened(problem, start)
+        return _unproved(level, start, _gaps(_in_scene(problem, known, screened), length))
+    others, touching, opened = OtherSolutions.of(level, box), level.touching, level.open
     load_errors = _load_errors(problem, loads, level)
     moved = _apart(start.loads.high, level) + np.abs(start.loads.low)
     shift = float((level.approach - start.approach.value).size)
     energy = _energy_error(level, box, start, moved)
+    screened, here = _screened(problem, start), start is level.trial
+    known = level.indentation if here else start.indentation
+    indentation = _in_scene(problem, known, screened)
     errors = problem.to_scene(
         level.indentation.error if here else (level.indentation - known.value).size
     )
@@ -225,23 +219,37 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     errors *= 1 + SAFETY
     codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
     codes[screened.which[screened.below]] = OPEN
-    codes[problem.candidates[level.touching]] = TOUCHING
-    codes[problem.candidates[level.open]] = OPEN
+    codes[problem.candidates[touching]] = TOUCHING
+    codes[problem.candidates[opened]] = OPEN
     energy += _screened_energy(problem, loads, indentation, errors)
     return Certificate(
         scope="local" if others.possible else "global",
         convexity_number=box.convexity_number,
         codes=frozen(codes),
         load_errors=frozen(load_errors),
-        gaps=gaps,
+        gaps=_gaps(indentation, length),
         gap_errors=frozen(errors * length),
-        approach=approach * length,
+        approach=float(start.approach.value) * length,
         approach_error=0.0 if problem.load is None else shift * (1 + SAFETY) * length,
         duality_gap=energy * (force * length),
         fixed_open=int(box.fixed_open.sum()),
         other_solutions_crowding=others.crowding,
         other_solutions_cover=others.cover,
     )
+
+
+def _in_scene(problem: NormalProblem, known: Ball, screened: _Screened) -> Array:
+    """(N,) indentations of all asperities of the scene, in scaled units.
+
+    known : (n,) indentations of the asperities that can touch
+    """
+    indentation = problem.to_scene(known.value)
+    indentation[screened.which] = screened.indentation
+    return indentation
+
+
+def _gaps(indentation: Array, length: float) -> Array:
+    return frozen(np.maximum(-indentation, 0.0) * length)
 
 
 def _unproved(level: Level, start: Trial, gaps: Array) -> Certificate:
@@ -346,8 +354,8 @@ def _screened_energy(
     The energy is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the total load is
     prescribed, the loads s are dropped and the bound is 0.
     """
-    screened = loads.copy()
-    screened[problem.candidates] = 0.0
+    screened = loads > 0
+    screened[problem.candidates] = False
     which = np.flatnonzero(screened)
     if len(which) == 0 or problem.load is not None:
         return 0.0
@@ -376,20 +384,22 @@ class OtherSolutions(NamedTuple):
     cover: bool  # in each, a contact disc covers the nearest neighbour's summit
 
     @classmethod
-    def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """The properties of solutions other than the one found.
-
-        near           : (n,) upper bounds on the loads of the solution found
-        approach_bound : upper bound on the approach of every solution
-        """
+    def of(cls, level: Level, box: Box) -> OtherSolutions:
+        """The properties of solutions other than that in the box, which is near `level`."""
+        if box.scope == "global":
+            return NO_OTHERS
+        assert level.trial is not None
+        problem = level.problem
 
         def radii(loads: Array) -> Array:
             return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
 
         A = problem.influence
         perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
-        a = radii(near)
-        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(approach_bound)))
+        a = radii(level.loads.upper)
+        # `overhang` needs weights and the displacement that exactly these weights cause.
+        highest = problem.overhang(level.trial.loads.high, level.trial.product)
+        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
         if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
             return NO_OTHERS
         crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed

@@ -164,7 +164,7 @@ class Level:
         """
         it = self.trial
         assert it is not None
-        own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
+        own = it.loads.at(k), it.product[k], it.gap[k]
         trial = Trial(problem, *own, it.approach[k, 0], it.missing[k, 0])
         found = self.loads[k], self.indentation[k], self.approach[k, 0], self.open[k]
         norm = float(self.distance[k, 0]), self.compliance[k]

@@ -128,11 +128,11 @@ class NormalProblem:
     def _at(self, control: Ball, by_load: bool) -> Self:
         """The problem with another control, and with the cached data of this one."""
         other = replace(self, control=control, by_load=by_load)
-        for name in ("exact", "squares", "row_norm", "largest_entry"):
+        for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
 
-    @cached_property
+    @property
     def squares(self) -> Array:
         """(n,) [length^2] squared distances of the summits from the axis."""
         return self.scene.asperities.distances[self.candidates] ** 2
@@ -206,13 +206,13 @@ class NormalProblem:
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
         """(n,) A times `others`; if possible by an update of `product`, that is A times `loads`."""
-        change = others - loads
+        change = (others - loads).high
         small = NEARBY * float(loads.high.max())
         few = self.influence.stored and len(self) <= ALL_SHARP
-        if few and float(np.abs(change.high).max()) > small:
+        if few and float(np.abs(change).max()) > small:
             return self.product(others)
-        moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
-        most = self.row_norm * float(np.linalg.norm(change.high))  # bounds A |change|
+        moved, off = self.influence.apply(change), self.influence.rounding(change)
+        most = self.row_norm * float(np.linalg.norm(change))  # bounds A |change|
         error = (off.relative + 2 * ROUNDOFF) * most + off.each
         return product + Ball.around(moved, error * (1 + SAFETY))
 

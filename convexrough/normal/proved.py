@@ -85,19 +85,8 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     bounds on the errors of the trial loads, by the theorem on the box. The third is the level, by
     the theorem on the smaller box.
     """
-    trial, missing = state.loads.high, _Missing.of(problem, state)
-    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
-
-    def theorem(h: Array, margin: Any) -> tuple[Any, Array]:
-        within = distance(residual, h, margin)
-        return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + missing.loads)
-
-    _, at_first = theorem(box.compliance, 1.0 - box.convexity_number)
-    within_faces = (trial + at_first < box.faces) & np.isfinite(at_first)
-    inside = (within_faces & ~(box.fixed_open & (trial > 0))).all(axis=-1)
-    h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
-    number = np.minimum(box.convexity_number, box.convexity_at(h))
-    within, errors = theorem(h, 1.0 - number)
+    missing = _Missing.of(problem, state)
+    inside, at_first, h, within, errors = _applied_twice(problem, box, state, missing)
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
     moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
@@ -109,6 +98,27 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     found = Ball.around(state.loads, np.where(opened, 0.0, errors))
     solution = _sharpened(problem, found, indentation), indentation, approach, opened
     return inside, at_first, Level(problem, *solution, state, box, within, h)
+
+
+def _applied_twice(
+    problem: NormalProblem, box: Box, state: Trial, missing: _Missing
+) -> tuple[Any, Array, Array, Any, Array]:
+    """As in `solution_in`: True if the box contains the solution, and the bounds by the first box;
+    then h of the smaller box, and bounds on the norm of P - P* and on its components by that box.
+    """
+    trial = state.loads.high
+    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
+
+    def theorem(h: Array, margin: Any) -> tuple[Any, Array]:
+        within = distance(residual, h, margin)
+        return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + missing.loads)
+
+    _, at_first = theorem(box.compliance, 1.0 - box.convexity_number)
+    within_faces = (trial + at_first < box.faces) & np.isfinite(at_first)
+    inside = (within_faces & ~(box.fixed_open & (trial > 0))).all(axis=-1)
+    h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
+    number = np.minimum(box.convexity_number, box.convexity_at(h))
+    return inside, at_first, h, *theorem(h, 1.0 - number)
 
 
 class _Missing(NamedTuple):

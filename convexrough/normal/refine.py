@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import TINY, Ball, of_rows, quietly, residual
-from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, two_sum
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
@@ -49,7 +49,6 @@ class Trial:
     """Loads of the asperities that can touch, and residuals in the contact law, in scaled units.
 
     loads, product : (n,) P and A P
-    local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
     approach : D0: the prescribed approach; if the load is prescribed, the approach that fits best
     missing : prescribed total minus the sum of the loads; 0 if no total is prescribed
@@ -58,10 +57,15 @@ class Trial:
     problem: NormalProblem
     loads: Pair
     product: Ball
-    local: Array
     gap: Ball
     approach: Ball
     missing: Ball
+
+    @property
+    def local(self) -> Array:
+        """(n,) k P^(2/3), to float64."""
+        local: Array = hertz.indentation(self.loads.high, self.problem.coefficients)
+        return local
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -73,7 +77,7 @@ class Trial:
         """(n,) bounds on violations of the law: |gap| where loaded, max(-gap, 0) elsewhere."""
         return frozen(excess(self.gap, self.inside))
 
-    @cached_property
+    @property
     def defect(self) -> Array:
         """(n,) the residual of the contact law: gap where loaded; elsewhere min(gap, 0)."""
         gap = self.gap.value
@@ -81,7 +85,7 @@ class Trial:
 
     def frozen(self) -> Trial:
         """The same trial with read-only arrays, because proofs rest on it."""
-        for each in (self.loads, self.product, self.local, self.gap):
+        for each in (self.loads, self.product, self.gap):
             of_rows(frozen, each)
         return self
 
@@ -101,23 +105,22 @@ class Trial:
     @property
     def numbers(self) -> tuple[Pair | Ball | Array, ...]:
         """All fields except the problem, in their order."""
-        return self.loads, self.product, self.local, self.gap, self.approach, self.missing
+        return self.loads, self.product, self.gap, self.approach, self.missing
 
 
 def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     """The trial of these loads; `product` is A P, `missing` is the given total minus their sum."""
     data, exact = problem.exact, Ball.exact(loads)
-    local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
         gap = residual(data.coefficients, exact, product, data.offsets, problem.control)
-        return Trial(problem, loads, product, local, gap, problem.control, missing)
+        return Trial(problem, loads, product, gap, problem.control, missing)
     above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))  # as D0
     weights = np.cbrt(loads.high)
     total = summed(weights)
     shift = summed(weights * above.value) / total
     rest = summed(weights * ((above.value - shift) + above.mid.low)) / total
     approach = Ball.exact(Pair(*(np.asarray(part) for part in two_sum(shift, rest))))
-    return Trial(problem, loads, product, local, above - approach, approach, missing)
+    return Trial(problem, loads, product, above - approach, approach, missing)
 
 
 def refined(problem: NormalProblem, best: Trial) -> Trial:
@@ -177,19 +180,28 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
 def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
     """The loads after the step, not yet changed to have the prescribed total."""
     loads, inside, defect = state.loads, state.inside, state.defect
-    own = np.where(inside, state.local, np.minimum(-state.gap.value, 0.0))
-    slopes = np.divide(1.5 * loads.high, own, out=np.zeros(own.shape), where=inside)
+    slopes = np.divide(1.5 * loads.high, state.local, out=np.zeros(defect.shape), where=inside)
     size = largest(np.abs(defect))
-    step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), enough, todo)
-    ratio = np.divide(step, own, out=np.zeros(own.shape), where=inside)
-    near = inside & (ratio > -0.5)
-    ends = hertz.load(own + step, problem.coefficients)
-    x = np.where(near, ratio, 0.0)
-    root = np.sqrt(1.0 + x)
-    grown = loads.high * (x * (1.0 + x + root + 1.0) / (1.0 + root))  # P ((1 + x)^(3/2) - 1)
-    following = loads + Pair.exact(np.where(near, grown, ends - loads.high))
-    loaded = near | (ends > 0)
-    return Pair(*(part * loaded for part in following))
+    defect /= np.where(size > 0, size, 1.0)
+    step = problem.correct(slopes, defect, enough, todo)
+    step *= size
+    k = np.broadcast_to(problem.coefficients, step.shape)
+    gap = state.gap.value
+
+    def following(some: slice) -> Pair:
+        before = loads.at(some)
+        local = hertz.indentation(before.high, k[some])
+        own = np.where(inside[some], local, np.minimum(-gap[some], 0.0))
+        ratio = np.divide(step[some], own, out=np.zeros(own.shape), where=inside[some])
+        near = inside[some] & (ratio > -0.5)
+        ends = hertz.load(own + step[some], k[some])
+        x = np.where(near, ratio, 0.0)
+        root = np.sqrt(1.0 + x)
+        grown = before.high * (x * (1.0 + x + root + 1.0) / (1.0 + root))  # P ((1 + x)^(3/2) - 1)
+        after = before + Pair.exact(np.where(near, grown, ends - before.high))
+        return Pair(*(part * (near | (ends > 0)) for part in after))
+
+    return in_parts(len(step), following)
 
 
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
@@ -236,7 +248,7 @@ def sums(values: Pair) -> Pair:
 
 def defect_of(state: Trial) -> Any:
     """The 2-norm of the residual of the contact law: a number, or (m,) for a stack."""
-    return np.sqrt((state.defect**2).sum(axis=-1))
+    return _norm(state.defect)
 
 
 def rounding_of(state: Trial) -> Any:
@@ -245,4 +257,9 @@ def rounding_of(state: Trial) -> Any:
     Errors of positive gaps are left out, because they do not change the residual.
     """
     counts = state.inside | (state.gap.value <= state.gap.radius)
-    return np.sqrt((np.where(counts, state.gap.radius, 0.0) ** 2).sum(axis=-1))
+    return _norm(np.where(counts, state.gap.radius, 0.0))
+
+
+def _norm(values: Array) -> Any:
+    """The 2-norm along the last axis: a number, or (m,) for (m, n) values."""
+    return np.sqrt(np.einsum("...i,...i->...", values, values))

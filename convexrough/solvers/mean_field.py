@@ -47,10 +47,11 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
 def _mean_field(problem: NormalProblem) -> Array:
     count = max(4, min(RINGS, len(problem) // LEAST))
     # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
-    limits = float(problem.squares.max()) * np.linspace(0.0, 1.0, count + 1)
+    squares = problem.squares
+    limits = float(squares.max()) * np.linspace(0.0, 1.0, count + 1)
     edges, middle = np.sqrt(limits), np.sqrt((limits[1:] + limits[:-1]) / 2.0)
     some = slice(None, None, max(1, len(problem) // SAMPLE))
-    places = problem.squares / limits[1]
+    places = squares / limits[1]
     ring = np.minimum(places.astype(np.intp), count - 1)
     numbers, areas = np.bincount(ring, minlength=count), np.pi * np.diff(limits)
     share = numbers / np.maximum(np.bincount(ring[some], minlength=count), 1)

@@ -110,7 +110,7 @@ def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: in
     distances = Distances.of(exactly(basis, unit), max(shape))
     norm = box.kernel(1, np.float64).norm * unit / float(np.hypot(*basis[0]))
     sliced = Sliced.of(box, distances, norm, unit, count)
-    places = np.add.outer(np.arange(17) * box.padded[1], np.arange(23)).ravel()
+    places = np.add.outer(np.arange(17) * box.stride, np.arange(23)).ravel()
     found = sliced.sums(loads, places)
     good = {2: 1e-18, 3: 1e-22, 4: 1e-26}[count]
     with ctx.workprec(300):

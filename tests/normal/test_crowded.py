@@ -21,7 +21,6 @@ from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.normal.boxes import CROWDED_MARGINS, overlapping_margin, overlaps
-from convexrough.normal.certificate import OtherSolutions
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import solution_in
 from convexrough.normal.refine import trial
@@ -210,12 +209,13 @@ def test_lattices_exclude_more_other_solutions() -> None:
         scene = hexagonal(tip_radius=0.02 * size)
         problem = NormalProblem.assemble(scene, approach=1e-4, influence="lattice")
         loads, most = Newton().solve(problem).loads, problem.bounds(problem.approach_bound)
-        others, A = OtherSolutions.of(problem, loads, problem.approach_bound), problem.influence
+        found, A = cr.press(scene, approach=1e-4, influence="lattice"), problem.influence
+        only = found.certificate.scope == "global"
         secant = problem.coefficients * (np.cbrt(most) ** 2 - np.cbrt(loads) ** 2) / (most - loads)
         if A.crowding(A.scale / secant) <= 1:
-            assert not others.possible
+            assert only
             continue
-        if others.possible:
+        if not only:
             continue
         by_lattice += 1
         for Q in (most, *(most * rng.random((20, len(most))))):
