@@ -123,7 +123,7 @@ left.bar(x / a, f / f.max(), width=2.8 / 64, color="0.75", edgecolor="0.3", labe
 fine = np.linspace(-1, 1, 101)
 left.plot(fine, 1 - fine**2, "k-", label="$\\delta - x^2 / R$")
 left.plot(fine, np.sqrt(1 - fine**2), "k--", label="Hertz pressure / $p_0$")
-left.set(xlabel="$x / a$ [1]", ylabel="force / largest [1]")
+left.set(xlabel="$x / a$ [1]", ylabel="force / largest force [1]")
 left.legend(loc="lower center")
 right.loglog(counts, errors, "ko", label="error of the load")
 right.loglog(counts, errors[0] * (counts[0] / counts) ** 2.0, "k-", lw=0.8, label="second order")
