@@ -166,7 +166,7 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
     began = time.perf_counter()
     statuses = sweep(file, workers=workers).read(["status"])["status"]
     seconds = (time.perf_counter() - began) / scenes
-    said = f"{scenes:,} scenes, {workers} processes, {np.sum(statuses == 'certified'):,} certified"
+    said = f"{scenes:,} scenes, {np.sum(statuses == 'certified'):,} certified, processes: {workers}"
     return Row("sweep", "rough", size, message=said, seconds=seconds, runs=1)
 
 
