@@ -8,7 +8,7 @@ accuracy of the fit. The two parameters are strongly correlated, because sharper
 spacing carry nearly the same load.
 
 Rings of asperities make contact one after the other. So the sum of squares has local minima, and
-from some starting values the fit ends in one. A large residual shows this.
+from some starting values the fit ends in one of them. A large residual shows such a failure.
 
     python examples/calibrate_asperities.py
 """
@@ -30,10 +30,10 @@ NOISE = 1e-3  # relative, of each load
 
 
 def curve(parameters: Array) -> tuple[Array, Array]:
-    """The logarithm of the load at each approach, and its derivatives by those of both parameters.
+    """The logarithm of the load at each approach, and its derivatives.
 
-    All tip radii change together, and so do all positions; so the derivatives of single asperities
-    add up.
+    parameters : logarithms of tip radius and spacing, by which the derivatives are taken. Each
+        derivative is a sum over the asperities, because all of them change together.
     """
     tip, spacing = np.exp(parameters)
     asperities = cr.Asperities.hexagonal(spacing=SPACING, tip_radius=tip, within=0.0125)

@@ -9,9 +9,9 @@ the best nor the worst.
     python examples/design_a_damper.py --draw design.png
     python examples/design_a_damper.py --finer 4          # 955 asperities, ten seconds
 
-The gradient with respect to an open asperity is zero, so no optimiser raises it: start from random
-heights, several times. Where an asperity makes contact the gradient has a kink, so second
-derivatives do not exist there: use a first-order method.
+The derivative with respect to the height of an open asperity is zero, so no optimiser raises it:
+start from random heights, several times. Where an asperity makes contact the gradient has a kink,
+so second derivatives do not exist there: use a first-order method.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def scene(finer: int = 1) -> cr.Scene:
 def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]:
     """Heights of the largest (sign 1) or smallest (-1) loss, this loss, and the possible gain.
 
-    The loss is relative to that of equal heights, and the unknowns are heights divided by FARTHEST,
-    because optimisers need numbers of about 1. The possible gain is the first-order gain of the
-    best further step.
+    The loss and the gain are relative to the loss of equal heights. The gain is that of the best
+    further step, to first order. The unknowns of the optimiser are heights divided by FARTHEST,
+    because optimisers need numbers of about 1.
     """
     force = FRACTION * FRICTION * LOAD
     loss = cr.Objective(scene=scene(finer), of="loss", load=LOAD, force=force)

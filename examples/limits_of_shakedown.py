@@ -1,11 +1,10 @@
 """Compute how far a load path may be scaled before sliding never ends, and compare two models.
 
-In the exact model an asperity slides in every cycle if the part of the contact that sticks for ever
-is smaller than the contact at which the asperity first touched. Melan's theorem assumes that
-asperities stick elastically until they slide as a whole. Its limit is lower, because it lets a
-lightly loaded asperity take a shear force in proportion to its whole contact area, although in fact
-the edge of its contact slips first. The script also draws the maps shakedown.png and
-shakedown_map.png.
+In the exact model, the contact that forms below a load L* sticks for ever. An asperity slides in
+every cycle if it first touches at a larger load. Melan's theorem assumes that asperities stick
+elastically until they slide as a whole. Its limit is lower, because it gives a lightly loaded
+asperity the shear force of a contact that sticks everywhere, although in fact the edge of the
+contact slips first. The script also draws the maps shakedown.png and shakedown_map.png.
 
     python examples/limits_of_shakedown.py
 """
@@ -42,7 +41,8 @@ def compare() -> Pairs:
     # On first loading the same asperity slides first, at the same force.
     onset = cr.onset_of_sliding(contact, which=[last])[0] / (FRICTION * P)
 
-    # Melan's limit is lower because P_i(P) <= (P - sigma) P_i'(P): P_i(s) is convex.
+    # Melan's limit is lower because P_i(s) is convex and 0 at the load sigma at which the asperity
+    # first touches: P_i(P) <= (P - sigma) P_i'(P).
     step = 1e-4 * P
     ahead, behind = (cr.press(scene, load=P + s).loads[last] for s in (step, -step))
     sigma = P * (1 - exact.factor)
@@ -52,7 +52,7 @@ def compare() -> Pairs:
     ellipse = (1 - sigma / (0.9 * P)) / np.hypot(0.1, 0.2)
 
     # On first loading to 0.6 f P ring A slides. Then only the range of the force matters, not its
-    # mean: while it is 1 % below the limit, no slip changes.
+    # mean: a range 1 % below the limit changes no slip.
     high = 0.6 * FRICTION * P
     low = high - 0.99 * exact.factor * 2 * FRICTION * P
     slips = cr.history(contact, forces=[high, low, high, low]).slips

@@ -7,12 +7,12 @@ approach is
 
     1 - sum_i x_i / r_i,    sum_j K_ij x_j = 1,    K_ii = pi / (2 a_i),  K_ij = 1 / r_ij,
 
-the derivative of w_i(P) = D_i (docs/theory/convexity.md, (1)), where r_i is the distance of the
-short asperity from neighbour i. For three equal neighbours at the distance r it is negative if a
-exceeds pi r / (2 (3 - 2 / sqrt(3))) = 0.851 r. Their discs overlap above 0.866 r. Random searches
-over positions and sizes of up to seven neighbours found no derivative below -0.03; this script
-repeats a short one. In all these cases an asperity loses contact only where contact discs nearly
-overlap, and there the model ends.
+by differentiation of (1) in docs/theory/convexity.md. Here r_i is the distance of the short
+asperity from neighbour i. For three equal neighbours at the distance r the derivative is negative
+if their contact radius exceeds pi r / (2 (3 - 2 / sqrt(3))) = 0.851 r. Their discs overlap above
+0.866 r. Random searches over positions and sizes of up to seven neighbours found no derivative
+below -0.03; this script repeats a short search. In all cases found, contact discs nearly overlap
+where the asperity loses contact. The model is not valid for overlapping discs.
 
     python examples/losing_contact.py
 """

@@ -9,10 +9,10 @@ approach. `convexrough summits MAP --whole` does this for a map of your own.
 Over eight surfaces, at the default pruning, the asperities carry on average 7 to 10 % less load at
 the same approach. The standard deviation between surfaces is 6 % with about 5 contacts and 2 % with
 about 30. The contact area is a quarter to a third smaller, because shoulders and pruned summits
-carry load, too. The largest load is 7 to 16 % smaller. For the same load the asperities need an
-approach that is larger by 3 to 11 % of the rms height. Part of the difference in area is an error
-of the boundary elements, in which a pixel touches as a whole or not at all: with pixels of half the
-width the area is a tenth smaller, and the load 1 % smaller.
+carry load, too. The largest load of a contact is 7 to 16 % smaller. For the same total load the
+asperities need an approach that is larger by 3 to 11 % of the rms height. Part of the difference in
+area is an error of the boundary elements, in which a pixel touches as a whole or not at all: pixels
+of half the width reduce their area by a tenth and their load by 1 %.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Pair = tuple[str, float, float]  # name, computed value, reference value
 
 
 class Picture(NamedTuple):
-    """What is compared."""
+    """Total load, contact area, number of contacts, and largest load of a contact."""
 
     load: float
     area: float

@@ -27,7 +27,7 @@ RATIO = (2 - 0.3) / (2 * (1 - 0.3))  # ratio of tangential to normal compliance
 
 
 def one_sphere() -> Pairs:
-    """A shear force over f that grows twice as fast as the load, which grows, too."""
+    """The displacement if the load grows, and Q / f grows twice as fast."""
     asperity = cr.Asperities(positions=[[0.0, 0.0]], tip_radii=1.0)
     scene = cr.Scene(1.0, asperity, MATERIAL, friction=FRICTION, geometry="summit")
     first, last, shear = 1e-6, 1.4e-6, 0.8e-6  # first and last P; last T = Q / f
@@ -51,10 +51,7 @@ def array() -> tuple[cr.Scene, float]:
 
 
 def on_a_line(approach: Callable[[Any], Any], P: float, p: float, t: float) -> float:
-    """The loss on a straight path with the amplitudes p of P and t > p of Q / f, in closed form.
-
-    It has means of the approach D0 over loads.
-    """
+    """The loss on a straight path with the amplitudes p of P and t > p of Q / f, in closed form."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
 
     def mean(low: float, high: float, panels: int = 12) -> float:
@@ -103,7 +100,7 @@ def against_phase() -> cr.PhaseLosses:
 
 
 def phases() -> Pairs:
-    """Phase matters more than roughness: in phase, a cycle loses a fraction of the largest loss."""
+    """Losses and stuck levels at several phases; in phase the loss is small."""
     losses = against_phase()
     P, p, t = losses.load, losses.load_amplitude, losses.force_amplitude / FRICTION
 

@@ -15,8 +15,8 @@ crossing, and at 4e-6 R 45 % have none: their lightly loaded asperities slide at
 they lose more than the smooth sphere at every amplitude. With equal heights and tip radii that vary
 by 20 %, the crossing is between 0.37 and 0.42.
 
-The references are the crossings of the array of equal asperities and of one random surface, both by
-bisection, and a loss from the indentation curve of one surface, which is computed without shear.
+The reference values are the crossings of the array of equal asperities and of one random surface,
+by bisection, and their losses computed without shear, from the curve of approach against load.
 """
 
 import sys
@@ -67,10 +67,9 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
 
 
 def crossings(ratios: Array) -> Array:
-    """(n,) the amplitude at which each curve (n, m) of loss over smooth loss passes 1; nan if none.
+    """(n,) the largest amplitude at which each curve (n, m) of loss over smooth loss is 1, or nan.
 
-    If there are several, it is the largest. Curves are interpolated by monotone cubics of the
-    logarithms.
+    Between the points, the logarithms are interpolated by monotone cubics.
     """
     found = np.full(len(ratios), np.nan)
     x = np.log(AMPLITUDES)
@@ -143,7 +142,7 @@ def compare() -> Pairs:
 
 
 def draw(table: cr.SweepTable, path: str) -> None:
-    """Draw the loss over the smooth sphere's against amplitude (left), and the crossing (right)."""
+    """Draw the loss, over that of the smooth sphere, against amplitude; and the crossing."""
     from matplotlib.figure import Figure
 
     columns = table.read()

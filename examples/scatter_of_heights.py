@@ -1,11 +1,11 @@
 """Estimate the scatter of a loss from its gradient, and find where the estimate fails.
 
-The heights vary independently with a standard deviation. To first order, the standard deviation of
-the loss is that of the heights times the length of the gradient of the loss. This needs no
-sampling. It holds as long as the deviation of the heights is small compared with the smallest gap
-and the smallest indentation. For larger deviations, asperities make and lose contact, and the
-estimate is too small. But the first-order term is still a good control variate: its mean over the
-random heights is 0, so subtract it from every sample and average only the remainder.
+The heights vary independently with a common standard deviation. To first order, the standard
+deviation of the loss is that of the heights times the length of the gradient of the loss. This
+estimate needs no sampling. It holds as long as the deviation of the heights is small compared with
+the smallest gap and the smallest indentation. For larger deviations, asperities make and lose
+contact, and the estimate is too small. But the first-order term is still a good control variate:
+its mean over the random heights is 0, so subtract it from every sample and average the remainder.
 
     python examples/scatter_of_heights.py --samples 400
 """
@@ -68,9 +68,9 @@ def compare(samples: int = 60) -> list[Pair]:
     small, large = sampled(SMALL, samples), sampled(LARGE, samples)
     return [
         ("small: deviation over estimate", small[0].std() / small[1].std(), 1.0),
-        ("small: left by a control variate, below 0.1", float(unexplained(*small) < 0.1), 1.0),
+        ("small: rest with a control variate < 0.1", float(unexplained(*small) < 0.1), 1.0),
         ("large: first order fails by a fifth", float(large[1].std() < 0.85 * large[0].std()), 1.0),
-        ("large: left by a control variate, below 0.8", float(unexplained(*large) < 0.8), 1.0),
+        ("large: rest with a control variate < 0.8", float(unexplained(*large) < 0.8), 1.0),
     ]
 
 
@@ -82,7 +82,7 @@ def main() -> None:
         found, first = sampled(deviation, samples)
         print(f"heights {deviation:g}: loss {found.mean():.4f} of that of equal ones")
         print(f"  deviation  {found.std():.4f}, estimate {estimated(deviation):.4f}")
-        print(f"  left by a control variate  {unexplained(found, first):.2f} of it")
+        print(f"  left by a control variate  {unexplained(found, first):.2f} of this deviation")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ MARKERS: dict[Family, str] = {"lattice": "o", "rough": "^", "scattered": "s"}
 
 COLUMNS = 3
 
-#: Errors below this value, such as 0, are drawn at it, because the axis is logarithmic.
+#: Smaller errors, such as 0, are drawn at this value, because the axis is logarithmic.
 EXACT = 1e-17
 
 
@@ -86,7 +86,7 @@ def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
 
 
 def cost_figure(bench: Bench) -> Figure:
-    """The figure of time to press a scene against its size, with fitted exponents and slope 1."""
+    """The figure of time to press a scene against its size, with fitted exponents."""
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log")
@@ -101,7 +101,7 @@ def cost_figure(bench: Bench) -> Figure:
                 axes.plot(x, 0.6 * min(y / x) * x, ":", color="0.3", lw=1.0, label="slope 1")
     if axes.lines:
         axes.legend(fontsize=TICK, frameon=False, loc="lower right")
-    label(axes, "asperities", "seconds for a press, certified")
+    label(axes, "asperities", "seconds for a certified press")
     _plain(axes)
     return figure
 

@@ -31,8 +31,8 @@ from convexrough.threads import cores
 #: Largest accepted error bound of reference loads, divided by the largest load: two roundoffs.
 ACCURATE = 2.0**-52
 
-#: Least and largest number of runs, of which the fastest counts. Between these limits, runs start
-#: until all runs together have taken `patience` [s].
+#: Least and largest number of runs, of which the fastest counts. Between these limits, a further
+#: run starts if all runs together have taken less than `patience` [s].
 LEAST_RUNS, MOST_RUNS = 3, 25
 
 #: Number of timed products (`plain_product`), of which the fastest is the unit of time.
@@ -99,7 +99,8 @@ def reference(scene: Scene) -> Array:
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
         advice = "another approach, or asperities further apart"
-        raise SolverError(f"loads proved to {bound:.2g} only", solver="reference", advice=advice)
+        what = f"the proved error of the loads is {bound:.2g} of the largest load, above 2^-52"
+        raise SolverError(what, solver="reference", advice=advice)
     return contact.loads
 
 
@@ -165,7 +166,7 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
     began = time.perf_counter()
     statuses = sweep(file, workers=workers).read(["status"])["status"]
     seconds = (time.perf_counter() - began) / scenes
-    said = f"{scenes:,} scenes, {workers} processes, {np.sum(statuses == 'certified'):,} certified"
+    said = f"{scenes:,} scenes, {np.sum(statuses == 'certified'):,} certified, processes: {workers}"
     return Row("sweep", "rough", size, message=said, seconds=seconds, runs=1)
 
 
@@ -191,8 +192,8 @@ def _timed(
 def plain_product(scene: Scene) -> float:
     """[s] the time of the Fourier transforms of one product with the lattice operator.
 
-    It is the least of `PRODUCTS` times of scipy's transforms in float64 on all cores, on the box of
-    sites padded to twice its size; nan without a lattice.
+    It is the least of `PRODUCTS` times of scipy's transforms in float64 on all cores, on a grid
+    twice as wide and high as the lattice; nan without a lattice.
     """
     from scipy import fft
 

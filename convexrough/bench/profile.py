@@ -49,7 +49,7 @@ class Profile:
         return part
 
     def rows(self) -> list[dict[str, str | int | float]]:
-        """For each solver the numbers of outcomes and right sets, and its `part` for `FACTORS`."""
+        """For each solver the numbers of outcomes and of right `sets`, and `part` for `FACTORS`."""
         rows = []
         for i, solver in enumerate(self.solvers):
             row: dict[str, str | int | float] = {"solver": solver}
@@ -61,7 +61,7 @@ class Profile:
         return rows
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Plot the part of the cases answered right against time / least time; return the axes."""
+        """Plot the part of cases answered correctly against time / least time; return the axes."""
         axes = new_axes((SINGLE, 3.8)) if axes is None else axes
         finite = self.ratios[np.isfinite(self.ratios)]
         factors = np.unique(np.append(finite, 2.0 * finite.max(initial=1.0)))
@@ -70,7 +70,7 @@ class Profile:
         axes.set(xscale="log", ylim=(0.0, 1.02))
         axes.legend(fontsize=TICK - 2, ncols=2, frameon=False,
                     loc="upper center", bbox_to_anchor=(0.5, -0.2))  # fmt: skip
-        label(axes, "time over that of the fastest", "part of the cases")
+        label(axes, "time / time of the fastest solver", "part of the cases answered correctly")
         return axes
 
 

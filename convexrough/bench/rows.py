@@ -24,7 +24,8 @@ NOT_OTHER = ("solve", "press", "from nothing", "sweep")
 #: Times count as equal up to this relative difference.
 NOISE = 0.1
 
-#: Exponents are fitted to scenes of at least this many asperities, as fixed costs dominate below.
+#: Exponents are fitted to scenes of at least this many asperities; in smaller ones, costs that do
+#: not depend on size dominate.
 FITTED_FROM = 10_000
 
 
@@ -133,7 +134,7 @@ class Bench:
 
 
 def frontier(rows: Iterable[Row]) -> list[Row]:
-    """The Pareto frontier: the points for which no different one is as fast and as accurate."""
+    """The Pareto frontier: points such that no other is at least as fast and as accurate."""
     points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
@@ -227,8 +228,8 @@ def _messages(bench: Bench) -> list[str]:
     lines = bench.verdicts()
     for row in bench.rows:
         if row.task == "sweep":
-            lines.append(f"A scene of about {row.asperities:,} with a cycle in a sweep "
-                         f"({row.message}): {1e3 * row.seconds:.2f} ms.")  # fmt: skip
+            lines.append(f"Time per scene of about {row.asperities:,} asperities, with a cycle, in "
+                         f"a sweep ({row.message}): {1e3 * row.seconds:.2f} ms.")  # fmt: skip
         elif row.task != "solve" and row.outcome != "answered":
             place = f"{row.task}, {row.asperities:,} asperities ({row.family})"
             lines.append(f"{place}: {row.outcome}, {row.message}")

@@ -86,7 +86,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 
 
 def attempts(quick: bool) -> list[Attempt]:
-    """All solvers at several tolerances; those with a last Newton step also without it."""
+    """All solvers at several tolerances; others than Newton's with and without a Newton step."""
     found, every = [Attempt("newton", "default", Newton())], 2 if quick else 1
     for kind, most in COUPLINGS.items():
         label = "newton" if kind is None else f"newton, {kind}"
@@ -130,8 +130,8 @@ def run(*, quick: bool) -> Bench:
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
     """The rows of the attempts on one scene; apparently faster attempts are timed again.
 
-    Attempts with the operator that is the default on this scene, or for fewer asperities, are left
-    out.
+    Left out are attempts that name the operator that the scene has by default, and attempts that
+    are limited to fewer asperities.
     """
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])

@@ -17,7 +17,7 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact with a known answer, up to the rounding of its heights to float64: `manufactured`.
+    """A contact made by `manufactured`, whose answer is known up to the rounding of its heights.
 
     `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
     and proves the statuses.
@@ -37,8 +37,8 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
 
     Each asperity touches with the probability `touching`. Contact radii are random from 0.1 to 0.45
     spacings, tip radii from 4 to 8 spacings, and gaps from 0 to the largest indentation. With other
-    versions of numpy, a `seed` may give other numbers. Raises InputError for a `count` below 1, and
-    unless `touching` is from 0 to 1.
+    versions of numpy, a `seed` may give other numbers. Raises InputError for a `count` below 1, or
+    if `touching` is not from 0 to 1.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

@@ -61,10 +61,10 @@ class Checked(Record):
 class HardCase(Record):
     """A hard scene, with an answer that is known to 50 digits.
 
-    Digits are strings. "0" is exact; the error of any other is at most one unit of the 50th digit.
-    The answer is that of the scene whose data are the given float64 numbers. An interval Newton
-    step proves that a solution agrees with these digits and is the only one nearby; `cr.certify`
-    says whether it is the only one anywhere.
+    Digits are strings. "0" is exact; the error of other numbers is at most one unit of the 50th
+    digit. The answer is that of the scene whose data are the given float64 numbers. An interval
+    Newton step proves that a solution agrees with these digits and is the only one nearby;
+    `cr.certify` shows whether it is the only one anywhere.
 
     family, why : name of the group of similar cases, and a sentence on the difficulty
     approach [length], load [force] : one of them is prescribed; the other is None
@@ -73,8 +73,7 @@ class HardCase(Record):
     shear_force : [force] the shear force at the end
     history     : (m,) [force] shear forces up to `shear_force`; empty if it is applied from rest
     forces, slips : (n,) digits [force], [length] under `shear_force`; empty if an asperity loses
-        load as the total load rises: in shear the others would drag it along, and the theorem of
-        Ciavarella and Jaeger gives no answer
+        load as the total load rises, because the theorem of Ciavarella and Jaeger does not apply
     displacement  : digits [length] of the relative displacement of the bodies, or ""
 
     >>> case = cr.gallery.case("grazing-gap-1e-9")
@@ -135,7 +134,7 @@ class HardCase(Record):
         Raises InputError for a wrong number of forces, and if there is no answer in shear.
         """
         if not self.forces:
-            found = "a case in which an asperity is dragged along by the others"
+            found = "a case in which an asperity loses load as the total load rises"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
         given = checks.array("forces", forces, length=len(self))
         return _judged(given, self.forces, given != 0, self.touching, within)
@@ -148,7 +147,7 @@ def _judged(
     touching: NDArray[np.bool_],
     within: float,
 ) -> Checked:
-    """The comparison. It is in exact arithmetic, as some errors are below float64's rounding."""
+    """The comparison, in exact arithmetic, because some errors are below float64's rounding."""
     exact = [Fraction(each) for each in digits]
     apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
     largest = max(map(abs, exact))
@@ -222,7 +221,7 @@ def stored() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces over the last and largest one; if "nested", each range is in all before it."""
+    """Shear forces, divided by the last and largest one; ranges of "nested" forces decrease."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

@@ -34,13 +34,14 @@ Each row is a contact of a sphere with asperities, written as programs for solve
 variables of a program, times `force_unit`, are the loads of the asperities that `index.json` lists.
 `index.json` also has the scenes, the answers to 50 digits, and the reason for each missing program.
 
-- `.cones.json`: `clarabel.load_from_file`; the contact law itself, no approximation
+- `.cones.json`: read by `clarabel.load_from_file`; the contact law without approximation
 - `.cbf`: the same with a linear objective, for readers of the Conic Benchmark Format
-- `.bristles.npz`: `qpsolvers.Problem.load`; the error of its loads is about `load_error_estimate`
-  of the largest
+- `.bristles.npz`: read by `qpsolvers.Problem.load`; an approximation, the error of whose loads is
+  about `load_error_estimate` of the largest load
 
 condition: condition number of the Hessian at the answer, scaled to a diagonal of 1. spread:
-smallest load / largest load. proved: scope of the proof that the answer is the only solution.
+smallest load / largest load, of the asperities that touch. proved: the answer is proved to be the
+only solution (global), the only one nearby (local), or neither (none).
 """
 
 

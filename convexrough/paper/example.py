@@ -76,18 +76,18 @@ def _pair(paper: Any, computed: Any) -> dict[str, Any]:
 
 def table(comparison: dict[str, Any]) -> list[str]:
     """The lines of a table with quantities, the paper's values and the computed values."""
-    rows = [("quantity", {"paper": "paper says", "computed": "computed"}, "")]
+    rows = [("quantity", {"paper": "paper", "computed": "computed"}, "")]
     rows.append(("asperities in contact", comparison["contacts"], ""))
     for name, ring in comparison["rings"].items():
         more = f"load of each {ring['load']:.6e}, slides from Q/(fP) = {ring['first_slide']:.4f}"
         rows.append((f"  ring {name}", ring, more))
     rows += [
         ("sliding at Q/(fP) = 0.5", comparison["sliding_at_half"], ""),
-        ("  their ring", comparison["sliding_ring_at_half"], ""),
-        ("first to slide at Q/(fP)", comparison["first_slide"], ""),
-        ("rough loses more beyond", comparison["crossover"], "read from a graph in the paper"),
-        ("loss W/W0 at 0.5, rough", comparison["loss_at_half"], ""),
-        ("loss W/W0 at 0.5, smooth", comparison["smooth_loss_at_half"], ""),
+        ("  ring of these asperities", comparison["sliding_ring_at_half"], ""),
+        ("first asperity slides at Q/(fP)", comparison["first_slide"], ""),
+        ("rough loses more above Q/(fP)", comparison["crossover"], "paper: read from a graph"),
+        ("loss W/W0 at Q/(fP) = 0.5, rough", comparison["loss_at_half"], ""),
+        ("loss W/W0 at Q/(fP) = 0.5, smooth", comparison["smooth_loss_at_half"], ""),
     ]
     lines = aligned([(name, row["paper"], row["computed"]) for name, row, _ in rows], left=1)
     return [f"{line}  {more}".rstrip() for line, (*_, more) in zip(lines, rows, strict=True)]

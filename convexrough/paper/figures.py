@@ -185,7 +185,7 @@ def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
         axes.set_ylim(0.0, 1.04 * float(values.max()))
         _letters(axes, list(firsts), values[-1, list(firsts.values())])
     style.label(left, "$Q\\,/\\,(fP)$", "$Q_i\\,/\\,(fP)$  [%]")
-    style.title(left, "asperity of each ring; dot: slides from here")
+    style.title(left, "an asperity of each ring; dot: starts to slide")
     style.label(right, "$Q\\,/\\,(fP)$", scale.displacement.short("(X_i + s_i)"))
     style.title(right, "with gross slip; dotted: without")
     figure.supxlabel(scale.footnote(), fontsize=TICK)

@@ -66,9 +66,9 @@ def draw_map(
     room   : (n,) [length] radii of discs that must fit into the square; default: those of the discs
         drawn
 
-    If there are `CROWDED` or more discs, a mosaic replaces discs and dots. A pixel has the mean
-    colour of the asperities inside it if there are several, otherwise the colour of the nearest
-    asperity, or none if that is far away. Asperities without a disc are white.
+    If there are `CROWDED` or more discs, a mosaic replaces discs and dots. A pixel with several
+    asperities has their mean colour. Any other pixel has the colour of the nearest asperity, or
+    none if this asperity is far away. Asperities without a disc are white.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, outline = whole > 0, [length.of(axis) for axis in smooth]
@@ -105,12 +105,12 @@ def draw_values(
     most: float | None = None,
     signed: bool = False,
 ) -> ScalarMappable:
-    """Draw discs coloured by `values`, and a named colour bar; return what assigns the colours.
+    """Draw discs coloured by `values`, and a named colour bar; return the map of colours.
 
     values : (n,), one for each contact disc; or (k, n), for k discs of each asperity, the later
         drawn over the earlier
     radii  : (k, n) [length] radii of these discs, the largest first
-    most   : the value at the end of the colours; default: the largest absolute value
+    most   : the value at the end of the colour scale; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
     """
     most = float(np.abs(values).max()) or 1.0 if most is None else most
@@ -175,7 +175,7 @@ def status_layers(
 
 
 def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
-    """Legend entries for each status that occurs, and with `stick` for stick discs."""
+    """Legend entries for each status that occurs and, if `stick`, for stick discs."""
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))

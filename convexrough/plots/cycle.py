@@ -93,11 +93,11 @@ def loops_figure(
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """The figure of loops of the contact, of the contact less an elastic part, and of asperities.
+    """The figure of loops: the contact, the same less its elastic part, and single asperities.
 
     names, meaning : entries and title of the legend for the asperities
-    loops : loops of the cycles, with those of the asperities;  count : number of all cycles, of
-        which `cycles` are drawn
+    loops : loops of the cycles, with those of the asperities;  count : number of all cycles; only
+        `cycles` are drawn
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure, (whole, upright, single) = panels(DOUBLE, 3.0, 1, 3, width_ratios=[1, 1, 1.1])
@@ -117,7 +117,7 @@ def loops_figure(
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     which = f": {len(cycles)} of {count}" if count > len(cycles) else ""
     style.title(whole, f"whole contact{which}")
-    style.title(upright, "less an elastic part")
+    style.title(upright, "less its elastic part")
     _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)
     style.title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
     single.legend(title=meaning, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=TICK,
@@ -232,5 +232,5 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     ratio.plot(q.of(amplitude), rough / smooth, **marks)
     ratio.set(xlim=(0.0, ends))
     style.label(ratio, "amplitude of " + q.short("Q"), "$W\\,/\\,W_\\mathrm{smooth}$")
-    style.title(ratio, f"the same, over the {scale.name}'s")
+    style.title(ratio, f"loss / loss of the {scale.name}")
     return figure

@@ -32,8 +32,8 @@ MOST_FACTORS = 5
 def steady_figures(found: Cycle) -> Figures:
     """The figure of a closed path.
 
-    "steady" : the path in the load plane, with the two lines that fix the point (L*, T*) below
-        which the state never changes, and the status of each asperity in every later cycle
+    "steady" : the path in the load plane, and two lines through the point (L*, T*); below the load
+        L* the memory curve never changes. Also the status of each asperity in every later cycle
 
     >>> P = contact.load
     >>> found = cr.steady(scene, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
@@ -69,7 +69,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
 
 
 def draw_losses(axes: Axes, found: PhaseLosses) -> None:
-    """Draw loss / factor^3. The loss of small cycles grows as factor^3, so their lines coincide."""
+    """Draw loss / factor^3 against phase; for small factors the lines coincide."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
@@ -116,7 +116,7 @@ def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
 
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
-    """Draw a closed path, and the two lines that fix the point (L*, T*)."""
+    """Draw a closed path, and the two lines that cross at the point (L*, T*)."""
     f = found.scene.friction or 1.0
     unit = _plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
@@ -127,7 +127,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
                   ls=DASHED)  # fmt: skip
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
     axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
-    style.title(axes, "dot: $(L^*, T^*)$, never changes")
+    style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
@@ -137,7 +137,7 @@ def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,
                   ls=DASHED)  # fmt: skip
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(style.round_ticks(5))  # the same after layout, which needs them
+        axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
     style.label(
         axes, unit.label("P"), unit.short("T = Q/f" if unit.said and not unit.symbol else "T")
     )

@@ -30,7 +30,7 @@ PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 
 
 class Measure(NamedTuple):
-    """The unit of an axis: `size` divides the values, and the label names this divisor.
+    """The unit of an axis: values are divided by `size`, which the label names.
 
     symbol : formula of the divisor, such as a_H; "" if the axis shows a unit
     said   : this unit; or, if there is a symbol, the value of the divisor
@@ -59,8 +59,8 @@ class Measure(NamedTuple):
 def measure(size: float, unit: str, symbol: str = "") -> Measure:
     """The measure of an axis with values up to `size`.
 
-    A metric `unit` becomes an SI unit with a prefix, and another unit stays. Without a unit, `size`
-    is the divisor, and `symbol` its formula; without a symbol, too, the numbers stay.
+    A metric `unit` becomes an SI unit with a prefix; another unit stays. Without a unit, values are
+    divided by `size`, whose formula is `symbol`; without unit and symbol, values are not divided.
     """
     if known := _metric(unit):
         name, exponent = known
@@ -142,7 +142,7 @@ class Scale:
 
     @cached_property
     def travel(self) -> float:
-        """[length] X0: displacement at gross sliding of a smooth contact; if none, of this one."""
+        """[length] X0: displacement at gross sliding of the smooth contact, if any, or of this."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
         scene = self.contact.scene  # X0 = c_t f times the approach from first touch

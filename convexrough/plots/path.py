@@ -24,8 +24,8 @@ from convexrough.sphere import hertz
 
 MOST_MAPS = 8
 
-#: Largest numbers with added points: of points; of asperities times points; of steps between two
-#: given points.
+#: Limits when points are added: number of points; touching asperities times points; steps between
+#: two given points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
 #: At varying load, points are added to at most this number of segments, because each point needs a
@@ -40,7 +40,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
     "history" : at constant load: shear force Q against displacement X, with numbered steps if there
         are few; and energy lost since the beginning against the step
-    "path" : at varying load: the same, and the points in the plane of P and Q, with the memory
+    "path" : at varying load: the same, and the points in the plane of P and Q / f, with the memory
         curve at some points
     "path_stick_slip" : at varying load: maps of the asperities that stick and that slide, at some
         of the points
@@ -67,7 +67,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
 
 def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
-    """Draw the loop of a path; at varying load, its points in the plane of P and Q."""
+    """Draw the loop of a path; at varying load, its points in the plane of P and Q / f."""
     if path.load_constant:
         draw_loop(axes, path, Scale(path.contact), between(path))
     else:
@@ -144,8 +144,7 @@ def between(path: LoadPath) -> LoadPath:
     """The path with points added between the given ones.
 
     The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
-    path of varying load starts from a pressed contact. Figures call this function only if no such
-    path is passed to them, because it may solve normal problems.
+    path of varying load starts from a pressed contact. The function may solve normal problems.
 
     >>> past = cr.history(contact, forces=0.5 * contact.load * np.array([0.6, -0.2, 0.3]))
     >>> len(cr.plots.between(past).forces)

@@ -23,8 +23,8 @@ def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
     "pressure" : map of the contact discs; and the pressure along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3). If few asperities lie on this line, if asperities are
-        not in rows or if very many touch, the second plot shows the peak pressures of all
+        sphere (Dini & Hills 2009, Fig. 3). If few contact discs cross this line, if asperities are
+        not on a lattice or if very many touch, the second plot shows the peak pressures of all
         asperities against the distance from the centre
     "loads"    : load of each touching asperity against its distance from the centre
 
@@ -56,7 +56,7 @@ def pressure_figure(scale: Scale) -> Figure:
 
 
 def map_and_profile() -> tuple[Figure, tuple[Axes, Axes]]:
-    """A figure with axes for a map, and beside them axes for the same along a line."""
+    """A figure with axes for a map, and beside them axes for a profile."""
     how = {"width_ratios": [1.0, 1.05], "gridspec_kw": {"wspace": 0.08}}
     figure, (chart, profile) = panels(DOUBLE, 3.0, 1, 2, **how)
     chart.set_anchor("E")
@@ -64,7 +64,7 @@ def map_and_profile() -> tuple[Figure, tuple[Axes, Axes]]:
 
 
 def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
-    """Draw a map of contact pressures with a colour bar; return the colours.
+    """Draw a map of contact pressures with a colour bar; return the map of colours.
 
     Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is drawn as a stack of discs in equal
     steps of pressure. If many asperities touch, each is one disc in the colour of its peak
@@ -132,7 +132,7 @@ def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
 
 
 def census(contact: Contact) -> str:
-    """A line that says how many asperities have a load, and how many statuses are not proved."""
+    """A line with the number of asperities that have a load and of statuses that are not proved."""
     text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
     return text + style.not_proved(contact.certificate.scope, contact.status)
 

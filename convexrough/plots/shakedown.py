@@ -66,10 +66,7 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
 
 
 def _onsets(found: Shakedown) -> Array:
-    """(k,) sigma_i / P0 of the asperities whose factor is known, in descending order.
-
-    sigma_i is the load at which asperity i first touches.
-    """
+    """(k,) loads, over P0, at which asperities with a known factor first touch; descending."""
     fall = _fall(found, np.array(1.0), np.array(1.0))
     return np.sort(1.0 - found.factors[np.isfinite(found.factors)] * float(fall))[::-1]
 
@@ -123,5 +120,5 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     style.bar(axes, filled, "asperities that keep sliding, or open")
     across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     style.label(axes, across_label, "shear amplitude / $(fP_0)$")
-    style.title(axes, "hatched: gross sliding\nline: the limit; dot: of this path")
+    style.title(axes, "hatched: gross sliding; line: limit\ndot: this path at its limit")
     return figure

@@ -39,7 +39,7 @@ MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 def slider_html(contact: Contact, proved: Sequence[str]) -> str:
     """The page as text; `proved` are lines that say what is proved of the contact.
 
-    Raises InputError without a load, a sphere or friction.
+    Raises InputError if nothing touches, the body is not a sphere, or friction is not given.
     """
     found = json.dumps(slider_data(contact, proved), separators=(",", ":"))
     template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
@@ -171,7 +171,7 @@ def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str
             "discs."
         )
     if followed < touching:
-        said.append(f"{followed:,} of the touching asperities can be followed.")
+        said.append(f"{followed:,} of the touching asperities can be selected.")
     if forces < next(iter(FORCES.values())):
-        said.append(f"The slider has {forces} forces.")
+        said.append(f"The slider has {forces} positions.")
     return said

@@ -120,7 +120,7 @@ def say_nothing(axes: Axes, why: str = "no contact") -> None:
 
 
 def not_proved(scope: str, status: Any) -> str:
-    """A text in brackets that says what is not proved about a state; "" if all is proved."""
+    """A text in brackets on what is not proved about a state; "" if all is proved."""
     if scope == "none":
         return " (not proved)"
     unsure = int((status == "undecided").sum())
@@ -185,7 +185,7 @@ def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None
     middle = [np.median(y[column == each]) for each in filled]
     axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=label)
     axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
-              label="their median")  # fmt: skip
+              label="median")  # fmt: skip
 
 
 def towards_rim() -> Array:

@@ -118,7 +118,9 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """The figure of contacts, crowding and model error against pruning; shaded if unreliable.
+    """The figure of contacts, crowding and model error against pruning.
+
+    Prunings below the advised one are shaded.
 
     chosen : the pruning that a dotted line marks;  unit : of the map's lengths, "" if unknown
 
@@ -183,7 +185,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         contacts = f"contacts ({np.count_nonzero(contact.loads):,})"
         handles = [style.disc_handle(UNSURE, contacts)]
         if Scale(contact).axes:
-            line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="contact if smooth")
+            line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="smooth contact")
             handles.append(line)
         positions = positions[np.abs(positions).max(axis=1) <= edge]
         if len(positions) < len(summits):

@@ -65,8 +65,8 @@ def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, sym
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     """The map of derivatives with respect to heights.
 
-    "gradient" : contact discs, coloured by (D0 / J) dJ / dz, with the approach D0, the
-        differentiated number J and the height z of the asperity; open asperities are dots
+    "gradient" : contact discs, coloured by (D0 / J) dJ / dz, where D0 is the approach, J the
+        differentiated number, and z the height of the asperity; open asperities are dots
     of : symbol of J, as a formula
 
     >>> print(*cr.plots.gradient_figures(contact.gradient(load=1.0), of="P"))

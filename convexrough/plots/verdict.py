@@ -14,14 +14,14 @@ from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
 
-#: The indices of at most this many suspects are written, of the likeliest ones.
+#: The indices of at most this many suspects, the likeliest, are written.
 NUMBERED = 5
 
 #: Grey shade of each status.
 SHADES = {"open": "0.93", "contact": "0.72", "partial": "0.72", "sliding": "0.45"}
 NAMES = {"partial": "partial slip"}
 
-#: Marks of wrong claims: they differ in shape for print without colours.
+#: Marks of wrong claims, different in shape for print without colours.
 MARKS = ["o", "X"]
 
 

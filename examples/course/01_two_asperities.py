@@ -2,9 +2,9 @@ r"""
 1. Two asperities by hand
 =========================
 
-**Claim.** Four systems of equations decide which of two asperities touch; exactly one of them has
-an admissible solution. This solution is also the minimum of an energy over the loads that are not
-negative.
+**Claim.** Which of two asperities touch follows from four systems of equations: exactly one of them
+has an admissible solution. This solution is also the minimum of an energy over the loads that are
+not negative.
 
 A flat stamp is lowered on two asperities, 1 and 2. It prescribes the displacement :math:`D_i` of
 asperity :math:`i` if the asperity touches. The displacement :math:`w_i` of an asperity has two
@@ -84,7 +84,7 @@ def allowed(loads: Array, gaps: Array) -> bool:
 CASES: list[tuple[int, ...]] = [(), (0,), (1,), (0, 1)]
 for case in CASES:
     loads, gaps = solve_case(case, D)
-    label = "allowed" if allowed(loads, gaps) else ""
+    label = "admissible" if allowed(loads, gaps) else ""
     print(f"touching {[i + 1 for i in case]!s:7} loads {loads}  gaps {gaps}  {label}")
 
 answers = [solve_case(case, D)[0] for case in CASES if allowed(*solve_case(case, D))]
@@ -173,10 +173,10 @@ assert np.allclose(found.x, answer, atol=1e-6)
 # touch with :math:`P_1 = P_2 = 1 / (1 + A) = 0.4`. The energy is a saddle: along
 # :math:`P_1 + P_2 = \text{const}` it is highest in the middle, so the state in which both touch is
 # not even a local minimum. Beyond :math:`A = 1` the energy is not convex and the solution is not
-# unique. The shell lemma of lesson 3 tells how close real asperities may be.
+# unique. The shell lemma of lesson 3 shows how large contact radii may be for given distances.
 
 closer = np.array([[1.0, 1.5], [1.5, 1.0]])
 crowded = [case for case in CASES if allowed(*solve_case(case, np.ones(2), closer))]
-print("allowed:", crowded)
+print("admissible:", crowded)
 assert crowded == [(0,), (1,), (0, 1)]
 assert np.allclose(solve_case((0, 1), np.ones(2), closer)[0], 0.4)

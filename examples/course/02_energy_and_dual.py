@@ -8,9 +8,8 @@ the error of the loads. The status that a solver reports does not.
 
 Seven Hertzian tips stand on short elastic stems. The load :math:`P_i` compresses tip :math:`i` by
 :math:`k P_i^{2/3}`. Stems and substrate move by :math:`(M P)_i` with a symmetric, positive
-definite matrix :math:`M`. (The stems are the diagonal of :math:`M`; lesson 3
-treats asperities without stems.) If the tips must take up the displacements :math:`D_i`, the loads
-minimise
+definite matrix :math:`M`. (The compliance of the stems is the diagonal of :math:`M`; lesson 3
+treats asperities without stems.) If displacements :math:`D_i` are prescribed, the loads minimise
 
 .. math:: \Phi(P) = \sum_i \tfrac 3 5 k P_i^{5/3} + \tfrac 1 2 P^\top M P - D^\top P,
           \qquad P \ge 0,
@@ -67,18 +66,18 @@ assert abs((k * np.maximum(poor, 0) ** (2 / 3) + M @ poor)[0] / D[0] - 1) > 1
 
 # %%
 # The solver stops when its residuals are below :math:`10^{-8}`. The exact loads are smaller than
-# that, so the solver accepts values that are far too large. It did what it promises, but its
-# tolerance does not fit the size of these numbers.
+# this tolerance, so the solver accepts values that are far too large. It did what it promises, but
+# the tolerance does not fit the size of these numbers.
 #
 # The repair: a bound from the loads alone
 # ----------------------------------------
 #
-# For any trial loads :math:`p`, a square is not negative: :math:`(x - p)^\top M (x - p) \ge 0`, so
-# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Insert this into the energy.
-# The remaining minimum separates into one problem per tip, with :math:`\lambda = (D - M p)_i`, and
-# each has a closed form: :math:`\tfrac 3 5 k x^{5/3} - \lambda x` is smallest at
-# :math:`x = (\lambda / k)^{3/2}`, with the value :math:`-\tfrac 2 5 \lambda^{5/2} k^{-3/2}`, or 0
-# if :math:`\lambda < 0`. So
+# Let :math:`p` be trial loads. For any loads :math:`x`, :math:`(x - p)^\top M (x - p) \ge 0`, so
+# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. With this bound in place of
+# the quadratic term, the energy of :math:`x` is a sum of one term per tip,
+# :math:`\tfrac 3 5 k x_i^{5/3} - \lambda x_i` with :math:`\lambda = (D - M p)_i`, and a constant. A
+# term is smallest at :math:`x_i = (\lambda / k)^{3/2}`, where it is
+# :math:`-\tfrac 2 5 \lambda^{5/2} k^{-3/2}`; if :math:`\lambda < 0`, its minimum is 0. So
 #
 # .. math:: \min \Phi \; \ge \; - \tfrac 1 2 p^\top M p
 #           - \tfrac 2 5 \sum_i k^{-3/2} \max(D - M p, 0)_i^{5/2} \quad \text{for every } p.

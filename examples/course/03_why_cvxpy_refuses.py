@@ -72,8 +72,8 @@ assert abs(eigenvalues.sum()) < 1e-10
 
 # %%
 # The function ``psd_wrap`` turns the check off: with it the user asserts that the matrix is
-# positive semidefinite. This assertion is false, and for crowded asperities the solution is wrong,
-# too. An example with two asperities whose discs overlap:
+# positive semidefinite. This assertion is false, and for crowded asperities the solver's result is
+# wrong, too. An example with two asperities whose discs overlap:
 
 crowded = cp.quad_form(P[:2], cp.psd_wrap(np.array([[0.0, 2.0], [2.0, 0.0]]))) / 2
 hertz = 0.6 * cp.sum(cp.power(P[:2], 5 / 3))
@@ -92,8 +92,8 @@ assert lying.value > better + 0.1
 # Give each point force a spherical shell of radius :math:`s_i`, such that no two shells overlap,
 # and spread the force evenly over it, as if it were electric charge. By Newton's theorem two
 # shells act on each other as two points do, with energy :math:`P_i P_j / r_{ij}`. Each shell also
-# has an energy of its own, :math:`P_i^2 / (2 s_i)`. The energy of any charge distribution is not
-# negative. Hence
+# has an energy of its own, :math:`P_i^2 / (2 s_i)`. The total energy of charges is never negative.
+# Hence
 #
 # .. math:: M = A + \operatorname{diag}\Big(\frac{1}{\pi E^* s_i}\Big)
 #           \; \text{ is positive semidefinite if } s_i + s_j \le r_{ij} .
@@ -145,9 +145,9 @@ plt.show()
 # -------------
 #
 # The quadratic part is convex now, and each local part
-# :math:`\tfrac 3 5 k P^{5/3} - \tfrac{1}{2 \pi E^* s} P^2` is convex on its range. But the rules
-# judge each term from the form in which it is written, and this term is a difference of two convex
-# functions.
+# :math:`\tfrac 3 5 k P^{5/3} - \tfrac{1}{2 \pi E^* s} P^2` is convex for contact radii up to
+# :math:`\tfrac \pi 2 s`. But CVXPY judges each term by rules from the form in which it is written,
+# and the local part is a difference of two convex functions.
 
 sigma = force / length / (np.pi * s)
 local = 0.6 * k @ cp.power(P, 5 / 3) - sigma / 2 * cp.sum_squares(P)
@@ -156,7 +156,7 @@ print("accepted by the rules:", split.is_dcp())
 assert not split.is_dcp()
 
 # %%
-# Lesson 5 writes this term in a form that the rules accept.
+# Lesson 5 writes the local part in a form that the rules accept.
 #
 # An independent check
 # --------------------

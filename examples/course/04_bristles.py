@@ -3,8 +3,8 @@ r"""
 ==================================================
 
 **Claim.** Hertz's law, with its power of 3/2, follows from a quadratic program: a row of
-independent linear springs that can only push. Each spring obeys its own complementarity condition,
-and the program converges at second order in the number of springs.
+independent linear springs that can only push. Each spring obeys its own complementarity condition.
+The load converges at second order in the number of springs.
 
 A sphere of radius :math:`R` (the relative radius of both surfaces) is pressed by an approach
 :math:`\delta` and carries the load :math:`P = \tfrac 4 3 E^* \sqrt R \, \delta^{3/2}`. Take
@@ -53,10 +53,10 @@ assert refused
 # The repair: bristles
 # --------------------
 #
-# Place springs side by side on a line through the centre. Each has the width :math:`\Delta x` and
-# the stiffness :math:`E^* \Delta x`. The sphere is replaced by the profile :math:`x^2 / R`, *twice*
-# that of the sphere. With this profile the row carries the same load as the half-space (method of
-# dimensionality reduction). With forces :math:`f_j \ge 0`
+# Place springs, the *bristles*, side by side on a line through the centre. Each has the width
+# :math:`\Delta x` and the stiffness :math:`E^* \Delta x`. The sphere is replaced by the profile
+# :math:`x^2 / R`, *twice* that of the sphere. With this profile the row carries the same load as
+# the half-space (method of dimensionality reduction). The forces :math:`f_j` of the bristles
 #
 # .. math:: \text{minimise } \sum_j \frac{f_j^2}{2 E^* \Delta x} + \frac{x_j^2}{R} f_j - \delta f_j,
 #           \qquad f \ge 0 .
@@ -123,7 +123,7 @@ left.bar(x / a, f / f.max(), width=2.8 / 64, color="0.75", edgecolor="0.3", labe
 fine = np.linspace(-1, 1, 101)
 left.plot(fine, 1 - fine**2, "k-", label="$\\delta - x^2 / R$")
 left.plot(fine, np.sqrt(1 - fine**2), "k--", label="Hertz pressure / $p_0$")
-left.set(xlabel="$x / a$ [1]", ylabel="force / largest [1]")
+left.set(xlabel="$x / a$ [1]", ylabel="force / largest force [1]")
 left.legend(loc="lower center")
 right.loglog(counts, errors, "ko", label="error of the load")
 right.loglog(counts, errors[0] * (counts[0] / counts) ** 2.0, "k-", lw=0.8, label="second order")
@@ -162,8 +162,8 @@ print(f"energy / (delta P) = {energy / (delta * f.sum()):.6f}")
 assert abs(energy / (delta * f.sum()) + 0.4) < 1e-4
 
 # %%
-# The package has the same program for any number of asperities. Each asperity has its own bristles,
-# and the total loads of the asperities interact.
+# The package solves the same program for any number of asperities. Each asperity has its own
+# bristles; the asperities interact through their total loads.
 
 material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)

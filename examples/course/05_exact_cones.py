@@ -45,8 +45,8 @@ assert refused
 # %%
 # The usual remedy is a *lift*: introduce variables :math:`y_3, y_5, y_6` for
 # :math:`t^3, t^5, t^6`, and require only convex relations between them. Here the term with the
-# minus sign prevents this: the minimum makes :math:`y_6` as large as it can, and the only convex
-# upper bound is :math:`y_6 \le y_5`.
+# minus sign prevents this: the minimum makes :math:`y_6` as large as it can, and a convex upper
+# bound such as :math:`y_6 \le y_5` is too weak.
 
 y3, y5, y6 = (cp.Variable(nonneg=True) for _ in range(3))
 slope = 0.3  # stands for the approach: minimise h - slope * load
@@ -57,7 +57,7 @@ loose = cp.Problem(
 loose.solve(solver=cp.CLARABEL)
 radii = np.linspace(0, 1, 100001)
 true_least = float((0.6 * radii**5 - S / 3 * radii**6 - slope * radii**3).min())
-print(f"least energy {true_least:.6f}, this relaxation says {loose.value:.6f}")
+print(f"least energy {true_least:.6f}, by this relaxation {loose.value:.6f}")
 assert loose.value < true_least - 0.005
 
 # %%
@@ -171,9 +171,9 @@ assert all(value == 0 for value in checked)
 # :math:`e = \tfrac 5 3 (\tfrac{21}{25} - S)` at 1. So four cones are exact up to :math:`S = 21/25`;
 # contacts whose discs do not overlap have :math:`S \le 2/\pi = 0.64`.
 #
-# The program of a whole scene has these cones for every asperity, and one quadratic form. It finds
-# the 37 contacts of Dini and Hills (2009), and Newton's method, which uses no cones, finds the
-# same loads.
+# The program of a whole scene has these cones for every asperity, and one quadratic form. For the
+# scene of Dini and Hills (2009) it finds the 37 asperities that touch. Newton's method, which uses
+# no cones, finds the same loads.
 
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
 scene = cr.Scene(
@@ -190,8 +190,8 @@ assert (by_newton.status == "contact").sum() == 37
 # Exercise
 # --------
 #
-# What happens with four cones beyond :math:`S = 21/25`? Take :math:`S = 0.97` and the slope
-# :math:`\lambda` for which the energy has its minimum at :math:`t = 0.9`.
+# What happens with four cones beyond :math:`S = 21/25`? Take :math:`S = 0.97`, and the slope (the
+# argument of ``lifted``) for which the energy has its minimum at :math:`t = 0.9`.
 #
 # *Answer.* The minimum of the cone program is below that of the energy: one weight of the identity
 # is negative, and values :math:`y_2, \dots, y_5, z` that are not powers of one number have less

@@ -101,8 +101,8 @@ assert period > 1
 # Why? The loads on the other asperities lower one asperity so far that it only just touches. Alone
 # it would carry far more, and the loop starts from this larger load. From there Newton's method for
 # :math:`x^{2/3}`, which is concave, overshoots zero. The asperity is dropped; then it penetrates
-# and is added with the same large load, and so on for ever. The loop decides by the signs of the
-# loads and gaps at an intermediate point, not by those at the solution.
+# and is added with the same large load, and so on for ever. The loop decides by the signs of loads
+# and gaps before they have converged.
 #
 # The repair: the normal map
 # --------------------------
@@ -113,9 +113,9 @@ assert period > 1
 #
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
-# It is once differentiable, so Newton's method applies, and the signs of the solution give the
-# active set. A step that does not make the residual smaller is halved. If the energy is
-# convex (lesson 3), the linear system of a step always has a solution.
+# :math:`F` is once differentiable, so Newton's method applies. The signs of the solution give the
+# active set. A step that does not make the residual smaller is halved. If the energy is convex
+# (lesson 3), the linear system of a step always has a solution.
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:
@@ -165,8 +165,8 @@ plt.show()
 # -------------------------------------
 #
 # ``certify`` takes loads from any source and bounds their distance from the exact solution. Here it
-# proves the same statuses from both results. But its bound on the error of the loop's loads is
-# nearly a third of the largest load; its bound for the normal map is as small as rounding errors.
+# proves the same statuses from the results of both methods. But the error bound of the loop's loads
+# is nearly a third of the largest load; that of the normal map is as small as rounding errors.
 
 force = contact.loads.max() / ((np.maximum(delta, 0) / k) ** 1.5).max()
 by_map = force * (np.maximum(delta, 0) / k) ** 1.5
@@ -184,7 +184,7 @@ assert bad.load_error > 0.01 * contact.loads.max()
 assert (abs(force * loads - contact.loads) <= bad.load_errors).all()
 
 # %%
-# The bound is close to the true error. The largest error, as a fraction of the largest load, is
+# The bound is close to the true error of the loop's loads, which is, over the largest load,
 
 off = abs(force * loads - contact.loads).max() / contact.loads.max()
 print(f"{off:.3f}")
@@ -199,7 +199,7 @@ for _ in range(DRAWN):
     values = law(random_scene(rng), APPROACH)
     ended += len(guessing_loop(*values)[1]) < 200
     reached += normal_map(*values)[1] < 50
-print(f"of {DRAWN} scenes the loop ends on {ended}, the normal map on {reached}")
+print(f"of {DRAWN} scenes the loop solves {ended}, the normal map {reached}")
 assert ended < DRAWN == reached
 
 # %%

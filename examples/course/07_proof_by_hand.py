@@ -64,7 +64,7 @@ for x, y in solved[:3]:
 # None of them is exact. The solution is irrational, so no fraction satisfies the equations
 # exactly. An *inequality* can be checked in fractions.
 #
-# The repair, line by line
+# The repair, step by step
 # ------------------------
 #
 # **1. Trial values**, from any source. Three digits are enough.
@@ -136,9 +136,9 @@ for i in range(2):
     assert proved
 
 # %%
-# This is a proof. Every line can be repeated with pencil and paper. The picture shows for all
-# trial values how large the bound on the error is, and for which of them the certificate still
-# proves that both asperities touch.
+# This is a proof. Every step can be repeated with pencil and paper. The picture shows how large the
+# bound on the distance is for other trial values, and for which of them steps 1 to 8 still prove
+# that both asperities touch.
 
 x, y = np.meshgrid(np.linspace(0.7, 1.1, 161), np.linspace(0.4, 0.9, 161))
 h1, h2 = float(h[0]), float(h[1])
@@ -162,8 +162,8 @@ plt.show()
 # --------------------
 #
 # First, bisection in fractions finds 50 digits of the solution, and the true error is compared
-# with the bound. Second, the package computes the same bound in floating-point numbers and
-# includes their rounding.
+# with the bound. Second, the package computes a similar bound in floating-point numbers, rounding
+# included.
 
 low, high = Fraction(0), b[0]  # a_1: the second equation gives a_2^2, the first judges
 for _ in range(170):
@@ -201,8 +201,8 @@ assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.
 #
 # *Answer.* Its trial load is 0 and its gap
 # :math:`g_3 = \tfrac 1 4 P_1 + \tfrac 1 5 P_2 - \tfrac 1 5` is positive, so :math:`e_3 = 0`. The
-# box has :math:`b_3 = \tfrac{9}{20}`. In line 5 replace :math:`A` by the sum of row :math:`i` of
-# the matrix. The error of the gap is at most the distance times
+# box has :math:`b_3 = \tfrac{9}{20}`. In step 5 replace :math:`A` by the sum of row :math:`i` of
+# the matrix. The error of the gap is at most the distance in step 7 times
 # :math:`(\tfrac 1 {16 h_1} + \tfrac 1 {25 h_2})^{1/2}`.
 
 h3 = 2 / (3 * Fraction(9, 20))

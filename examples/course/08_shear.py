@@ -7,9 +7,9 @@ shear force on every asperity is the coefficient of friction :math:`f` times the
 lose if the total load were reduced by :math:`Q / f`. The asperities that would lose contact are
 those that slide. So a solver for normal contact also solves shear.
 
-This is Ciavarella and Jäger's theorem. It holds if a tangential force displaces the surface as a
-normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`, and if no indentation
-falls as the load rises.
+This is Ciavarella and Jäger's theorem. It has two conditions: a tangential force displaces the
+surface as a normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`, and no
+indentation falls as the load rises.
 """
 
 # %%
@@ -65,8 +65,8 @@ assert shares.max() > 1.2 * shares.min()
 
 # %%
 # All asperities connect the same two bodies, so all must have the same displacement, not 37
-# different ones. The neighbours displace the inner asperities as well, so the assumption gives
-# these too much force, and the outer ones too little. The assumption also gives a result beyond the
+# different ones. Inner asperities are displaced more by their neighbours, so the assumption gives
+# them too much force, and the outer ones too little. The assumption also gives a result beyond the
 # limit of friction, where no equilibrium exists:
 
 try:
@@ -88,7 +88,8 @@ assert refused
 # The reason: for an asperity that touches in both pressings, subtract its contact law at the total
 # load :math:`L` from that at :math:`P`. Its own compression gives
 # :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over :math:`c_t f`; the
-# coupling is :math:`A (P - p)`; the right side is the difference of approaches, the same for all.
+# interaction gives :math:`A (P - p)`; the right side is the difference of the approaches, the same
+# for all asperities.
 # An asperity that is open in the second pressing has :math:`p_i = 0`, so :math:`Q_i = f P_i`. It
 # slides, and its slip is :math:`c_t f` times its gap.
 

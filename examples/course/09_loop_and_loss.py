@@ -4,8 +4,8 @@ r"""
 
 **Claim.** Shear a contact back and forth at constant normal load. The energy that a cycle
 dissipates follows from the curve of approach against load (the *indentation curve*), without any
-shear: it is :math:`8 c_t f^2` times the area between this curve and its chord. And a contact
-remembers only the turning points of the force.
+shear: it is :math:`8 c_t f^2` times the area between this curve and its chord, with :math:`c_t` and
+:math:`f` of lesson 8. A contact remembers only the turning points of the force.
 """
 
 # %%
@@ -18,8 +18,8 @@ remembers only the turning points of the force.
 #
 # .. math:: W = 8 c_t f^2 \Big\{ V(P) - V(L) - (P - L) \frac{D_0(P) + D_0(L)}{2} \Big\} .
 #
-# This takes two pressings. The block compares it with the sum over asperities that ``cycle``
-# reports.
+# This takes two pressings. The code below compares :math:`W` with the sum of the losses of the
+# asperities, which ``cycle`` computes.
 
 from itertools import pairwise
 
@@ -142,7 +142,7 @@ for low, high in pairwise(ends):
 first = cr.press(scene, load=0.2 * pressed.load).approach
 sliver = pressed.load * (area - 0.8 * (first + pressed.approach) / 2)
 by_sliver = 8 * ratio * FRICTION**2 * sliver
-print(f"loss {half.loss:.9e}, area under the curve {by_sliver:.9e}, polygon {loop.area:.9e}")
+print(f"loss {half.loss:.9e}, from the grey area {by_sliver:.9e}, polygon {loop.area:.9e}")
 assert abs(by_sliver / half.loss - 1) < 1e-6
 assert 0 < half.loss - loop.area < 1e-3 * half.loss
 
@@ -151,9 +151,9 @@ assert 0 < half.loss - loop.area < 1e-3 * half.loss
 # ------
 #
 # The displacement is not a function of the force: at :math:`Q / (f P) = 0.3` it differs between the
-# way up and the way down. The state depends on the past through the turning points only, and a
-# small loop that closes removes its own two. After the detour to 0.4 and back the path continues as
-# if there had been no detour.
+# way up and the way down. The state depends on the past through the turning points only, and when a
+# small loop closes, its two turning points have no further effect. After the detour from -0.1 to
+# 0.4 and back, the path continues as if there had been no detour.
 
 plain = cr.history(pressed, forces=np.array([0.3, 0.7, 0.3, -0.5, 0.7]) * limit)
 nested = cr.history(pressed, forces=np.array([0.7, -0.1, 0.4, -0.1, -0.5, 0.7]) * limit)

@@ -62,7 +62,7 @@ assert naive(2) < 0.8 * path.displacements[2]
 # naive form a larger load at constant :math:`Q` would move the bodies *back*. In fact new
 # contact forms around the old one, it carries no shear at first, and nothing moves. (At point 4
 # the naive form is right again: so much slips during unloading that the contact forgets the third
-# point. A rule should give this, too.)
+# point. The rules below give this result, too.)
 
 assert path.displacements[2] == path.displacements[1]
 
@@ -83,9 +83,9 @@ assert path.displacements[2] == path.displacements[1]
 #    through the new point. Below the level :math:`L` where it meets the curve, the curve remains;
 #    above, the line replaces it.
 #
-# The following function does this in fractions. (It omits one case: a falling path that meets the
-# old curve again. There the contact forgets everything above, and the rest of the piece starts
-# anew.)
+# The following function applies the rules in fractions. (It omits one case: a falling path that
+# meets the old curve again. Then the part of the curve above this point is removed, and the rules
+# apply anew to the rest of the piece.)
 
 Curve = list[tuple[Fraction, Fraction]]
 
@@ -123,8 +123,8 @@ for p, t in corners:
 # The picture
 # -----------
 #
-# The picture shows each step: the path in grey, the curve in black, the line of rule 3 dashed; a
-# dot marks the front :math:`L`, down to which the contact slipped. In the last step the contact
+# The picture shows each step: the path in grey, the curve in black, the line of rule 3 dashed. A
+# circle marks the front :math:`L`: all layers above it have slipped. In the last step the contact
 # slips although :math:`Q` is constant, because the limit of friction falls with the load.
 
 figure, places = plt.subplots(
@@ -140,7 +140,7 @@ for k, axes in enumerate(places.flat):
     if (front := path.curves[k].front) is not None:
         L = float(front) / whole
         reach = np.array([0.0, s[-1]])
-        axes.plot(reach, h[-1] - (s[-1] - reach), "k--", lw=0.7, label="ruler")
+        axes.plot(reach, h[-1] - (s[-1] - reach), "k--", lw=0.7, label="line of rule 3")
         axes.plot([L], [h[-1] - (s[-1] - L)], "o", mfc="white", mec="k", label="front")
     axes.set(title=f"point {k + 1}", aspect="equal")
     axes.set(xlim=(0, 1.05), ylim=(-0.5, 0.8))
@@ -161,10 +161,9 @@ plt.show()
 # derivative by :math:`c_t f\, \theta`, where :math:`c_t` is the ratio of tangential to normal
 # compliance, and integrate over :math:`s`: the result is the balance of tangential displacements.
 # So every curve is an equilibrium, for any shapes, heights and elasticity. It also respects
-# friction, :math:`|q_b| \le f N_b`, because no slope exceeds 45 degrees. The bristles that slip
-# determine the curve: they are those that come into contact above :math:`L`. The level :math:`L`
-# follows from the total shear force alone, because the forces :math:`N_b` add up to :math:`P` on
-# any scene.
+# friction, :math:`|q_b| \le f N_b`, because no slope exceeds 45 degrees. Slip determines the curve:
+# the bristles that come into contact above :math:`L` slip. The level :math:`L` follows from the
+# total shear force alone, because the forces :math:`N_b` add up to the total load in any scene.
 #
 # The elastic problem is solved once per corner :math:`s_k`, as a normal contact with loads
 # :math:`P_i(s_k)` and approach :math:`D_0(s_k)`. With the change :math:`c_k` of slope at the
@@ -255,7 +254,7 @@ heavy = cr.press(shaded, approach=1.4).load
 loads = [cr.press(shaded, load=part * heavy).loads[0] for part in (0.6, 0.8, 1.0)]
 failing = cr.load_path(shaded, loads=[0.8 * heavy, heavy], forces=[0.0, 0.2 * heavy])
 print("load of the shaded summit:", ", ".join(f"{load:.2e}" for load in loads))
-print(f"order: here {path.order}; there {failing.order}")
+print(f"order: of the array {path.order}; with the shaded summit {failing.order}")
 assert loads[2] < loads[1]
 assert (path.order, failing.order) == ("proved", "fails")
 assert np.isinf(failing.displacement_errors).all()  # general steps instead, and nothing is proved

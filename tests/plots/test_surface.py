@@ -34,7 +34,7 @@ def test_figures_fit(load: float) -> None:
     (dots,) = chart.lines
     shown, count = len(dots.get_xdata()), f"{len(summits):,}"
     some = count if shown == len(summits) else f"{shown:,} of {count}"
-    named = {f"summits ({some})", f"contacts ({touching:,})", "contact if smooth"}
+    named = {f"summits ({some})", f"contacts ({touching:,})", "smooth contact"}
     assert named <= said(figures["map"])
     pairs, _ = cr.surface.crowded(contact)
     named = {f"{i}, {j}" for i, j in pairs[:1]}
