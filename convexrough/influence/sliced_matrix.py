@@ -31,15 +31,14 @@ MOST_BITS = 30
 #: Largest number of rows of a cached matrix. The slices of such a matrix take 0.4 GB.
 KEPT = 4096
 
-#: For a part of the asperities, the matrix of all asperities is computed, because other parts may
-#: be needed later, if it has at most this many rows or at most twice as many as the part.
+#: The matrix of a part of the asperities is cut from that of all asperities, which other parts may
+#: use later, if all are at most SMALL or at most twice as many as the part.
 SMALL = 128
 
-#: Number of entries that are computed together. Such arrays of 64 KB fit in the cache, and the
-#: allocator reuses them without returning them to the system.
+#: Number of entries that are computed together: arrays of 64 KB, which fit in the cache.
 PIECE = 2**13
 
-#: Number of rows that are computed together at least: with fewer, calls take longer than numbers.
+#: Least number of rows that are computed together; with fewer, calls take most of the time.
 ROWS = 32
 
 #: Limit on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
