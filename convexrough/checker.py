@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 
 FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
-MOST_INVERTED = 600  # largest number of touching asperities for which the proof of order inverts
+MOST_INVERTED = 600  # most touching asperities for which order is proved with an inverse
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
@@ -453,7 +453,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
     weights = [math.ceil(2 * a * scene.grid) for a in radii]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
-    rows: dict[int, list[int]] = {}  # rows of A C (11) times ONE, too small by less than `rounding`
+    rows: dict[int, list[int]] = {}  # rows of F (11) times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
     able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
     for i, apart in distances(scene, able, near, tell):

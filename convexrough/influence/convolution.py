@@ -172,7 +172,7 @@ class SiteBox:
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
         """Yield blocks of the rows `taken` of the padded box.
 
-        A block is a slice of these rows (from the first one taken), a slice of columns, and the
+        A block is a slice of these rows, counted from the first, a slice of columns, and the
         differences i and j of sites that belong to these rows and columns.
         """
         (rows, columns), (height, width) = self.shape, self.padded
@@ -245,7 +245,7 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one
+    fields : (rows, columns) each, read one by one and padded with zeros before the transform
     """
     from scipy import fft
 

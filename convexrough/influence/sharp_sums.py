@@ -189,7 +189,7 @@ def _applied(upper: Any, loads: Array) -> Array:
 
 
 def _sizes(product: Product, strengths: Array) -> tuple[Array, Array]:
-    """(n,) bounds on the sums over j of |S_ij| s_j, and of s_j for near pairs, with strengths s."""
+    """(n,) bounds on the sums of |S_ij| s_j over j, and of s_j over near j, for strengths s."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)

@@ -52,8 +52,8 @@ class SlicedMatrix:
     slices : (m, n) the three parts
     blocks : the columns of each block, and the number of bits of first slices of its loads
     exponent : the matrix is that of points divided by 2^exponent, so that their extent is about 1
-    losses : (3 blocks, m) three factors for each block: of the largest load in the block, of the
-        largest rest of a load after two slices, and of the largest rest after one slice. The sum of
+    losses : (3 blocks, m) three factors for each block, to be multiplied by its largest load, its
+        largest rest of a load after two slices, and its largest rest after one slice. The sum of
         these products over all blocks bounds the error of a product with loads
     """
 
@@ -177,7 +177,7 @@ class MatrixSums:
 
     @cached_property
     def _matrix(self) -> SlicedMatrix:
-        """The matrix, taken from that of more points if this one is cached or small enough."""
+        """The matrix, cut from that of `part_of` if the latter is cached or small enough."""
         if self.part_of is not None:
             whole, which = self.part_of
             few = len(whole.points.high) <= min(KEPT, max(SMALL, 2 * len(which)))

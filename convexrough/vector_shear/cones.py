@@ -163,9 +163,7 @@ class FrictionProgram:
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
-        """Minimise (1/2) q'(B + shift) q plus the local energies less the shift, subject to the
-        prescribed total and the cones.
-        """
+        """The program in standard form: the objective, the prescribed total and all cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
