@@ -1,7 +1,7 @@
 """Check a proof of which asperities touch, and which slide: python checker.py proof.json
 
 This file needs only the standard library and trusts no claim of the proof. Asperity i of a scene
-with n asperities has the contact radius a_i, which is 0 where the asperity is open, and the load
+has the contact radius a_i, which is 0 where the asperity is open, and carries the load
 P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the curvature of the tip
 plus the mean curvature of the *base*, which is the sphere, or a flat, cylinder or ellipsoid in its
 place. With the distances r_ij between contact points, the contact law is
@@ -9,8 +9,8 @@ place. With the distances r_ij between contact points, the contact law is
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
 
 where the sum leaves out j = i. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i
-of the asperity. The offset is its height minus the distance, at the asperity, between the base and
-the plane that touches the base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
+of the asperity: its height minus the distance there between the base and the plane that touches the
+base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, which are exact
@@ -36,13 +36,13 @@ from typing import Any, NamedTuple
 
 FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
-MOST_INVERTED = 600  # largest number of touching asperities for which the proof of order inverts
+MOST_INVERTED = 600  # most touching asperities for which order is proved with an inverse
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
 UNIT = 1 << 320  # inverse distances are integers / UNIT, too small by at most the factor SLACK
 SLACK = 1 + Fraction(1, 1 << 96)
-FAR = 1 << 400  # counts as the distance of an asperity from itself: it does not displace itself
+FAR = 1 << 400  # stands for the distance of an asperity from itself, which it does not displace
 ROOT_BITS = 60  # bits of the integer Cholesky factor
 ONE_BITS = 80  # binary places of fixed-point numbers in the proof of order
 ONE = 1 << ONE_BITS
@@ -202,7 +202,7 @@ def digest(scene: Any, prescribed: Any) -> str:
 
 
 class Scene(NamedTuple):
-    """The scene. Points are rounded down to a grid and offsets outwards; all else is exact."""
+    """The scene. Points are rounded down to a grid, offsets to intervals; all else is exact."""
 
     modulus: Fraction  # E*, used only for loads from radii
     ratio: Fraction  # Poisson's ratio
@@ -236,7 +236,7 @@ def read_scene(given: Any) -> Scene:
     if not 0 < len(x) <= MOST_ASPERITIES:
         raise Refused(f"{len(x)} asperities; from 1 to {MOST_ASPERITIES} can be checked in minutes")
     if min(modulus, *tips) <= 0 or friction < 0 or not 0 <= ratio <= Fraction(1, 2):
-        raise Refused("a radius, the modulus, the friction or Poisson's ratio is out of range")
+        raise Refused("a radius, the modulus, friction or Poisson's ratio is out of range")
     if geometry not in ("summit", "closest"):
         raise Unreadable("the geometry is neither summit nor closest")
     drops = [Fraction(0)] * len(x)
@@ -267,7 +267,7 @@ def distances(
         if i in place:
             apart[place[i]] = FAR
         if min(apart, default=FAR) < NEAREST:
-            raise Refused(f"asperity {i} is too near another for their distance to be enclosed")
+            raise Refused(f"asperity {i} is too near another to bound their distance")
         if i % 100 == 0:
             tell(f"asperity {i} of {len(scene.points)}")
         yield i, apart
@@ -298,7 +298,7 @@ def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
 def prove_by_shells(
     scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
 ) -> None:
-    """Prove A + diag(1 / (2 E* radii)) >= 0 by spherical shells whose overlap satisfies (3)."""
+    """Prove A + diag(1 / (2 E* radii)) >= 0 by spherical shells (3), which may overlap."""
     sizes = [math.floor(shells[i] * scene.grid) for i in able]
     if min(sizes, default=1) <= 0:
         raise Refused("a shell is not positive")
@@ -309,7 +309,7 @@ def prove_by_shells(
             if (over := size + other - m + 2) > 0:
                 overlap -= -over * over // (4 * (m - 2))
         if overlap > size * (size * PI.low / (2 * radius * scene.grid) - 1):
-            raise Refused(f"the shell of asperity {i} is too small for its box, or overlaps others")
+            raise Refused(f"the shell of asperity {i} is too small, or overlaps others too much")
 
 
 def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: Tell) -> None:
@@ -334,7 +334,7 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
 class State(NamedTuple):
     """A solution and trial loads, as intervals. Forces and energies are divided by E*."""
 
-    near: list[Interval]  # trial loads: from the given radii, scaled to a prescribed total
+    near: list[Interval]  # trial loads, from the given radii, scaled to a prescribed total
     pushed: list[Interval]  # displacements (A P)_i of the trial loads
     approach: Interval  # D0 of the solution
     depths: list[Interval]  # D_i - (A P)_i of the solution: the indentation, or minus the gap
@@ -344,9 +344,9 @@ class State(NamedTuple):
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """The solution, proved to be in the box.
+    """The solution, proved to be in the box, at the total `load` or, if None, the given approach.
 
-    It is at the total load `load` or, if this is None, at the approach in `place`.
+    place : the entry of the file with radii and approach
     """
     radii, centre = table(place, "radii", "approach")
     n = len(scene.points)
@@ -423,8 +423,8 @@ def push(
 def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
     """The scope: "global" if every solution is proved to be in the box, else "local" (10).
 
-    top : None if the approach is prescribed; else any number. If it does not exceed all (A P)_i of
-        the trial loads, the scope is "local"
+    top : None if the approach is prescribed; else the ceiling of the file. If it does not exceed
+        all (A P)_i of the trial loads, the scope is "local"
     """
     ceiling = state.approach  # an upper bound on D0 of every solution
     if top is not None:
@@ -443,18 +443,17 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 
 
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
-    """An amount by which D0 can decrease from this state while no indentation increases (11).
+    """A decrease of D0 from this state over which order is proved (11); 0 if none is.
 
     The rate of an asperity is the derivative of its indentation with respect to D0. `missed` holds
-    a lower bound on each rate, times -ONE. It must be negative for all asperities that may touch;
-    otherwise the amount is 0. For an open asperity it may be positive; then the amount is so small
-    that the gap stays open.
+    a lower bound on each rate, times -ONE. It must be negative for all asperities that may touch.
+    For an open asperity it may be positive if the decrease is so small that the gap stays open.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     radii = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
     weights = [math.ceil(2 * a * scene.grid) for a in radii]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
-    rows: dict[int, list[int]] = {}  # rows of A C (11) times ONE, too small by less than `rounding`
+    rows: dict[int, list[int]] = {}  # rows of F (11) times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
     able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
     for i, apart in distances(scene, able, near, tell):
@@ -518,14 +517,14 @@ def prove_shear(
         raise Refused("a shear force or the coefficient of friction is not positive")
     fall = number(force, "force") / unit
     if (pressed.total - fall).low <= 0:
-        raise Refused("a shear force is not proved to be below what friction can carry")
+        raise Refused("a shear force is not proved to be below the friction limit")
     held = prove_state(scene, box, place, pressed.total - fall, tell)
     drop, mean = pressed.approach - held.approach, pressed.approach + held.approach
     in_order, travel = drop.high < ordered, f * (2 - scene.ratio) / (2 * (1 - scene.ratio))
     statuses, slips = list[str](), list[Interval]()
     for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
         if not in_order and after.high > 0 and held.loads[i].high > pressed.loads[i].low:
-            raise Refused(f"asperity {i} may be dragged along by others: no theorem covers this")
+            raise Refused(f"asperity {i} may be dragged along: under less load it may carry more")
         touches, slip = status(at, "contact", "open"), gap_of(after) * travel
         statuses.append(status(after, "partial", "sliding") if touches == "contact" else touches)
         slips.append(Interval(slip.low if at.low > 0 else 0, slip.high if at.high > 0 else 0))

@@ -1,10 +1,9 @@
 """`prove`: proofs of contacts and friction states, for `convexrough.checker` or another checker.
 
 docs/theory/proof-file.md describes the files. A proof needs an argument why the energy is convex on
-a box of loads. `TrialState` computes possible arguments in floating point. They may be wrong, so
-the checker verifies them in exact arithmetic, one after another, until it accepts one.
-docs/theory/proof-file-steps.md defines the box and, in (2) and (3), the convexity number theta and
-the shells.
+a box of contact radii. `TrialState` computes possible arguments in floating point. They may be
+wrong, so the checker verifies one after another in exact arithmetic, until it accepts one.
+docs/theory/proof-file-steps.md defines box, convexity number theta (2) and shells (3).
 """
 
 from __future__ import annotations
@@ -36,9 +35,9 @@ from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Two numbers for boxes that contain every solution: the relative distance of their upper ends from
-#: bounds on the radii, and the smallest upper end divided by the largest. The first pair of numbers
-#: is for accurate radii, the second for inaccurate ones.
+#: For boxes that contain every solution: relative distance of their upper ends from bounds on the
+#: radii, and smallest upper end divided by the largest. The first pair of these two numbers is for
+#: accurate radii, the second for inaccurate ones.
 ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
 #: Relative room for rounding in this module.
@@ -50,13 +49,13 @@ CROWDED = (0.9, 0.99, 0.999, 0.9999)
 #: Radii of overlapping shells, divided by the smallest radii that are enough without overlap.
 WIDTHS = (2.0, 4.0, 8.0)
 
-#: Relative distance from the radii to the upper ends of a box in which all asperities that do not
-#: touch are fixed open: for radii with thirty digits, float64 numbers, and less accurate ones.
+#: For boxes in which all asperities that do not touch are fixed open: relative distance from the
+#: radii to the upper ends, for radii with thirty digits, in float64, and less accurate.
 LEEWAY = (1e-12, 1e-6, 1e-2)
 
 
 class ShearedState(Protocol):
-    """A friction state after first loading, such as `convexrough.shear` returns."""
+    """A friction state after first loading, such as that which `convexrough.shear` returns."""
 
     @property
     def force(self) -> float: ...
@@ -106,8 +105,7 @@ def prove(
         shear force Q [force], and the `Trial` of the contact without shear at the load P - Q/f,
         with the coefficient of friction f (docs/theory/proof-file.md)
 
-    The function runs the checker, which computes the bounds, so it takes as long as a check (times:
-    docs/theory/proof-file.md).
+    The checker computes the bounds, so a proof takes as long as a check.
 
     Raises InputError for invalid values and for scenes too large for the checker; ProofError if no
     solution is proved, because the loads are too inaccurate or the contacts overlap too much.
@@ -164,7 +162,7 @@ def _exact_loads(trial: Trial) -> list[Fraction]:
 
 
 def _document(scene: Scene, prescribed: dict[str, Any]) -> dict[str, Any]:
-    """The contents of the file without its entries `argument`, `pressed`, `sheared`, `claims`."""
+    """The contents of the file; `argument`, `pressed`, `sheared` and `claims` are still empty."""
     x, y = scene.asperities.positions.T
     given = {
         "sphere_radius": scene.sphere_radius,
@@ -302,14 +300,14 @@ class TrialState:
         return float(best), bound - drop + ROUNDING * (bound + abs(drop))
 
     def arguments(self) -> Iterator[Argument]:
-        """The arguments that are valid in floating point, the most general first."""
+        """The arguments that hold in floating point; those for the scope "global" come first."""
         for beyond, least in ROOM:
             yield from self._on(self._box(beyond, least))
         for beyond in LEEWAY:
             yield from self._on(self.largest * (1 + beyond))
 
     def _on(self, box: Array) -> Iterator[Argument]:
-        """At most two arguments on a box: by shells that do not overlap, and one for crowds."""
+        """At most two arguments on a box: by shells that do not overlap, and by `_crowded`."""
         shells, able = self._room(box) * (1 - ROUNDING), box > 0
         least = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING))
         if (number := least * (1 + ROUNDING)) < 1:
@@ -334,7 +332,7 @@ class TrialState:
         return box
 
     def _crowded(self, box: Array) -> Argument | None:
-        """An argument by overlapping shells, or if none is found by Cholesky's method."""
+        """An argument by overlapping shells or, if none is found, by a Cholesky factorisation."""
         able = np.flatnonzero(box)
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:

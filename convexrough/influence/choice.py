@@ -15,18 +15,19 @@ from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: A matrix is cheapest for at most FEW_ASPERITIES asperities on a lattice, and for at most
-#: FEW_SCATTERED that are not on one. Timed on two cores; the numbers affect speed only.
+#: A matrix is fastest for at most FEW_ASPERITIES asperities on a lattice, and for at most
+#: FEW_SCATTERED that form no lattice. Timed on two cores; the numbers affect speed only.
 FEW_ASPERITIES = 512
 FEW_SCATTERED = 3000
 
 
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
-    """The compliance operator of the asperities `which` of a scene.
+    """The compliance operator of some asperities of a scene.
 
+    which : (n,) indices of these asperities
     scale : 1 / (pi E*) with the contact modulus E*, in the units of the loads and displacements
-    kind  : None for the cheapest kind. For few asperities it is a matrix. For more asperities it
-        uses Fourier transforms, on their lattice if they lie on one, and on a mesh otherwise
+    kind  : None for the fastest kind: for few asperities a matrix; for more, Fourier transforms, on
+        their lattice or, if they form none, on a mesh
 
     Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
     than fit in memory.
@@ -48,7 +49,7 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind == "lattice":
         expected = "contact points on a two-dimensional lattice"
         if scene.asperities.lattice is not None:
-            expected += ': equal tip radii, geometry "summit", or influence "scattered"'
+            expected += '; try equal tip radii, geometry "summit", or influence "scattered"'
         raise InputError("influence", found="lattice", expected=expected)
     if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error, tails)

@@ -20,13 +20,12 @@ from convexrough.roundoff import ROUNDOFF
 #: passes of radix 2, which have a larger error.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed in groups with this many bytes in each row, which fit in the cache.
+#: Columns are transformed in groups that have this many bytes in each row and fit in the cache.
 ROW = 512
 
 #: Rows of a kernel are computed in groups of about LAID_OUT numbers, and rows of a field are
 #: transformed in groups of about IN_ROWS numbers, which fit in the cache.
 LAID_OUT, IN_ROWS = 2**17, 2**16
-
 
 #: A function of i, j and squares: i are differences of the row numbers of two sites, j those of
 #: their column numbers, and squares (len(i), len(j)) the squared distances [spacing^2]. It returns
@@ -54,11 +53,10 @@ class SiteBox:
 
     @cached_property
     def padded(self) -> tuple[int, int]:
-        """The size of the transforms.
+        """The size of the transforms: no two differences of occupied sites share an entry.
 
-        It is so large that no two differences of occupied sites share an entry of the periodic
-        array. Twice the box always suffices. A smaller size suffices if every vector between two
-        periodic images of a site is longer than twice the extent.
+        Twice the box always suffices. A smaller size suffices if every vector between two periodic
+        images of a site is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # takes 0.1 s to import, so only if transforms are used
 
@@ -87,7 +85,7 @@ class SiteBox:
 
     @cached_property
     def loss(self) -> float:
-        """Error of one two-dimensional transform relative to the 2-norm, in roundoffs."""
+        """Bound on the error of a two-dimensional transform, in roundoffs of the 2-norm."""
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
@@ -180,7 +178,7 @@ class SiteBox:
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
         """Yield blocks of the rows `taken` of the padded box.
 
-        A block is a slice of these rows (from the first one taken), a slice of columns, and the
+        A block is a slice of these rows, counted from the first, a slice of columns, and the
         differences i and j of sites that belong to these rows and columns.
         """
         (rows, columns), (height, width) = self.shape, self.padded

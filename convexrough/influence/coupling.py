@@ -68,7 +68,7 @@ class Coupling(Protocol):
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(m,) upper bounds on sum_j strengths_j / r_ij^power, mostly a few per cent too large.
+        """(m,) upper bounds on sum_j strengths_j / r_ij^power, often a few per cent too large.
 
         strengths : (n,) not negative
         power     : 2 or 3
@@ -119,7 +119,7 @@ class Influence(Coupling, Protocol):
         ...
 
     def onto(self, points: Array) -> Coupling:
-        """The map from loads to displacements at other points; a load on the same point adds 0."""
+        """The map from loads to displacements at other points; a load at such a point adds 0."""
         ...
 
     def slopes(self, loads: Array) -> Array:
@@ -134,11 +134,14 @@ class Influence(Coupling, Protocol):
         ...
 
     def crowding(self, radii: Array) -> float:
-        """The largest (a_i + a_j) / r_ij of all pairs, with contact radii a (n,), 0 where open."""
+        """The largest (a_i + a_j) / r_ij; the `radii` a (n,) are contact radii, 0 where open."""
         ...
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite; on lattices only."""
+        """True if A + (scale / radius) I is proved positive semidefinite; else False.
+
+        Only the operator on a lattice proves it.
+        """
         ...
 
     def sums(self, loads: Pair) -> Ball:
@@ -146,10 +149,9 @@ class Influence(Coupling, Protocol):
         ...
 
     def smoother(self, root: Array) -> Smoother | None:
-        """A function that applies an approximation of (I + W A W)^-1, with W = diag(root).
+        """A symmetric, positive definite approximation of (I + W A W)^-1, with W = diag(root).
 
-        The approximation is symmetric and positive definite. None if no better one than the
-        identity is known.
+        None if no approximation is available.
         """
         ...
 

@@ -30,7 +30,7 @@ KEPT = 2**16
 
 
 def fits_densely(count: int) -> None:
-    """Raise InputError if the matrix of `count` asperities and a solver's copies exceed memory."""
+    """Raise InputError if memory cannot hold the matrix of `count` asperities and its copies."""
     checks.fits_in_memory("asperities that could touch", count, 5 * 8, power=2)
 
 
@@ -106,7 +106,7 @@ class DenseInfluence:
         return len(self.points)
 
     def apply(self, loads: Array) -> Array:
-        """A P, summed in blocks of sqrt(n) terms (at least 64): rounding grows as sqrt(n)."""
+        """A P, in blocks of sqrt(n) terms (at least 64), so that rounding grows as sqrt(n)."""
         size = self._block
         if len(self) <= size:
             return np.asarray(self.matrix @ loads)

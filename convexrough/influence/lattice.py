@@ -55,8 +55,8 @@ CHUNK = 2**14
 #: (docs/theory/convexity.md).
 FILLED = 0.2
 
-#: For more asperities than this, spectra (transforms of kernels) that are rarely needed, and parts,
-#: are not cached.
+#: For more asperities than this, rarely needed transforms of kernels, and operators among parts of
+#: the asperities, are not cached.
 MOST_KEPT = 2**21
 
 #: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), a lower bound on the
@@ -104,9 +104,8 @@ class LatticeInfluence:
     def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
         """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
 
-        The transforms are smaller if only asperities near the middle carry loads: the extent of
-        the box is then the largest distance of any asperity from a loaded one. The last box is
-        cached, with its indices.
+        If only asperities near the middle carry loads, the transforms are smaller: the extent of
+        the box need only bound the distances of all asperities from the loaded ones.
         """
         box, loaded, (i, j) = self.box, loads.nonzero()[0], self.cells
         reach = _farthest(i[loaded], j[loaded], box.shape, box.basis)
@@ -313,8 +312,8 @@ class LatticeInfluence:
         """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
 
         slices : number of parts of 10 to 18 bits into which loads and kernel are divided
-            (docs/theory/operators-lattice.md, "Slices"); default 3, and 4 for more than `MANY`
-            sites, because friction takes differences of sums. If a number is given, deviations of
+            (docs/theory/operators-lattice.md, "Slices"); None for 3, or for 4 on more than `MANY`
+            sites, as friction needs. If a number is given, deviations of
             points from their sites are treated in single precision
         """
         dtype = np.float64 if slices is None else np.float32
@@ -335,7 +334,7 @@ class LatticeInfluence:
 
     @cached_property
     def _kept(self) -> dict[object, Any]:
-        """By name: kernels on the last box of `_boxed_for`, this box, and the last part."""
+        """By name: kernels on the last box of `_boxed_for`, this box, and the last `restricted`."""
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:
@@ -437,7 +436,7 @@ def _least_symbol(lattice: Lattice) -> float:
 
 
 def _farthest(i: Indices, j: Indices, shape: tuple[int, int], basis: Array) -> float:
-    """Upper bound on the distances of sites (i, j) from the middle of a box of this shape."""
+    """Upper bound on the distances [spacing] of sites (i, j) from the middle of the box."""
     (g11, g12), (_, g22) = basis @ basis.T
     largest = 0.0
     for some in threads.chunks(len(i), CHUNK):

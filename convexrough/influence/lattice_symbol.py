@@ -18,8 +18,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Largest difference of the lower bound from the least value found. A smaller difference takes
-#: longer.
+#: Largest difference of the lower bound from the least value found. A heuristic.
 TOLERANCE = 1e-3
 
 #: Ratio of the longer to the shorter basis vector above which the sums have too many terms.
@@ -34,20 +33,20 @@ REACH = 6.0
 #: below 10.
 LOST = 1e-9
 
-#: Number of cells into which each side of a cell of the dual lattice is divided first, and largest
-#: number of times that these cells are halved.
+#: Number of parts into which each side of a cell of the dual lattice is divided first, and largest
+#: number of times that the sides of these parts are halved.
 FIRST, MOST_HALVINGS = 8, 12
 
-#: Vectors from the middle of a cell to the middles of its quarters, in units of a quarter's size.
+#: Vectors from the middle of a part to the middles of its quarters, in units of a quarter's side.
 QUARTERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) / 2.0
 
 
 def least_symbol(basis: Array) -> float:
     """A lower bound on f for a reduced basis (2, 2) whose shorter vector has length 1.
 
-    The dual lattice is divided into cells, and these are halved until the bounds in all cells are
-    within the tolerance of the least value found. The result is -inf if the longer vector exceeds
-    `LONGEST`, or if `MOST_HALVINGS` halvings are not enough.
+    A cell of the dual lattice is divided into smaller and smaller parts, until the bounds in all
+    parts are within the tolerance of the least value found. The result is -inf if the longer vector
+    exceeds `LONGEST`, or if `MOST_HALVINGS` halvings are not enough.
     """
     if np.hypot(*basis.T).max() > LONGEST:
         return -np.inf
@@ -89,15 +88,15 @@ class _Symbol:
         return cls(alpha, area, dual, sites[distances > 0], distances[distances > 0], images)
 
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
-        """(m,) f in the middles c of cells of the dual lattice, and lower bounds on f in each cell.
+        """(m,) f in the middles c of parts of the dual lattice, and lower bounds on f in each part.
 
-        Each bound is the larger of two bounds. All points of a cell are within rho of c, and no
+        Each bound is the larger of two bounds. All points of a part are within rho of c, and no
         second derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a
         bound. For the other bound, each cosine is replaced by -1, and each |k + G| by an upper
         bound, because E decreases.
 
         cells : (m, 2) middles c in units of g1 and g2
-        size  : side of the cells in these units
+        size  : side of the parts in these units
         """
         from scipy.special import erfc
 

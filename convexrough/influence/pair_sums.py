@@ -1,9 +1,9 @@
 """Sums over pairs of arbitrary points: distant pairs by a mesh, near pairs one by one.
 
 1 / r^q is the sum of a smooth part L (`softened`) and a rest S, which is 0 for distances above the
-"reach". For L, the code uses W G W^T: W interpolates from the nodes of a square mesh, and Fourier
-transforms multiply by G, which has the values of L between nodes. S is a sparse matrix.
-docs/theory/operators-mesh.md derives the method and the error bounds.
+"reach". The matrix of L is approximated by W G W^T: W interpolates from the nodes of a square mesh,
+and G, which has the values of L between nodes, is applied by Fourier transforms. S is a sparse
+matrix. docs/theory/operators-mesh.md derives the method and the error bounds.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from convexrough.influence.softened import WEIGHT_ROUNDOFFS, Softened, lebesgue,
 from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
 
-#: Memory [bytes] per near neighbour of a point while the matrix is assembled; and the number of
-#: points from whose near neighbours the number of all near pairs is estimated first.
+#: Memory [bytes] per near neighbour of a point while S is assembled, and number of points whose
+#: near neighbours are counted first, to estimate this memory.
 BYTES, SAMPLE = 24, 1000
 
-#: Largest number of points in a patch: sums stay short, and a matrix product fits in the cache.
+#: Largest number of points in a patch of `Interpolation`: sums stay short, and fit in the cache.
 BLOCK = 256
 
 #: Number of points whose weights are computed together: they fit in the cache.
@@ -279,11 +279,7 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """(n,) the sums.
-
-        A second thread computes the product with S while this one computes the product with
-        W G W^T. They run in parallel, because both release Python's global interpreter lock.
-        """
+        """(n,) the sums. A second thread computes the product with S at the same time."""
         ordered = loads[self.order.places]
         with ThreadPoolExecutor(1) as other:
             near = other.submit(self.near.apply, ordered)
@@ -293,11 +289,10 @@ class Product:
         return self.order.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
-        """(n,) bounds on errors of sums of strengths_j / r_ij^q over j, for `strengths` (n,) >= 0.
+        """(n,) bounds on errors of the sums of strengths_j / r_ij^q, for `strengths` (n,) >= 0.
 
-        These are the errors by interpolation for near pairs, and by entries left out of S.
-        Pairs within the reach plus `Softened.sway` count as near. The relative error of other pairs
-        is part of `rounding`.
+        The errors are those by interpolation for pairs within the reach plus `Softened.sway`, and
+        by entries left out of S. The relative error of farther pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
         points, ordered = self.order.points, strengths[self.order.places]
@@ -315,7 +310,7 @@ class Product:
     def _rounding(self) -> tuple[float, float]:
         """Bounds on errors except those of `_weighing` and of transforms.
 
-        The first is relative to the sums, the second to the largest load.
+        The first is a part of the sums, the second is to be multiplied by the largest load.
         """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
@@ -346,8 +341,8 @@ class Product:
     def slopes(self, values: Array) -> Array:
         """(n, 2) the sums over j of (c_i - c_j) v_j / r_ij^3 for points c and `values` v.
 
-        They have no error bounds. The smooth part of the kernel is -grad L. It is the distance
-        vector times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
+        There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
+        times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
         ordered = values[self.order.places]
         total = self._near_slopes(ordered)

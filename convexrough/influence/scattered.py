@@ -31,8 +31,8 @@ from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
-#: Target of the relative error that interpolation causes in a product. Most of the error of `sums`,
-#: about 1e-16, is this error.
+#: Target of the relative error that interpolation causes in a product. It is the largest part of
+#: the error of `sums`, about 1e-16.
 TOLERANCE = 5e-17
 
 #: The same target for loads in single precision, and for `falloff`.
@@ -41,8 +41,8 @@ SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 #: Up to this number of asperities, `sums` uses a matrix, which is faster and gives 27 digits.
 FEW = 1500
 
-#: Largest number of pairs (asperity, other point) that `onto` computes one by one. The number
-#: affects the speed only.
+#: Largest number of pairs (asperity, other point) that `onto` computes one by one. Affects speed
+#: only.
 FEW_PAIRS = 10**8
 
 

@@ -5,7 +5,7 @@ P, the part of the sums with L is W G W^T P, where W interpolates from the nodes
 points, and G has the values of L between nodes. So there are three products: from points to the
 mesh, on the mesh, and back to the points. For each, numbers are split into a first slice and a
 rest. First slices have so few bits that sums of their products are exact, and all products with
-rests are small. The remaining error is mostly due to interpolation (docs/theory/operators-mesh.md).
+rests are small. The table at the end of docs/theory/operators-mesh.md shows which errors remain.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from convexrough.roundoff import ROUNDOFF
 #: Numbers of bits of a float64 number and of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches (`pair_sums.Interpolation`) that are processed together, to fit in the cache.
+#: Number of patches (`pair_sums.Interpolation`) processed together; their data fit in the cache.
 PATCHES = 64
 
 #: Whole numbers in units of 2^-FIXED are used to compute L.
@@ -189,7 +189,7 @@ def _applied(upper: Any, loads: Array) -> Array:
 
 
 def _sizes(product: Product, strengths: Array) -> tuple[Array, Array]:
-    """(n,) bounds on the sums over j of |S_ij| s_j, and of s_j for near pairs, with strengths s."""
+    """(n,) bounds on the sums of |S_ij| s_j over j, and of s_j over near j, for strengths s."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
     around = within(product.order.points, strengths, product.splitting.cut)

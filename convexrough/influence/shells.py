@@ -1,7 +1,7 @@
 """Shells: imagined spheres, one around each asperity, which do not overlap.
 
-With radii s_i, the contact modulus E* and the compliance operator A, A + diag(1 / (pi E* s_i)) is
-positive semidefinite: docs/theory/convexity.md, "Why (2) is not convex as it stands".
+Let their radii be s_i. Then A + diag(1 / (pi E* s_i)) is positive semidefinite, with the compliance
+operator A and the modulus E*: docs/theory/convexity.md, "Why (2) is not convex as it stands".
 """
 
 from __future__ import annotations

@@ -26,12 +26,12 @@ from convexrough.roundoff import ROUNDOFF
 #: Largest error allowed in a computed level; below 1/2, rounding to whole numbers removes it.
 SURE = 0.45
 
-#: Number of slices; and numbers of sites of a box above which one more slice is used: in a press,
-#: and for all else. On 6.6 million sites, error bounds of loads are 7e-13 of the largest load with
-#: three slices, and 3e-15 with four.
+#: Number of slices. One more slice is used on boxes of more than LARGE sites in a press, and of
+#: more than MANY sites elsewhere. On 6.6 million sites, error bounds of loads are 7e-13 of the
+#: largest load with three slices, and 3e-15 with four.
 SLICES, LARGE, MANY = 3, 2**22, 2**16
 
-#: Largest number of bits in a slice: float64 holds these and a rest.
+#: Largest number of bits in a slice; with 53, float64 would have no bits left for a rest.
 MOST_BITS = 48
 
 

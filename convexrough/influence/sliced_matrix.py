@@ -31,15 +31,14 @@ MOST_BITS = 30
 #: Largest number of rows of a cached matrix. The slices of such a matrix take 0.4 GB.
 KEPT = 4096
 
-#: For a part of the asperities, the matrix of all asperities is computed, because other parts may
-#: be needed later, if it has at most this many rows or at most twice as many as the part.
+#: The matrix of a part of the asperities is cut from that of all asperities, which other parts may
+#: use later, if all are at most SMALL or at most twice as many as the part.
 SMALL = 128
 
-#: Number of entries that are computed together. Such arrays of 64 KB fit in the cache, and the
-#: allocator reuses them without returning them to the system.
+#: Number of entries that are computed together: arrays of 64 KB, which fit in the cache.
 PIECE = 2**13
 
-#: Number of rows that are computed together at least: with fewer, calls take longer than numbers.
+#: Least number of rows that are computed together; with fewer, calls take most of the time.
 ROWS = 32
 
 #: Limit on 1 / r for points with an extent of 1; if 1 / r is larger, r^2 may underflow.
@@ -53,8 +52,8 @@ class SlicedMatrix:
     slices : (m, n) the three parts
     blocks : the columns of each block, and the number of bits of first slices of its loads
     exponent : the matrix is that of points divided by 2^exponent, so that their extent is about 1
-    losses : (3 blocks, m) three factors for each block: of the largest load in the block, of the
-        largest rest of a load after two slices, and of the largest rest after one slice. The sum of
+    losses : (3 blocks, m) three factors for each block, to be multiplied by its largest load, its
+        largest rest of a load after two slices, and its largest rest after one slice. The sum of
         these products over all blocks bounds the error of a product with loads
     """
 
@@ -178,7 +177,7 @@ class MatrixSums:
 
     @cached_property
     def _matrix(self) -> SlicedMatrix:
-        """The matrix, taken from that of more points if this one is cached or small enough."""
+        """The matrix, cut from that of `part_of` if the latter is cached or small enough."""
         if self.part_of is not None:
             whole, which = self.part_of
             few = len(whole.points.high) <= min(KEPT, max(SMALL, 2 * len(which)))

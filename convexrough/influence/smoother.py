@@ -22,8 +22,8 @@ from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
 
-#: The Gaussian averages over as many cells as a square window with this side, in cells. A wider one
-#: is better where W varies more.
+#: The Gaussian averages over as many cells as a square window with this side, in cells. A wider
+#: Gaussian would be better where W varies more.
 WINDOW = 9.0
 
 #: Side of a block in cells. Blocks resolve the waves that the Gaussian passes.
@@ -90,7 +90,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     touching = total > 0
     counts = sums(root > 0)[touching].astype(np.float64)
     sharing = float(counts @ counts / counts.sum())
-    # In blocks with many asperities, this estimates A W r within a block for r of random signs.
+    # Estimates A W r within a block of many asperities, for r with random signs.
     rough = scale / BLOCK * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / BLOCK**2, 1.0)))
     size, spectrum = _block_spectrum(shape, basis, float(counts.mean()), workers)
     passed = _low_pass(size, basis)

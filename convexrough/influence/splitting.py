@@ -2,7 +2,7 @@
 
 S is 0 for distances r above the reach a. L is interpolated from p x p nodes of a mesh with the
 spacing h. docs/theory/operators-mesh.md, "Choice of p, h and a", explains the choice. All numbers
-here are heuristics: they affect the cost, and how near the error is to its target, the tolerance.
+here are heuristics: they affect the time, and how close the error is to its target, the tolerance.
 The bounds on the error hold for any choice.
 """
 
@@ -47,9 +47,9 @@ class Splitting:
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
-        """The cheapest splitting for which the relative error of a product is probably tolerable.
+        """The fastest splitting with an estimated relative error of products of `tolerance`.
 
-        None if sums over all pairs are cheaper.
+        None if sums over all pairs are faster.
         """
         n = len(points)
         extent = np.ptp(points, axis=0) if n else np.zeros(2)
@@ -100,8 +100,7 @@ class _Sums(NamedTuple):
         some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
         distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
-        # Nearer pairs count as if at this distance, so that a single pair does not decide the
-        # estimate.
+        # Nearer pairs count as if at this distance: no single pair shall decide the estimate.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
         sums = (np.maximum(distances, nearest) ** -power).sum(axis=1)
         return cls(ordered, SAMPLE * share, float(np.median(sums)) / share)
@@ -114,8 +113,7 @@ class _Sums(NamedTuple):
 def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
     """The spacing h [length] at which the larger of two interpolation errors is the tolerance.
 
-    One error is that of near pairs, by (1) of docs/theory/operators-mesh.md. The other error is
-    that of distant pairs.
+    The errors are those of near pairs, by (1) of docs/theory/operators-mesh.md, and distant pairs.
     """
     spacing = kernel.reach / (2.0 * kernel.order)
     for _ in range(4):

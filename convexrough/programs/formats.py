@@ -45,7 +45,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """The contents of a file for clarabel.load_from_file; Clarabel (0.11) writes no such files."""
+    """The contents of a file for clarabel.load_from_file."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),
@@ -119,10 +119,10 @@ def mps(program: QuadraticProgram) -> bytes:
 def cbf(program: ConeProgram) -> bytes:
     """The contents of a file in the Conic Benchmark Format, version 1.
 
-    The objective of this format is linear. So x'Px/2 is replaced by one more variable t, the last.
-    With P = F'F,
+    The objective of this format is linear. So one more variable t, the last, replaces x'Px/2. With
+    P = F'F, the condition t >= |Fx|^2 / 2 is written as the cone
 
-        t >= |Fx|^2 / 2    as    t + 1/2 >= |(t - 1/2, Fx)|,
+        t + 1/2 >= |(t - 1/2, Fx)|,
 
     and the objective is q'x + t. Constraints are affine functions of (x, t) in cones.
     """
@@ -171,6 +171,6 @@ def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
 
 
 def _counted(entries: list[tuple[Any, ...]]) -> list[str]:
-    """The number of entries whose value, the last item, is not 0; then a line for each of them."""
+    """The number of entries whose last item is not 0, then a line for each of these entries."""
     lines = [" ".join(map(repr, entry)) for entry in entries if entry[-1] != 0]
     return [str(len(lines)), *lines]

@@ -43,7 +43,7 @@ WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
 #: File endings, with the contents and the software that reads them.
 FORMATS = {
     "cbf": "the cone program, and its dual, in the Conic Benchmark Format: MOSEK, PICOS, ...",
-    "json": "the same for clarabel.load_from_file",
+    "json": "the cone program, and its dual, for clarabel.load_from_file",
     "mps": "the quadratic program of bristles: HiGHS (which has no cones), Gurobi, CPLEX, ...",
     "npz": "all programs: cones as sparse matrices, bristles for qpsolvers.Problem.load",
 }
@@ -63,8 +63,8 @@ class Program(Record):
     energy_unit : [force length] unit of the objective
     objective   : minimum of the objective, in energy_unit; for bristles the value that OSQP finds,
         nan if OSQP fails
-    constant    : the energy, in energy_unit, minus the objective; for the dual, the energy plus the
-        objective. It is 0 for bristles, and if the approach is prescribed
+    constant    : energy in energy_unit minus objective (for the dual, plus objective); 0 for
+        bristles, and for a prescribed approach
     load_error_estimate : estimated difference between the exact minimiser and the solution of the
         contact law, as a fraction of the largest load; 0 for cones and dual
 
@@ -165,15 +165,14 @@ def program(
 ) -> Program:
     """The contact problem of a scene as a convex program in standard form.
 
-    form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
-        program; if asperities did not interact, errors would be about 0.4 / bristles^2 times the
-        largest load; `load_error_estimate` includes the interaction)
+    form     : "cones" (equivalent to the contact law), "dual" (of the cone program) or "bristles"
+        (a quadratic program, with errors of loads of about `load_error_estimate`)
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     bristles : number of bristles per asperity, for the form "bristles"
 
-    docs/theory/exact-cones.md derives the cones. Raises TooDenseError if the solution lies outside
-    the boxes in which the program is exact. To check this, Newton's method solves the problem
-    first; SolverError is raised if it finds no solution. Raises InputError for wrong values.
+    docs/theory/exact-cones.md derives the cones. Newton's method first solves the problem. Raises
+    SolverError if it finds no solution; TooDenseError if the solution lies outside the boxes in
+    which the program is exact; InputError for wrong values.
 
     >>> program = cr.program(scene, approach=5e-5)
     >>> program.data.cones
@@ -185,10 +184,7 @@ def program(
 
 
 def solved(scene: Scene, approach: float | None, load: float | None) -> tuple[NormalProblem, Array]:
-    """The problem of a scene, and the loads (n,) that Newton's method finds, in scaled units.
-
-    The compliance operator of the problem is a dense matrix.
-    """
+    """The problem of a scene, with a dense matrix, and the scaled loads (n,) by Newton's method."""
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     if len(problem) == 0:
         expected = "an approach at which an asperity touches"
@@ -255,15 +251,15 @@ def write_programs(
 ) -> tuple[list[Path], dict[str, Any]]:
     """Write a file NAME.FORM.ENDING for each form and format, and index.json.
 
-    Returned are the paths of all files, and the contents of the index.
+    Returns the paths of all files, and the contents of the index.
 
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
     formats        : some of `FORMATS`
     bristles       : number of bristles per asperity
 
-    A program is left out if the solution is not in the box on which it is exact, or if a file would
-    not fit in memory; the index gives the reason. Raises InputError, with the reason for the last
-    one left out, if no program remains, and FileError if a file cannot be written.
+    A program is left out if the solution is not in the box on which it is exact, or if its file
+    would not fit in memory; the index gives the reason. If no program remains, InputError is raised
+    with the last of these reasons. Raises FileError if a file cannot be written.
     """
     problem, own = solved(scene, approach, load)
     about: dict[str, Any] = {}
@@ -324,7 +320,7 @@ def _bristle_error(rows: BristleProgram, own: Array) -> float:
     """Estimated error of the loads of the bristle program, divided by the largest load.
 
     With m bristles and the box 0 <= load <= B, the load of one asperity at a given indentation has
-    an error of at most 0.375 B / m^2. Coupling multiplies errors by up to about 1 / lambda, with
+    an error of at most 0.375 B / m^2. Interaction multiplies errors by up to about 1 / lambda, with
     the smallest of the `scaled_eigenvalues` as lambda.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
@@ -332,7 +328,7 @@ def _bristle_error(rows: BristleProgram, own: Array) -> float:
 
 
 def scaled_eigenvalues(problem: NormalProblem, own: Array) -> Array:
-    """Ascending eigenvalues of the touching asperities' Hessian, scaled to a diagonal of 1."""
+    """Eigenvalues of the Hessian of touching asperities, scaled to a diagonal of 1, ascending."""
     touching = np.flatnonzero(own)
     root = np.sqrt(1.0 / problem.compliance(own[touching], touching))
     scaled = problem.influence.matrix[np.ix_(touching, touching)] * root * root[:, None]

@@ -3,14 +3,15 @@
 In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
 minimum of a quadratic program. Independent springs, the bristles, lie on |x| <= b. They have the
 stiffness E* per length; the bristles at x and -x count as one, with the stiffness 2 E* per length.
-They first touch at the indentation x^2 / R_i:
+The bristle at x first touches at the indentation x^2 / R_i:
 
     (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
 
 with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
 delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
-cells. Then x^2 / R_i is replaced by its mean over the cell, and the minimum becomes an upper bound
-on the energy. In scaled units let B_i be the load at which the contact radius of asperity i is b_i.
+cells, with the mean of x^2 / R_i over the cell in place of x^2 / R_i. The minimum is then an upper
+bound on the energy. In scaled units let B_i be the load at which asperity i has the contact radius
+b_i.
 Under this load its indentation is d_i = k B_i^(2/3), and its compliance is
 h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
 
@@ -27,8 +28,8 @@ and prescribed displacements D,
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
 For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
-the contact energy at the upper ends of the box P <= B. At first B are the a priori bounds on the
-loads. If a Cholesky factorisation does not find A + diag(h) positive definite for this B, the box
+the contact energy at the upper ends of the box P <= B. The program first takes the a priori bounds
+on the loads for B. If a Cholesky factorisation does not find A + diag(h) positive definite, the box
 is cut at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the
 cut box the shell lemma of docs/theory/convexity.md proves definiteness. If a load of the answer
 reaches an upper end that was cut, the answer is refused.
@@ -59,7 +60,8 @@ from convexrough.solvers.programs import (
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: The convexity number of a box that is cut; below 1 the matrix is definite. A heuristic.
+#: The convexity number 2 b_i / (pi s_i) at which a box is cut; below 1 the matrix is definite. A
+#: heuristic.
 LARGEST_S = 0.99
 
 #: This part of the diagonal is subtracted from the matrix before a Cholesky factorisation decides
@@ -67,8 +69,8 @@ LARGEST_S = 0.99
 MARGIN = 0.001
 
 #: Smallest upper end B_i of a box, divided by the largest, unless the box must be cut below it. A
-#: heuristic: smaller loads need not be resolved. The factors B^(-1/3) of the compliances then
-#: differ by at most a factor of a hundred.
+#: heuristic: smaller loads need not be resolved, and compliances, in proportion to B^(-1/3), differ
+#: by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -80,7 +82,7 @@ class BristleQP:
         0.4 / m^2 of the largest load
     newton_step : True to end with one Newton step, which squares the relative error
     tolerance   : absolute and relative tolerance of OSQP, in scaled units. If OSQP finds which
-        bristles carry forces, its polishing step computes these forces up to rounding errors
+        bristles carry forces (the active set), polishing computes these forces up to rounding
     max_iterations : largest number of iterations of OSQP
     verbose     : True to print OSQP's table of iterations
 
@@ -181,9 +183,9 @@ class BristleProgram:
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
         """The loads, from the forces phi of the bristles and the multipliers of phi >= 0.
 
-        A bristle carries a force where h phi exceeds m times the size of its multiplier. The sign
-        of this difference is clear even where the solver's phi is nearly 0. Raises TooDenseError if
-        the answer lies on a face where the box was cut.
+        A bristle carries a force where h phi exceeds m times the absolute value of its multiplier,
+        a criterion that is clear even where the solver's phi is nearly 0. Raises TooDenseError if
+        a load reaches an upper end that was cut.
         """
         problem, n, m = self.problem, len(self.problem), self.m
         P, e = raw.x[:n], raw.x[n:].reshape(n, m)
@@ -196,7 +198,7 @@ class BristleProgram:
         return ProgramAnswer(loads, approach, raw.iterations)
 
     def refuse_cut(self, loads: Array) -> None:
-        """Raise TooDenseError if loads (n,) reach a face where the box was cut."""
+        """Raise TooDenseError if loads (n,) reach upper ends of the box that were cut."""
         problem = self.problem
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
             ratios = problem.shells[beyond] / problem.compliance(loads[beyond], beyond)

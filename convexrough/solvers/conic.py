@@ -4,8 +4,8 @@ docs/theory/exact-cones.md states the program (1) and proves that its solution s
 law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
 approach. If the load is prescribed, the approach is unknown, and an upper bound replaces it.
 
-The loads are limited to boxes 0 <= P_i <= B_i ("Choice of the box" there). Let the number S_i be
-(3/2) sigma_i B_i^(1/3) / k_i, with Hertz's coefficients k_i. It must be at most 21/25 in the form
+The loads are limited to boxes 0 <= P_i <= B_i ("Choice of the box" there). With Hertz's
+coefficients k_i, the number S_i = (3/2) sigma_i B_i^(1/3) / k_i must be at most 21/25 in the form
 of the program with four cones per asperity, and at most 1 in the form with five. Where S_i would be
 larger, B_i is reduced. A box is called cut if B_i is below the a priori bound, which is the load
 that the asperity would carry alone. If a cut box limits a load, the program with five cones is
@@ -31,8 +31,7 @@ from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
 #: Asperities whose a priori bound on the load is below this part of the largest such bound are left
-#: out of the program. The Newton step can still give them a load. The value can be a heuristic,
-#: because all loads are checked.
+#: out of the program. The Newton step can still give them a load. A heuristic: loads are checked.
 NEGLIGIBLE = 1e-12
 
 #: Largest contact radius at the upper end of a box, divided by the contact radius at the a priori
@@ -46,8 +45,8 @@ WIDENED = 1.1
 ACCURATE = 1e-13
 
 #: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
-#: the tolerance. Here P(delta) is Hertz's load at the indentation delta. The square root is taken
-#: because an error of the energy causes errors of loads in proportion to its root. A heuristic.
+#: the tolerance, because an error of the energy causes errors of loads in proportion to its root.
+#: Here P(delta) is Hertz's load at the indentation delta. A heuristic.
 ROOTS = 10.0
 
 #: Number of asperities from which Clarabel's supernodal factorisation is faster.
@@ -59,7 +58,7 @@ STOPPED = ("Solved", "AlmostSolved")
 
 
 class TooDenseError(InputError):
-    """Some asperities are pressed to contact radii that are too large for a convex program.
+    """Some asperities would have contact radii that are too large for a convex program.
 
     asperities : (m,) the indices of these asperities in the scene
     ratios     : (m,) for each, an estimate of the contact radius that it would have if its box did
@@ -80,8 +79,8 @@ class TooDenseError(InputError):
         more = f" and {len(ratios) - len(worst)} more" if len(ratios) > len(worst) else ""
         super().__init__(
             "asperities too dense for a convex program",
-            found="contact radii pressed towards these multiples of pi/4 of the distance to the "
-            f"nearest neighbour, by asperity: {described}{more}",
+            found="contact radii divided by pi/4 times the distance to the nearest neighbour, "
+            f"by asperity: {described}{more}",
             expected=f"less than {limit:g}",
             where=solver,
         )
@@ -147,7 +146,7 @@ class ConeSolver(ABC):
 
     tolerance   : tolerance of the cone solver, in scaled units
     newton_step : True to end with a step of Newton's method, which reduces errors of about 1e-8 of
-        the largest load to rounding errors. If one step is not accurate enough, a second follows
+        the largest load to rounding errors; a second step follows if the first is too inaccurate
 
     With the loads P, gaps g, approach D0, offsets d and D = D0 + d, the checks are as follows. With
     `newton_step`, |g_i| at loaded asperities and -g_i at all others must be at most 1e-13
@@ -213,7 +212,7 @@ def judged(
     """
     if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
         raise SolverError(
-            "loads or an approach that are not numbers",
+            "loads or an approach that are not finite numbers",
             solver=solver.name,
             advice="try a larger tolerance, or Newton's method",
         )
@@ -233,7 +232,7 @@ def judged(
     missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
     if not missed <= (accepted := ROOTS * np.sqrt(solver.tolerance)):
         raise SolverError(
-            f"loads miss the contact law by {missed:.3g} of the largest, accepted {accepted:.3g}",
+            f"loads err in the contact law by {missed:.3g} of the largest, accepted {accepted:.3g}",
             solver=solver.name,
             advice="try newton_step=True or more iterations",
             iterate=loads,
@@ -348,7 +347,7 @@ class LiftedProgram:
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:
-        """The program. Its rows are the prescribed total, if any, then p = B y3, then the cones."""
+        """The program, with rows for the prescribed total, if any, for p = B y3, and for cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, boxes = self.problem, self.boxes
@@ -381,7 +380,7 @@ class LiftedProgram:
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads and the approach, which is found from the multiplier if the load is given."""
+        """The loads, and the approach: prescribed, or from the multiplier of the total load."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

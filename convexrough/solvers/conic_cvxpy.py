@@ -24,16 +24,16 @@ from convexrough.solvers.solution import Solution
 
 
 class _Options(NamedTuple):
-    """Names of a solver's options for tolerances and iterations, and the default iterations."""
+    """Names of a solver's options for tolerances and the limit on iterations, and this limit."""
 
     tolerances: tuple[str, ...]
     limit: str
     steps: int
 
 
-#: Options of CVXPY's solvers; others keep their own tolerances and limits. Tolerances are those of
-#: primal and dual feasibility and of the duality gap. SCS, a first-order method, needs thousands of
-#: iterations; interior-point methods need about twenty.
+#: Options of some of CVXPY's solvers; others keep their own tolerances and limits. Tolerances are
+#: those of primal and dual feasibility and of the duality gap. SCS, a first-order method, needs
+#: thousands of iterations; interior-point methods need about twenty.
 OPTIONS = {
     "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
     "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
@@ -82,7 +82,7 @@ class ConicCVXPY(ConeSolver):
         if self.max_iterations is not None:
             checks.whole("max_iterations", self.max_iterations)
         if not isinstance(self.solver, str):
-            raise InputError("solver", found=repr(self.solver), expected="a name that CVXPY knows")
+            raise InputError("solver", found=repr(self.solver), expected="the name of a solver")
         object.__setattr__(self, "solver", self.solver.upper())
 
     @property
@@ -224,7 +224,7 @@ class LiftedModel:
         normal = self.normal
         if approach is not None:
             if normal.approach is None or not approach <= normal.approach_bound:
-                expected = f"approach control, and not above {normal.approach_bound:g}"
+                expected = f"at most {normal.approach_bound:g}, and no prescribed load"
                 raise InputError("approach", found=approach, expected=expected)
             self.D0.value = approach
             normal = normal.at_approach(Ball.exact(approach))

@@ -1,7 +1,7 @@
 """Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-Asperities are grouped in rings about the axis. The approximation: the loads of all rings cause the
-same displacement w at all asperities of a ring. Their indentations are D - w with
+Asperities are grouped in rings about the axis. All asperities of a ring are assumed to be displaced
+by the same w by the loads on other asperities. Their indentations are D - w with
 D = approach + offsets, and by Hertz's law the total loads of the rings are P(w). K_rs is the
 displacement of ring r by a unit load that is spread evenly over ring s, without the displacement of
 an asperity by its own load. Newton's method solves w = K P(w) (Greenwood and Tripp, J. Appl. Mech.
@@ -20,8 +20,7 @@ from convexrough.sphere import hertz
 #: Largest number of rings, and least mean number of asperities in a ring. Heuristics.
 RINGS, LEAST = 128, 150
 
-#: Of more asperities than this, only every k-th is used. The largest possible k leaves at least
-#: this number.
+#: Of more asperities than this, only every k-th is used, with the largest k that leaves so many.
 SAMPLE = 50_000
 
 #: The evenly spread load of a ring includes each asperity's own load, spread over the asperity's
@@ -102,7 +101,7 @@ def _mean_field(problem: NormalProblem) -> Array:
 
 def _disc(distance: Array, radius: Array) -> Array:
     """The integral of 1 / r over a disc; r is measured from a point `distance` off the centre."""
-    from scipy.special import ellipe, ellipk  # 0.1 s to import: only where there are many
+    from scipy.special import ellipe, ellipk  # 0.1 s to import: only for many asperities
 
     r, a = np.broadcast_arrays(distance, radius)
     inside = r < a

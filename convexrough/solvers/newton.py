@@ -3,7 +3,7 @@
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
 D = D0 + d of `NormalProblem`. For many asperities the iteration first includes only those near the
-contact, and adds others until all asperities left out are found to be open.
+contact, and adds others until all asperities that it leaves out are found to be open.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from convexrough.sphere import hertz
 NEGLIGIBLE = 88 * ROUNDOFF
 
 #: If at most this many asperities could touch, the iteration includes all of them, and the start
-#: uses a product with A. This number affects speed only.
+#: uses a product with A. Affects speed only.
 ALL_ITERATED = 1000
 
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
 ACCURATE = 1e-12
 
-#: Asperities are near the contact if their gap is at most this part of the largest D_i. This number
-#: affects speed only.
+#: Asperities are near the contact if their gap is at most this part of the largest D_i. Affects
+#: speed only.
 MARGIN = 0.03
 
 
@@ -117,8 +117,8 @@ class Newton:
         the symbols of docs/theory/newton.md;  0 for the accuracy of float64
     max_iterations : largest number of steps; SolverError is raised if they are not enough
 
-    Once the left side, the residual, is below 1e-12 (|D0| + max_i |d_i|), the method also stops if
-    the residual is small compared with the rounding errors of A P, or if a step does not halve it.
+    Let the left side be the residual. Once it is below 1e-12 (|D0| + max_i |d_i|), the method also
+    stops if it is small compared with the rounding errors of A P, or if a step does not halve it.
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Newton(tolerance=1e-6))
     >>> contact.iterations, contact.certificate.holds
@@ -153,7 +153,7 @@ class Newton:
     def _found(
         self, problem: NormalProblem, start: Array | None
     ) -> tuple[Array, float, int, Trial | None]:
-        """Loads, approach, number of steps, and the trial of the loads if it is to be refined."""
+        """Loads, approach, number of steps, and the trial to be refined, if there is one."""
         indentation = _start(problem, start)
         near, iterations = np.arange(len(problem)), 0
         if len(problem) > ALL_ITERATED and start is None:

@@ -180,7 +180,8 @@ def run_osqp(
 def _of_numbers(raw: RawAnswer, library: str, solver: str) -> RawAnswer:
     if not (np.isfinite(raw.x).all() and np.isfinite(raw.multipliers).all()):
         raise SolverError(
-            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.status})",
+            f"{library} returned values that are not finite, after {raw.iterations} steps "
+            f"({raw.status})",
             solver=solver,
             advice="try a larger tolerance, or Newton's method",
         )

@@ -19,8 +19,8 @@ class Solution(Record):
     """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
     iterations : number of steps of the solver
-    residual : residual of the contact law for `loads`, as computed by `NormalProblem.residual`; if
-        `trial` is given, an upper bound on the residual of the loads in `trial`
+    residual : residual of the contact law for `loads`, as in `NormalProblem.residual`; if `trial`
+        is given, an upper bound on the residual of the loads in `trial`
     refine   : True if the loads may be corrected to more digits; False to certify them unchanged
     trial    : the loads to more digits, if the solver has computed such loads; else None
 
@@ -49,7 +49,7 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """A solution with the residual computed from the loads; a residual nan becomes inf.
+        """A solution with the residual computed from the loads; inf if it is not a number.
 
         Raises SolverError unless there is a load for each asperity of the problem.
         """

@@ -1,10 +1,10 @@
-"""Proved bounds on the errors of a vector friction state from any source.
+"""Proved bounds on the errors of a vector friction state.
 
 docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derive the
 steps 1 to 6 that comments name. Symbols, in scaled units: q are the shear forces (in code,
-`increments`), eta the displacements that the asperities take up, T the total force, X the rigid
-displacement, P the loads, k the values of |eta| at which asperities slide, and B the kernel. A star
-marks the exact state for the true loads, which are known as balls.
+`increments`), eta the sums of deflection and slip, T the total force, X the rigid displacement, P
+the loads, k the thresholds of |eta| at which asperities slide, and B the kernel. A star marks the
+exact state for the true loads, which are known as balls.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class VectorBounds(NamedTuple):
 
     proved : False if nothing is proved
     increments, slips : (n,) bounds on |q - q*| and |slip - slip*|
-    displacement_error : bound on |X - X*|;  excess : bound on the energy minus its minimum
+    displacement_error : bound on |X - X*|;  excess : bound on the energy minus the least energy
     sliding, partial : (n,) True where the asperity is proved to slide, and where it is proved not
         to slide
     """
@@ -54,10 +54,7 @@ class VectorBounds(NamedTuple):
 
 @quietly
 def certify_vectors(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Bounds on the errors of a state from any source, compared with the exact state.
-
-    total : (2,) the total T, as a ball
-    """
+    """Bounds on the errors of a state from any source; `total` is T (2,) as a ball."""
     if problem.scope == "none" or not problem.sure.any():
         return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
@@ -145,7 +142,7 @@ def _steepest(problem: FrictionProblem, size: Array) -> Array:
 def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) -> float:
     """The r of step 2: some vector of at most this length, added to all eta, restores the total.
 
-    The result is infinite if no r is found.
+    It is infinite if no r is found.
 
     turned  : (n,) each eta_i may also change by a vector of up to this length
     missing : bound on the difference of the sum of the forces from the total
@@ -183,9 +180,9 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
 def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: Array) -> float:
     """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
 
-    It is the sum of e_i |q_i - q*_i|, and a term for the error of the total. It needs |q_i| <= P_i
-    up to rounding. e_i is the distance of X - (B q)_i from the deflection of q_i or, where
-    |q_i| = P_i, from the ray of all eta with this force.
+    It is the sum of e_i |q_i - q*_i|, plus a term for the error of the total, and holds if
+    |q_i| <= P_i up to rounding. e_i is the distance of X - (B q)_i from the deflection of q_i or,
+    where |q_i| = P_i, from the ray of all eta with this force.
 
     errors : (n,) bounds on |q - q*|
     """
@@ -254,7 +251,7 @@ def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) ->
     least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # bounds X.t
     highest = thresholds.upper + uncertainty  # bounds |X - coupled| where an asperity sticks
     pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)
-    # If i stuck, |X| would be small. Then differences of B q across t would turn the forces.
+    # If i stuck, |X| would be so small that differences of B q across t turned the forces too far.
     weights, side = np.where(sure, least, 0.0), coupled @ across
     mean = float(weights @ side) / float(weights.sum())
     spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ uncertainty**2)
@@ -262,8 +259,8 @@ def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) ->
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
     complete = problem.stray == 0 and bool(sure.all())
     proved = bool(sliding.any()) or complete
-    # If the bias is 0, the only state has all forces along t. So below the friction limit not all
-    # asperities slide. If all but one slide, that one sticks.
+    # If the bias is 0, all forces are along t. So below the friction limit not all asperities
+    # slide, and if all but one slide, that one sticks.
     straight = problem.bias == 0.0 and problem.margin > 0 and unused < float(least.min())
     below = float(left.lower) > AT_THE_END * ROUNDOFF * size
     last = complete and straight and below and int(sliding.sum()) == len(P) - 1

@@ -1,8 +1,9 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-docs/theory/vector-friction.md, "Cones", derives it and defines t, u, S and epsilon; the shift is S
-times the local compliance. The variables are q / (epsilon P) of each asperity with the shear force
-q and the load P, and those of the cones. The multiplier of the total is the rigid displacement.
+docs/theory/vector-friction.md, "Cones", derives it and defines t, u, S and epsilon. The *shift*, S
+times the local compliance, makes the quadratic form convex. The variables are q / (epsilon P) of
+each asperity with the shear force q and the load P, and those of the cones. The multiplier of the
+total is the rigid displacement.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class _Lift(NamedTuple):
     orders : (k,) order of each variable in u; the first variable is the number 1
     cones  : (cones, 3, k) coefficients of x, y, w
     share  : (k,) coefficients of m / P = 1 - t^3, where m is a bound on |q|
-    energy : (2, k) the first row plus S times the second gives the coefficients of the local energy
+    energy : (2, k) two rows; the first plus S times the second are coefficients of the local energy
     """
 
     orders: Array
@@ -67,16 +68,16 @@ FIVE = _Lift(
     energy=np.array([[0, 0, 3, -5, 3, -3 / 5, 0], [0, 0, -3, 17 / 3, -4, 1, 1 / 3]]),
 )
 
-#: Below this fraction of gross sliding the state is proportional to T to the solver's accuracy, so
-#: the program is solved at this fraction and the result scaled. A heuristic.
+#: If |T| is below this fraction of gross sliding, sum P, the state is proportional to T to the
+#: solver's accuracy: the program is solved at this fraction, and the result scaled. A heuristic.
 ELASTIC = 1e-9
 
-#: Largest accepted residual over the largest accepted `duality_gap`. A heuristic: the error of the
-#: forces is about the root of that of the energy, which is 1e-4 for the default gap of 1e-8.
+#: Largest accepted residual divided by the largest accepted `duality_gap`. A heuristic: errors of
+#: forces are about the root of that of the energy, which is 1e-4 for the default gap of 1e-8.
 SLIPS = 1e4
 
 #: Limits on Clarabel's steps, as parts of the way to the boundary of the cones, in order of trial.
-#: Short steps give a tenth of the error; a few problems need long ones. Heuristics.
+#: Errors with 0.9 are a tenth of those with 0.99, which a few problems need. Heuristics.
 STEPS = (0.9, 0.99)
 
 
@@ -119,9 +120,9 @@ class FrictionConic:
                 q, X, slips = (scale * each for each in state[1:4])
                 return VectorState(total, q, X, slips, state.iterations)
         raise SolverError(
-            f"clarabel stopped after {raw.iterations} steps with {raw.status}, at an energy proved "
-            f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
-            f"accepted are {self.accepted:g} and {SLIPS * self.accepted:g}",
+            f"clarabel stopped after {raw.iterations} steps with {raw.status}, a duality gap of "
+            f"{gap:.3g} of the energy and a residual of {residual:.3g}; accepted are "
+            f"{self.accepted:g} and {SLIPS * self.accepted:g}",
             solver=solver,
             advice="try a larger `accepted`, or FrictionNewton()",
             iterate=scale * state.increments,
@@ -162,9 +163,7 @@ class FrictionProgram:
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
-        """Minimise (1/2) q'(B + shift) q plus the local energies less the shift, subject to the
-        prescribed total and the cones.
-        """
+        """The program in standard form: the objective, the prescribed total and all cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
@@ -213,7 +212,7 @@ class FrictionProgram:
         """Forces, rigid displacement and slips, from the solver's variables and multipliers.
 
         An interior-point method returns |q_i| < P_i and a slip > 0 everywhere. An asperity slides
-        if the slip exceeds the difference of its deflection from the threshold.
+        if the slip exceeds the threshold minus the deflection.
         """
         problem = self.problem
         n, P, thresholds = len(problem), problem.loads, problem.thresholds
@@ -235,10 +234,10 @@ def _too_dense(problem: FrictionProblem) -> SolverError:
     worst = np.argsort(-numbers)[:5]
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(
-        f"too dense for a convex program: the least shift of the tangential kernel is "
-        f"{problem.share:.4g} of the local compliance, and at most 1 is convex. "
-        f"Largest convexity numbers, contact radii over (pi/4) times the distance to the nearest "
-        f"neighbour, by their indices: {named}",
+        f"asperities too dense for a convex program, which needs S <= 1: the kernel is convex from "
+        f"a shift S that is {problem.share:.4g} of the local compliance. Largest convexity numbers "
+        f"(contact radii divided by pi/4 times the distance to the nearest neighbour), by "
+        f"asperity: {named}",
         solver="friction (conic)",
         advice="use a smaller load, sharper tips, or asperities further apart",
     )

@@ -1,8 +1,7 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
 docs/theory/vector-friction.md, "Newton's method", describes the method, and `vector_shear.problem`
-the symbols in scaled units; eta_i is the sum of deflection and slip of asperity i. `convex.newton`
-solves
+the symbols in scaled units. With the sums eta_i of deflection and slip, `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
@@ -31,8 +30,8 @@ class FrictionNewton:
     """A solver for `shear_vector`: Newton's method, started from the state that `shear` finds.
 
     The method stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not
-    halve this residual. If this takes more than `max_iterations` steps, `shear_vector` raises
-    SolverError. docs/theory/vector-friction.md defines the symbols.
+    halve this residual. After `max_iterations` steps, `shear_vector` raises SolverError.
+    docs/theory/vector-friction.md, "What is proved of a state", defines the symbols.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
     >>> state.residual < 1e-12
@@ -134,8 +133,7 @@ class _Friction:
 def _direction(problem: FrictionProblem, state: newton.Iterate) -> Array:
     """The step d(eta).
 
-    If the matrix is not positive definite, a diagonal that makes the kernel positive semidefinite
-    is added to the kernel.
+    If the matrix is not positive definite, the kernel gets a diagonal that makes it semidefinite.
     """
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
@@ -211,11 +209,11 @@ def _onto_total(problem: FrictionProblem, eta: Array, total: Array) -> Array | N
 
 def advice(problem: FrictionProblem, total: float) -> str:
     """What the user can try if no state is found at this total."""
-    place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
+    place = f"the shear force is {total / float(problem.loads.sum()):.6g} f P"
     number = float(problem.convexity_numbers.max())
     if number < 1:
         return f"{place}; try a shear force a little smaller"
     return (
-        f"{place}, of a contact so crowded that the energy need not be convex (convexity number "
-        f"{number:.3g}, convex below 1): press less hard, or on sharper tips"
+        f"{place}, in a contact so crowded that the energy need not be convex (convexity number "
+        f"{number:.3g}, convex below 1): use a smaller load, or sharper tips"
     )

@@ -1,14 +1,14 @@
 """The friction problem of the loaded asperities, with vectors of shear forces.
 
-docs/theory/vector-friction.md derives the equations. Here forces are in units of the coefficient of
-friction f, displacements in units of c_t f and energies in units of c_t f^2, with Mindlin's ratio
-c_t. In these units the deflection of an asperity with the load P by the shear force u is
+docs/theory/vector-friction.md derives the equations. Here shear forces are divided by the
+coefficient of friction f, displacements by c_t f and energies by c_t f^2, with Mindlin's ratio c_t.
+The shear force u deflects an asperity with the load P and Hertz's coefficient k by
 
-    own(u) = threshold [1 - (1 - u / P)^(2/3)],    threshold = k P^(2/3),
+    own(u) = threshold [1 - (1 - u / P)^(2/3)],    threshold = k P^(2/3).
 
-with Hertz's coefficient k; the kernel (1) of the page is B_ij = A_ij [(1 - bias) I + 2 bias d d'],
-with bias = nu / (2 - nu), Poisson's ratio nu and the unit vector d from j to i; and the forces q_i,
-|q_i| <= P_i, with the sum T = Q / f, the slips and the rigid displacement X satisfy
+The kernel (1) of the page is B_ij = A_ij [(1 - bias) I + 2 bias d d'], with bias = nu / (2 - nu),
+Poisson's ratio nu and the unit vector d from j to i. The forces q_i, |q_i| <= P_i, with the sum
+T = Q / f, the slips and the rigid displacement X satisfy
 
     X = own(q_i) + (B q)_i + slip_i,
 
@@ -73,7 +73,7 @@ class FrictionProblem:
     sure     : True where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
     stiffness : upper bound on 1 / h_i where sure, 0 elsewhere
-    stray    : bound on the total load of all asperities that are neither sure nor proved open
+    stray    : bound on the total load of all asperities not proved to touch or to be open
     stray_effect : bound on the displacement of any asperity by this load
     bias     : nu / (2 - nu)
     """
@@ -156,16 +156,11 @@ class FrictionProblem:
 
     @property
     def elastic(self) -> Ball:
-        """(n,) parts of a shear force that the asperities carry if all stick.
-
-        These parts are the derivatives of the loads with respect to the total load.
-        """
+        """(n,) parts of a shear force on the asperities if all stick: dP_i / d(total load)."""
         return self.levels.top.tangent.loads[self.places]
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) the shear forces u and the displacements eta in the simpler model of `shear`.
-
-        Both are in scaled units; eta is the sum of deflection and slip.
+        """(n,) scaled shear forces u, and sums eta of deflection and slip, in the model of `shear`.
 
         height : [force] T = Q / f
         """
@@ -208,17 +203,15 @@ class FrictionProblem:
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) the forces q(eta) of asperities that take up displacements by deflection and slip.
+        """(n, 2) the forces q(eta), with |q_i| = P_i where an asperity slides.
 
-        |q_i| = P_i where an asperity slides.
-
-        deflections : (n, 2) eta
+        deflections : (n, 2) eta, the sums of deflection and slip
         """
         _, across = self.slopes(deflections)
         return deflections * across[:, None]
 
     def slopes(self, deflections: Array) -> tuple[Array, Array]:
-        """(n,) the eigenvalues of dq/deta along and across the deflections eta (n, 2)."""
+        """(n,) the eigenvalues of dq/deta along and across eta (n, 2)."""
         sizes = np.hypot(*deflections.T)
         return slopes(self.loads / self.thresholds, sizes / self.thresholds)
 

@@ -1,8 +1,8 @@
 """`shear_vector`: the friction state of a pressed contact with the full tangential kernel.
 
-`shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces move the
-surface by Cerruti's tensor, so forces and slips are vectors, which turn a little from the direction
-of the shear force (docs/theory/vector-friction.md).
+`shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces displace the
+surface by Cerruti's solution. So forces and slips are vectors, with directions that differ a little
+from that of the shear force (docs/theory/vector-friction.md).
 """
 
 from __future__ import annotations
@@ -30,8 +30,7 @@ from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 
 
 class FrictionSolver(Protocol):
-    """The interface of solvers of `shear_vector`; it must raise SolverError for an inaccurate
-    result."""
+    """The interface of solvers of `shear_vector`. For inaccurate results they raise SolverError."""
 
     @property
     def name(self) -> str: ...
@@ -59,8 +58,8 @@ class VectorShearState(Table, Plottable):
     solver, iterations : name of the solver, and its number of steps
 
     At |Q| = f P the forces are f P_i along Q. If these forces displace the asperities by different
-    amounts perpendicular to Q, this state is reached only in the limit of an infinite displacement,
-    and the displacement, the slips, `residual` and `duality_gap` are infinite.
+    amounts perpendicular to Q, this state is the limit of an infinite displacement. The
+    displacement, the slips, `residual` and `duality_gap` are then infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.holds
@@ -96,7 +95,7 @@ class VectorShearState(Table, Plottable):
 def shear_vector(
     contact: Contact, *, force: ArrayLike, solver: FrictionSolver | None = None
 ) -> VectorShearState:
-    """The friction state with the full tangential kernel: Q grew from 0 at constant normal load.
+    """The friction state with the full tangential kernel, after Q grew from 0 at constant load.
 
     docs/theory/vector-friction.md derives the equations and the bounds.
 
@@ -104,8 +103,7 @@ def shear_vector(
     solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
 
     Raises InputError if the scene has no friction or |Q| exceeds f P; SolverError if the solver
-    does not converge or is not installed, or if the program is not convex because the asperities
-    are too crowded.
+    does not converge or is not installed, or if asperities are too crowded for a convex program.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> print(f"{state.disagreement:.3f}")
@@ -157,10 +155,7 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> VectorState:
-    """The solver's result, checked to be finite.
-
-    The forces in a SolverError of the solver are converted to those of all asperities [force].
-    """
+    """The solver's result, checked to be finite; forces in a SolverError become [force] (N, 2)."""
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
@@ -214,7 +209,7 @@ def _times(vectors: Array, size: Array | float) -> Array:
 
 
 def _rounding(problem: FrictionProblem, state: VectorState) -> float:
-    """Bound on what the rounding of the forces [force] can add to the energy."""
+    """Bound on the change of the energy by rounding of the forces [force]."""
     size = problem.sizes(state.increments)
     own = along(problem.deflections(size), state.increments, size)
     slope = np.hypot(*(own + problem.couple(state.increments)).T)

@@ -87,9 +87,7 @@ def test_a_first_order_solver_is_judged_by_the_contact_law() -> None:
     expected = Newton().solve(problem)
     hasty = ConicCVXPY(solver="SCS", max_iterations=100)
     assert disagreement(hasty.solve(problem), expected) < 1e-12
-    said = (
-        r"^conic in CVXPY \(SCS\): loads miss .* by 0\.00\d+ of .*, accepted 0.000316; try newton"
-    )
+    said = r"^conic in CVXPY \(SCS\): loads err .* by 0\.00\d+ of .*, accepted 0.000316; try newton"
     with pytest.raises(cr.SolverError, match=said) as missed:
         replace(hasty, newton_step=False).solve(problem)
     assert missed.value.iterate is not None
