@@ -1,8 +1,8 @@
-"""Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
+"""Tests and proofs that a matrix is positive definite, by triangular factorisation.
 
 docs/theory/certificate.md, "Choice of the box", 2, gives the proof for an (n, n) matrix in float64.
 It requires 2 (n + 1) (n + 2) u <= 1 with the roundoff u, which is true for all matrices that fit in
-memory. LAPACK may not report overflow, or entries that are not finite. They make the diagonal of
+memory. LAPACK may not report overflow, or entries that are not finite. Both make the diagonal of
 the factor nan or infinite, so the diagonal is checked.
 """
 

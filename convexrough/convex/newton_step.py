@@ -8,7 +8,7 @@ a point with the defect F is
 
 If the loads must keep their sum, beta is the number for which sum W y = 0; otherwise beta is 0. The
 matrix I + W A W is positive definite where the energy is convex. If it is not positive definite,
-diag(`shells`) is added to A, which makes it so. Conjugate gradients also give A W y, from which the
+diag(`shells`) is added to A, with which it is. Conjugate gradients also give A W y, from which the
 step d follows for every asperity, touching or open.
 """
 

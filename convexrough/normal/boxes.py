@@ -10,7 +10,7 @@ If contacts are crowded, overlapping shells about the asperities may prove the c
 (docs/theory/crowded.md, "Shells that overlap"). With the lengths t_i = 1 / (pi E* h_i), distances
 r_ij, any radii s_i, and the energy U_ij of two shells of charge 1 with these radii, the matrix
 
-    S_ij = (1 - t_i / s_i) on the diagonal,  (t_i t_j)^(1/2) (1 / r_ij - U_ij) off it,
+    S_ii = 1 - t_i / s_i,    S_ij = (t_i t_j)^(1/2) (1 / r_ij - U_ij)  for i != j,
 
 is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
 """

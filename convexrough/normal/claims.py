@@ -47,7 +47,7 @@ class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
     one, many : the singular and the plural of the term for a force in messages
-    proved    : the noun in messages before "proved", "not proved" or "wrong": "contact set"
+    proved    : the noun in messages before "proved" or "wrong", such as "contact set"
     kinds     : names of the attributes with indices of wrong statuses, and a text on each
     claimed   : (n,) True where the asperity is claimed to touch or, in a verdict on shear, to slide
     claims    : the status claimed where `claimed` is True, and that where it is False, such as
@@ -127,7 +127,7 @@ class Claim(ABC):
 
     @property
     def holds(self) -> bool:
-        """True if all claimed statuses are proved, all forces accurate, and the total agrees."""
+        """True if all claimed statuses are proved, and forces and total are right to `within`."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
 

@@ -1,6 +1,4 @@
-"""An upper bound on the approach under a total load, before solving, and the asperities that could
-touch.
-"""
+"""An upper bound on the approach under a total load, and the asperities that could touch."""
 
 from __future__ import annotations
 
@@ -70,8 +68,7 @@ def approach_bound(
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) upper bounds on A times weights
     coefficients, offsets : (n,) k, and lower bounds on d
-    load         : L. For m problems the other arrays are (m, n), and the load and the bound are (m,
-        1)
+    load         : L; for m problems, L and the bound are (m, 1) and the other arrays (m, n)
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
@@ -160,8 +157,7 @@ def all_that_could_touch(
     farthest: Callable[[float], float],
     load: float,
 ) -> tuple[Scene, float]:
-    """The scene with all asperities that could touch under a load, and an upper bound on the
-    approach.
+    """The scene with all asperities that could touch under a load, and a bound on the approach.
 
     scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]

@@ -34,7 +34,7 @@ POOR = 2.0**-60
 NONE = np.zeros(0, dtype=np.intp)
 
 CROWDED = "their discs overlap so much that the energy is not proved to be convex"
-POORLY_KNOWN = "the error bounds of their loads are too large to remain where the energy is convex"
+POORLY_KNOWN = "their loads, with error bounds, may lie outside the box where the energy is convex"
 ELSEWHERE = "no given box is proved to contain their loads"
 NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
