@@ -117,7 +117,7 @@ class Certificate(Table):
             return f"nothing is proved because of {which}{why}"
         others = []
         if self.other_solutions_cover:
-            others.append("a disc that covers its nearest neighbour's summit")
+            others.append("a contact disc that covers the summit of its nearest neighbour")
         if self.other_solutions_crowding > 0:
             others.append(
                 f"crowding above {math.floor(self.other_solutions_crowding * 100) / 100:.2f}"
