@@ -1,6 +1,6 @@
-"""Balls: numbers known to within a radius. A formula evaluated on balls also gives an error bound.
+"""Balls: numbers with error bounds. A formula evaluated on balls bounds the error of its result.
 
-The midpoint of a ball is the sum of a pair of float64 numbers, the radius is one float64 number.
+The midpoint of a ball is a pair (the sum of two float64 numbers), the radius is a float64 number.
 Every operation returns a ball that contains the result for every choice of numbers in the operands.
 The radius is infinite where nothing is known: after an overflow, or if a divisor may be 0.
 """
@@ -172,7 +172,7 @@ class Ball:
         return Ball(Pair(self.mid.high * unit, self.mid.low * unit), self.radius * unit)
 
     def positive_part(self) -> Ball:
-        """Balls that contain max(x, 0) for each number x; their radii do not grow."""
+        """Balls that contain max(x, 0) for each number x; their radii are not larger."""
         above = self.mid.high > 0
         high, low = (np.where(above, part, 0.0) for part in self.mid)
         return Ball(Pair(high, low), np.where(self.upper <= 0, 0.0, self.radius))
@@ -209,11 +209,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """The result of `function` on arrays.
-
-    Pairs and balls consist of several arrays: `function` is applied to the first array of all
-    values, to the second of all, and so on.
-    """
+    """The result of `function` on arrays, or on each of the arrays of pairs and balls."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
@@ -321,7 +317,7 @@ def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
 
 
 def power_error(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array]) -> Array:
-    """Error bounds of a concave power f at midpoints x with radii dx; `steep` is dx f(x) / x."""
+    """Error bounds of a concave power f of the balls x +- dx; `steep` is dx f(x) / x."""
     wide = dx > x.high
     if not wide.any():
         return steep

@@ -121,7 +121,7 @@ class Pair(NamedTuple):
     def total(self) -> Pair:
         """The sum along the last axis; the error is at most 2^-97 times the sum of absolute values.
 
-        The numbers are cut into parts of so few bits that float64 sums of these parts are exact.
+        Numbers are divided into parts with so few bits that float64 sums of these parts are exact.
         """
         high, low = np.asarray(self.high), np.asarray(self.low)
         n = high.shape[-1]
@@ -143,7 +143,7 @@ class Pair(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
-    """(length,) read-only numbers; `part` computes slices of them, in several threads."""
+    """(length,) read-only pairs; `part` computes slices of them, in several threads."""
     if length <= CHUNK:
         return Pair(*map(frozen, part(slice(0, length))))
     found = Pair(np.empty(length), np.empty(length))

@@ -2,8 +2,8 @@
 
 A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
 the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
-the four cones (1) and the five cones (2). Each form is exact up to some convexity number S of a
-box: 21/25 with four cones, 1 with five cones. "Proof that the program is exact" proves this.
+the four cones (1) and the five cones (2), and proves up to which convexity number S of a box each
+form is exact: 21/25 with four cones, 1 with five.
 """
 
 from __future__ import annotations

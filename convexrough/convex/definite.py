@@ -1,9 +1,9 @@
-"""Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
+"""Tests and proofs that a matrix is positive definite, by triangular factorisation.
 
 docs/theory/certificate.md, "Choice of the box", 2, gives the proof for an (n, n) matrix in float64.
-The proof needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u. This holds for all matrices that fit
-in memory. LAPACK need not report overflow or entries that are not finite. Such entries make the
-diagonal of the factor nan or infinite, so the diagonal is checked.
+It requires 2 (n + 1) (n + 2) u <= 1 with the roundoff u, which is true for all matrices that fit in
+memory. LAPACK may not report overflow, or entries that are not finite. Both make the diagonal of
+the factor nan or infinite, so the diagonal is checked.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from convexrough.roundoff import ROUNDOFF
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
     """The largest of the increasing `margins` for which `proved` is true; 0 if there is none.
 
-    The search is by bisection. It assumes that `proved` is true for all margins below one for which
-    it is true.
+    The search is by bisection. It assumes that `proved` is true below each margin for which it is.
     """
     low, high = -1, len(margins)
     middle = 0  # begin with the smallest margin: if it is not proved, no other margin needs a test
@@ -51,6 +50,7 @@ def proved_margin(
     couplings   : (n, n) computed symmetric M, with 0 on the diagonal
     margins     : numbers from 0 to 1, in the order in which they are tried
     entry_error : bound on the relative error of each entry of M
+    spare       : the part of the smallest eigenvalue that is kept in addition to mu
     """
     n = len(couplings)
     perturbation = entry_error * float(np.abs(couplings).sum(axis=1).max())

@@ -48,11 +48,11 @@ class Iterate(NamedTuple):
     energy: float  # Phi(p)
     residual: float  # the largest |F|
     scale: float  # the unit of residuals
-    at: Any  # what else the law knows at this point
+    at: Any  # further results of the law at this point
 
 
 class Law(Protocol):
-    """A law of contact, as Newton's method needs it.
+    """A law of contact: the functions that Newton's method calls.
 
     solver, unit : names of the solver and of the unit of residuals, for error messages
     """
@@ -81,10 +81,7 @@ class Law(Protocol):
         ...
 
     def noise(self, state: Iterate) -> float:
-        """A limit for the 2-norm of F, well below the rounding errors of A p.
-
-        If F is smaller than this, further steps do not help.
-        """
+        """The 2-norm of F below which further steps do not help, because of rounding in A p."""
         ...
 
     def advice(self, state: Iterate) -> str:
@@ -139,7 +136,7 @@ def solve(law: Law, state: Iterate, stopping: Stopping) -> tuple[Iterate, int]:
     needed = max(stopping.tolerance, stopping.accurate)
     raise SolverError(
         f"residual {_relative(state):.3g} of {law.unit} after {stopping.most} steps, "
-        f"{needed:.3g} needed",
+        f"at most {needed:.3g} needed",
         solver=law.solver,
         advice=law.advice(state),
         iterate=state.forces,
@@ -162,7 +159,7 @@ def descend(law: Law, state: Iterate, direction: Array) -> Iterate:
                 return trial
         length /= 2.0
     raise SolverError(
-        "no step along its direction lowers the energy",
+        "no step in the computed direction lowers the energy",
         solver=law.solver,
         advice=law.advice(state),
         iterate=state.forces,

@@ -6,11 +6,10 @@ a point with the defect F is
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
-The number beta is 0. But if the loads must keep their sum, beta is the number with which
-sum W y = 0. The matrix I + W A W is positive definite where the energy is convex. If this matrix is
-not positive definite, diag(`shells`) is added to A, which makes the matrix positive definite.
-Conjugate gradients also give A W y, from which the step d follows for every asperity, touching or
-open.
+If the loads must keep their sum, beta is the number for which sum W y = 0; otherwise beta is 0. The
+matrix I + W A W is positive definite where the energy is convex. If it is not positive definite,
+diag(`shells`) is added to A, with which it is. Conjugate gradients also give A W y, from which the
+step d follows for every asperity, touching or open.
 """
 
 from __future__ import annotations
@@ -29,8 +28,7 @@ from convexrough.influence.coupling import Influence, Smoother
 #: without a stored matrix. Heuristics, from timings.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
-#: Conjugate gradients are never asked for a smaller relative residual than this, in single and in
-#: double precision.
+#: Least relative residual to which conjugate gradients run, in single and in double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
 #: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, is
@@ -73,7 +71,7 @@ def correct(
             return _iterate(influence, extra, root, defect, balanced, tolerance)
         except _IndefiniteError:
             continue
-    raise SolverError("the shell-shifted matrix is not positive definite", solver="newton")
+    raise SolverError("the matrix of a step is not positive definite", solver="newton")
 
 
 class _IndefiniteError(Exception):
@@ -163,10 +161,9 @@ def _iterate(
 class _Smoothed:
     """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
 
-    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. A call also changes the
-    residual by a multiple of the diagonal of W, so that single precision is enough. The sum of
-    these multiples, `shift`, is the number beta of the step for the scaled defect, from which the
-    residual is computed.
+    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. If balanced, a call also
+    adds a multiple of the diagonal of W to the residual, so that single precision is enough. The
+    sum of these multiples, `shift`, is beta of the step, divided by the scale of the defect.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:

@@ -1,1 +1,1 @@
-"""The normal contact problem, bounds from a prescribed load, and the certificate."""
+"""The normal contact problem, bounds on the approach under a load, and the certificate."""

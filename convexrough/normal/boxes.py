@@ -1,16 +1,16 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Choice of the box".
 
-In crowded contacts a box may limit the loads of the touching asperities only, and assume all others
-open: docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). Symbols: h is
-the local compliance at the upper ends of a box (`NormalProblem.compliance`), H the diagonal matrix
-of the h, and A the compliance operator. On the box the Hessian of the energy is at least mu H with
-mu = 1 - `convexity_number`, the margin of convexity.
+If contacts are crowded, a box may contain only the loads of the touching asperities, with all other
+loads 0: docs/theory/crowded.md. A stack is many problems, one per row (`normal.stack`). Symbols: h
+is the local compliance at the upper ends of a box (`NormalProblem.compliance`), H the diagonal
+matrix of the h, and A the compliance operator. On the box the Hessian of the energy is at least
+mu H, with the margin mu = 1 - `convexity_number`.
 
-Where contacts are crowded, overlapping shells about the asperities may prove the convexity
+If contacts are crowded, overlapping shells about the asperities may prove the convexity
 (docs/theory/crowded.md, "Shells that overlap"). With the lengths t_i = 1 / (pi E* h_i), distances
 r_ij, any radii s_i, and the energy U_ij of two shells of charge 1 with these radii, the matrix
 
-    S_ij = (1 - t_i / s_i) on the diagonal,  (t_i t_j)^(1/2) (1 / r_ij - U_ij) off it,
+    S_ii = 1 - t_i / s_i,    S_ij = (t_i t_j)^(1/2) (1 / r_ij - U_ij)  for i != j,
 
 is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
 """
@@ -33,19 +33,19 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
-#: Shells are fitted to the contact radii if the convexity number is above this. A heuristic.
+#: Shells are also fitted to the contact radii if the convexity number is above this. A heuristic.
 FIT_FROM = 0.8
 
-#: Weight of contact radii in the radii of fitted shells; half the distances to neighbours have the
-#: weight 1 - FITTED. A heuristic: any weight gives valid shells (docs/theory/certificate.md,
-#: "Choice of the box", 3).
+#: Weight of contact radii in the radii of fitted shells; half the distance to the nearest neighbour
+#: has the weight 1 - FITTED. A heuristic: any weight gives valid shells
+#: (docs/theory/certificate.md, "Choice of the box", 3).
 FITTED = 0.9
 
 #: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
 MARGINS = (0.1, 1e-3)
 
 #: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
-#: plus LEAST_LEEWAY times the largest load. Heuristics: the proof allows any box.
+#: plus LEAST_LEEWAY times the largest load. Heuristics: proofs are valid for any box.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
 #: Number of touching asperities up to which a Cholesky factorisation costs no more than a proof by
@@ -55,20 +55,19 @@ FACTORISED = 1500
 #: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
 CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
-
-#: WIDTHS are radii of shells divided by t, the cheapest first. Where s = (t_i t_j)^(1/2) / r_ij of
-#: a pair is close to 1, the radii are at least WIDENED t / (1 - s)^(1/2). Each radius is then
-#: raised to the radius of each near neighbour minus LESS times its distance, if that is larger.
-#: Heuristics: any radii give valid bounds.
+#: Least radii of overlapping shells: t times one of WIDTHS, the cheapest first; and
+#: WIDENED t / (1 - c)^(1/2), with the largest c = (t_i t_j)^(1/2) / r_ij of near neighbours j. Each
+#: radius is then raised to the radius of each near neighbour minus LESS times its distance, if that
+#: is larger. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
-#: Number of nearest neighbours that set the radii of shells.
+#: Number of near neighbours that affect the radius of a shell.
 NEAREST = 8
 
-#: Largest number of pairs of shells for each asperity, limited by memory.
+#: Largest number of pairs of overlapping shells, divided by the number of asperities, for memory.
 MOST_PAIRS = 200
 
-#: Overlaps of shells wider than this many times the median are searched one by one, for speed only.
+#: For shells wider than WIDE times the median, overlaps are searched shell by shell, for speed.
 WIDE = 2.0
 
 #: Largest number of asperities for which a proof by overlapping shells is tried. Such a proof needs
@@ -80,11 +79,11 @@ class Box(NamedTuple):
     """A box of loads, and the convexity of the energy on it; for one problem or for a stack."""
 
     scope: Scope  # "global" if every solution lies in the box
-    shells: Array  # (n,) 1 / (pi E* s_i) of shells, which may prove the convexity
+    shells: Array  # (n,) 1 / (pi E* s_i) for shells of radii s_i, which may prove the convexity
     loads: Array  # (n,) upper ends of the box; the lower ends are 0
     compliance: Array  # (n,) h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # (n,) the proof must show that loads are below these; infinite where not needed
+    faces: Array  # (n,) limits of loads that the proof must show; infinite where none is needed
     fixed_open: NDArray[np.bool_]  # (n,) True where assumed open, which the proof must then show
 
     def at(self, rows: Indices) -> Box:
@@ -99,19 +98,18 @@ class Box(NamedTuple):
         )
 
     def convexity_at(self, compliance: Array) -> Any:
-        """The convexity number by the shells on a box with this compliance at its upper ends."""
+        """The convexity number that shells prove for a box with this compliance at upper ends."""
         return convexity_number(self.shells, compliance)
 
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self, problem: NormalProblem) -> Box:
         """A box that contains this one, to be tried at another load or approach of `problem`.
 
-        The solution at the other load or approach may lie outside this box. So `faces` holds the
-        upper ends, and the proof must show that the loads are below them. If shells prove the
-        convexity on this box, each upper end above 0 is raised to the load at which shell_i / h_i,
-        with shell_i = 1 / (pi E* s_i) and the radius s_i of the shell, equals the convexity number
-        of the box, if that load is larger. So asperities at the rim of the contact, whose loads are
-        small, get upper ends far above the error bounds of their loads, too.
+        The solution at the other load or approach may lie outside this box. So `faces` are the
+        upper ends, and the proof must show that all loads are below them. If shells prove the
+        convexity on this box, an upper end above 0 is raised to the load at which `shells` / h
+        equals the convexity number of the box, if that load is larger. So asperities with small
+        loads also get upper ends far above the error bounds of their loads.
         """
         theta = self.convexity_number
         ends = (2.0 / 3.0 * problem.coefficients * theta / self.shells) ** 3
@@ -127,7 +125,7 @@ class Box(NamedTuple):
 def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
     """The box that contains every solution, and `loads`; for a stack, one box for each row.
 
-    The shells of the problem prove the convexity if the convexity number is below 1.
+    If its convexity number is below 1, the shells of the problem prove the convexity.
 
     highest : upper bound on the approach at every solution
     """
@@ -138,10 +136,8 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Iterator[Box]:
-    """At most one box on which convexity is proved.
-
-    It is the global box, which contains every solution, or else a local box, which contains
-    `loads`.
+    """At most one box on which convexity is proved: the global box, which contains every solution,
+    or else a local box, which contains `loads`.
 
     displacement : (n,) A P for P = `loads`
     """
@@ -173,9 +169,8 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Iterator[
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """A local box for the touching asperities, with all others fixed open.
-
-    None if convexity on the box is not proved.
+    """A local box for the touching asperities, with all others fixed open; None if convexity on it
+    is not proved.
 
     room : (n,) the upper ends of the box exceed `loads` by at least this
     """
@@ -215,9 +210,8 @@ def _scaled(influence: Influence, compliance: Array) -> Array:
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity.
 
-    They are the asperities of pairs that are too close for convexity. If there is no such pair,
-    they are the asperities whose shells of radius t_i meet another shell; if no shells meet, they
-    are all loaded asperities.
+    They are the asperities of pairs that are too close for convexity; if there is no such pair, the
+    asperities whose shells of radius t_i meet another shell; if no shells meet, all of them.
     """
     which = np.flatnonzero(loads)
     if len(which) < 2:
@@ -231,9 +225,8 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
 
 
 def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
-    """The first mu of `margins` with  I + H^(-1/2) A H^(-1/2) >= mu I  proved.
-
-    0 if there is none, or if A is not stored as a matrix.
+    """The first mu of `margins` for which  I + H^(-1/2) A H^(-1/2) >= mu I  is proved; 0 if there
+    is none, or if A is not stored as a matrix.
     """
     if not influence.stored:
         return 0.0

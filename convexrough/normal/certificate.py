@@ -1,8 +1,8 @@
 """The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
 The data of the scene are the given float64 numbers. The module `refine` evaluates the contact law
-in ball arithmetic, and `proved` proves that a solution exists near the loads. This module bounds
-the distance from the loads to that solution.
+in ball arithmetic, and `proved` proves that a solution exists near the refined loads. This module
+bounds the distance from the given loads to that solution.
 """
 
 from __future__ import annotations
@@ -35,10 +35,8 @@ STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
-#: neighbour, every other solution has a contact disc that covers the summit of its nearest
-#: neighbour. In units of this distance, the fraction is the radius a for which (1) of
-#: docs/theory/crowded.md gives the mean m = pi / 4 if the radius in the other solution is b = 1.
-#: The fraction is rounded down.
+#: neighbour, every other solution has a contact disc that covers the summit of the nearest
+#: neighbour: in (1) of docs/theory/crowded.md, a = ROOMY and b = 1 give m <= pi / 4.
 ROOMY = 0.52
 
 
@@ -49,30 +47,30 @@ class Certificate(Table):
     scope : "global": the scene has exactly one solution; "local": the bounds hold for one solution
         near these loads, but others are not excluded (`meaning` describes which are possible);
         "none": nothing is proved, every bound is infinite and every asperity is undecided
-    convexity_number : if below 1, the energy is strictly convex on the box of loads on which the
-        proof is based: the smallest eigenvalue of the Hessian, scaled by each asperity's local
-        compliance, is at least 1 - convexity_number
+    convexity_number : if below 1, the energy is strictly convex on the box of loads that the proof
+        uses: its Hessian is at least (1 - convexity_number) H, with the diagonal matrix H of the
+        local compliances at the upper ends of the box
     codes : index of each status in `STATUSES`
     load_errors : [force] bounds on |load - load in the solution|
-    gaps : [length] gaps that remain under these loads; 0 where an asperity touches
+    gaps : [length] gaps under these loads; 0 where an asperity touches
     gap_errors : [length] bounds on |gap - gap in the solution|
-    approach : [length] the prescribed approach, or the one that fits the loads best
+    approach : [length] the prescribed approach; under a prescribed load, that at which a weighted
+        mean of the gaps of loaded asperities is 0
     approach_error : [length] bound on |approach - approach of the solution|; 0 if prescribed
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
-        solution. If the scope is "global", the solution has the least energy. The bound is 0 up to
-        rounding at the solution. It is infinite if nothing is proved, or if the energy is not
-        proved convex between the loads and the solution. If the total load is prescribed, the
-        energy is that of changed loads: those on asperities that cannot touch are dropped, and the
-        others are scaled to the total
+        solution, which has the least energy if the scope is "global". The bound is infinite if
+        nothing is proved, or if the energy is not proved convex between the loads and the solution.
+        If the total load is prescribed, the energy is that of changed loads: loads on asperities
+        that cannot touch are set to 0, and the others are scaled to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
-        in the solution that it finds; 0 unless contacts are crowded. Solutions nearby in which one
-        of these asperities touches are not excluded
-    other_solutions_crowding : lower bound on the crowding of every other solution. The crowding is
-        the largest (a_i + a_j) / r_ij of all pairs of asperities that can touch, with the distance
-        r_ij and the contact radii a, which are 0 where open. The bound is infinite if there is no
-        other solution, and 0 if nothing is known
-    other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
-        its nearest neighbour
+        in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
+        which one of these asperities touches are not excluded
+    other_solutions_crowding : lower bound on the crowding of every other solution, the largest
+        (a_i + a_j) / r_ij of all pairs of asperities that can touch, with the distance r_ij and the
+        contact radii a, which are 0 where open. The bound is infinite if there is no other
+        solution, and 0 if nothing is proved
+    other_solutions_cover : True if, in every other solution, the contact disc of some asperity
+        covers the summit of its nearest neighbour
     in_the_way : (m,) indices of asperities that prevent a proof; empty if there is a proof
     obstacle : a sentence that says why these asperities prevent a proof
 
@@ -101,12 +99,12 @@ class Certificate(Table):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) "contact" if the load is proved positive, "open" if the gap is, else "undecided"."""
+        """(n,) "contact": load proved positive; "open": gap proved positive; else "undecided"."""
         return frozen(STATUSES[self.codes])
 
     @property
     def meaning(self) -> str:
-        """The scope in words: which other solutions are possible.
+        """A text on the scope: which other solutions are possible, or why nothing is proved.
 
         >>> contact.certificate.meaning
         'the only solution'
@@ -120,7 +118,7 @@ class Certificate(Table):
             return f"nothing is proved because of {which}{why}"
         others = []
         if self.other_solutions_cover:
-            others.append("a disc that covers its nearest neighbour's summit")
+            others.append("a contact disc that covers the summit of its nearest neighbour")
         if self.other_solutions_crowding > 0:
             others.append(
                 f"crowding above {math.floor(self.other_solutions_crowding * 100) / 100:.2f}"
@@ -160,8 +158,8 @@ def certify(
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
     approach, load : [length], [force] the prescribed quantity, exactly one of the two. If the load
-        is prescribed, the loads are scaled to this total, and the bounds include the change by
-        scaling
+        is prescribed, gaps and energy are those of the loads scaled to this total; `load_errors`
+        are those of the given loads
     influence : compliance operator "dense", "lattice" or "scattered"; None for the cheapest
 
     Raises InputError for loads that are negative, not finite or not of the shape (n,).
@@ -194,7 +192,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     """The certificate of the given `loads` (N,) [force] of all asperities of the scene.
 
     level : the solution that is proved to be near these loads, or the obstacle to a proof
-    start : the loads of the asperities that can touch, scaled to the total load if it is prescribed
+    start : the trial of the given loads of asperities that can touch, scaled to a prescribed total
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
@@ -276,10 +274,7 @@ def _apart(loads: Array, found: Level) -> Array:
 
 
 def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
-    """(N,) [force] bounds on |load - load in the solution|.
-
-    The bound is the load itself where an asperity cannot touch.
-    """
+    """(N,) [force] bounds on |load - load in the solution|; the load where it cannot touch."""
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
     errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
@@ -289,9 +284,9 @@ def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
 def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
-    The bound is e'|P - P*|, with the violations e of the contact law at P, if Phi is convex between
-    P and P*. Loads q on asperities fixed open add at most e'q; without these loads the residuals
-    change by A q. If Phi is not proved convex, the bound is infinite.
+    If Phi is convex between P and P*, the bound is e'|P - P*| with the violations e of the contact
+    law at P; if Phi is not proved convex, it is infinite. Loads q on asperities fixed open add at
+    most e'q; setting these loads to 0 changes the residuals by A q.
 
     moved : (n,) bounds on |P - P*|
     """
@@ -349,10 +344,9 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy of loads s on asperities that cannot touch.
+    """Bound on the energy of loads s on asperities that cannot touch; 0 under load control.
 
-    The energy is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g. If the total load is
-    prescribed, the loads s are dropped and the bound is 0.
+    The energy is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g.
     """
     screened = loads > 0
     screened[problem.candidates] = False
@@ -374,14 +368,13 @@ def _screened_energy(
 
 
 class OtherSolutions(NamedTuple):
-    """Properties of all solutions other than the one found, which a local certificate states.
-
-    docs/theory/crowded.md, "Other solutions", derives these properties.
+    """Properties of all solutions other than the one found: docs/theory/crowded.md, "Other
+    solutions".
     """
 
     possible: bool  # False if it is proved that there are none
     crowding: float  # lower bound on their crowding (see `Certificate`); infinite if there are none
-    cover: bool  # in each, a contact disc covers the nearest neighbour's summit
+    cover: bool  # True if in each of them a contact disc covers the nearest neighbour's summit
 
     @classmethod
     def of(cls, level: Level, box: Box) -> OtherSolutions:
@@ -411,10 +404,7 @@ NO_OTHERS = OtherSolutions(False, np.inf, True)
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """(n,) the mean m of contact radii a and b in two solutions; m increases with a and with b.
-
-    (2 / pi) m is the shell radius t of (1) of docs/theory/crowded.md.
-    """
+    """(n,) upper bounds on m of (1) in docs/theory/crowded.md, which increases with a and b."""
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

@@ -17,7 +17,7 @@ from convexrough.errors import InputError
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
-#: Largest error of forces and totals by default, as a fraction of the largest force or the total.
+#: Default of `Claim.within`.
 WITHIN = 0.01
 
 #: A force is a suspect if its error exceeds this fraction of the largest error.
@@ -47,8 +47,8 @@ class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
     one, many : the singular and the plural of the term for a force in messages
-    proved    : what messages put before "proved", "not proved" or "wrong", such as "contact set"
-    kinds     : names of the attributes that hold indices of wrong statuses, with a text on each
+    proved    : the noun in messages before "proved" or "wrong", such as "contact set"
+    kinds     : names of the attributes with indices of wrong statuses, and a text on each
     claimed   : (n,) True where the asperity is claimed to touch or, in a verdict on shear, to slide
     claims    : the status claimed where `claimed` is True, and that where it is False, such as
         ("contact", "open")
@@ -108,7 +108,7 @@ class Claim(ABC):
 
     @property
     def basis(self) -> str:
-        """A text: what the proof assumes, and whether that is proved; "" if it assumes nothing."""
+        """What the proof assumes, and whether that is proved; "" if it assumes nothing."""
         return ""
 
     @property
@@ -127,7 +127,7 @@ class Claim(ABC):
 
     @property
     def holds(self) -> bool:
-        """True if all claimed statuses are proved, all forces accurate, and the total agrees."""
+        """True if all claimed statuses are proved, and forces and total are right to `within`."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
 
@@ -236,11 +236,10 @@ class Claim(ABC):
 
     @cached_property
     def suspects(self) -> Indices:
-        """(m,) indices of asperities with a wrong status or a wrong force, likeliest first.
+        """(m,) indices of asperities with a wrong status or a wrong force, the likeliest first.
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
-        two. If the sum of the forces differs from that of the solution, all forces are
-        also compared after scaling them to the sum of the solution.
+        two. Forces with another sum than the solution are also compared after scaling to its sum.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or self.near_enough:
@@ -258,7 +257,7 @@ class Claim(ABC):
 
 
 def _power_of_ten(factor: float) -> int:
-    """The power of ten that a factor equals to 1 %; 0 if none."""
+    """The exponent of the power of ten that differs from a factor by less than 1 %; 0 if none."""
     if not (0 < factor < math.inf):
         return 0
     exact = math.log10(factor)

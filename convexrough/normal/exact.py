@@ -1,7 +1,7 @@
 """The units of a normal problem, and its numbers to about thirty digits.
 
 The numbers of a scene are float64. Its coefficients, offsets and 1 / (pi E*) follow from these
-numbers by few operations, of which pairs and balls bound the rounding.
+numbers by few operations on pairs and balls, which bound the rounding errors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Units:
     """Units of length and force in which the numbers of a problem are about 1.
 
     They are the units of the scene times a power of two (length) and a power of eight (force). So
-    it causes no rounding to scale a float64 number, or a force to the power 2/3.
+    scaling rounds neither float64 numbers nor forces to the power 2/3.
     """
 
     length: float  # [length] the scaled unit of length
@@ -69,7 +69,7 @@ class Data(NamedTuple):
 
 
 def exact_data(scene: Scene, which: Indices, units: Units, sizes: Array) -> Data:
-    """The numbers of the asperities `which` of a scene.
+    """The coefficients, offsets and scale of the asperities `which` of a scene.
 
     sizes : (n,) bounds on the numbers from which the offsets are computed, in scaled units
     """

@@ -40,7 +40,7 @@ class Pressed(NamedTuple):
 
     @classmethod
     def at(cls, problem: NormalProblem, indentation: Array) -> Pressed:
-        """The loads at indentations; one must be positive if a load is prescribed."""
+        """The loads at these indentations, scaled to a prescribed total (one must be positive)."""
         own = np.maximum(indentation, 0.0)
         ratio = own / problem.coefficients
         root = np.sqrt(ratio)
@@ -75,11 +75,11 @@ def on_hertz_pressure(problem: NormalProblem) -> Array:
 
     P = x^3 s with s = (1 - r^2 / a^2)^(1/2), where r is the distance from the axis and a an
     estimated contact radius. The number x follows from a prescribed load. At a prescribed approach,
-    x minimises the energy; the condition is  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If these s give
-    no x > 0, s is replaced by 1 at the asperity with the largest offset and by 0 at all others.
+    x minimises the energy; the condition is  x^2 sum k s^(5/3) + x^3 s'A s = D's.  If this gives no
+    x > 0, then s is 1 at the asperity with the largest offset and 0 at all others.
     """
     load, approach = problem.load, problem.approach
-    if approach is None:  # small loads keep their digits if the highest is at 0
+    if approach is None:  # small loads keep their digits if the largest D is 0
         approach = -problem.offsets.max(axis=-1, keepdims=problem.offsets.ndim > 1)
     prescribed = problem.offsets + approach
     inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))

@@ -33,8 +33,8 @@ from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial
 from convexrough.roundoff import SAFETY
 
-#: Largest accepted residual of `Level.response` after refinement, divided by that before it or by
-#: the right side, whichever is larger.
+#: Largest accepted residual of `Level.response` after refinement, divided by the larger of the
+#: residual before refinement and the right side.
 SOLVED = 1e-6
 
 
@@ -89,10 +89,10 @@ class Level:
     trial     : the loads from which the solution was proved, and their residuals; None at L = 0
     box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
         L = 0
-    distance  : bound on the norm of P - P*, for the loads P of `trial` scaled to the total L, and
-        the solution P*; the square of the norm is sum_i h_i (P_i - P*_i)^2
-    compliance : (n,) the h_i of this norm: the local compliance at the upper ends of a second,
-        smaller box, which also contains the solution
+    distance  : bound on (sum_i h_i (P_i - P*_i)^2)^(1/2), with the loads P of `trial` scaled to the
+        total L, and the solution P*
+    compliance : (n,) these h_i: the local compliance at the upper ends of a second, smaller box,
+        which also contains the solution
     obstacle  : the reason why nothing is proved, or None
     """
 
@@ -109,9 +109,7 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, obstacle: Obstacle) -> Level:
-        """The level for loads near which no solution is proved: all radii are infinite, except that
-        of a prescribed approach.
-        """
+        """The level for loads near which no solution is proved."""
         loads = Ball.around(state.loads, np.inf)
         indentation = Ball.around(state.indentation.mid, np.inf)
         error = np.inf if problem.by_load else state.approach.radius
@@ -194,7 +192,7 @@ class Level:
 
     @cached_property
     def energy(self) -> Ball:
-        """The energy V(L) of this module's docstring."""
+        """The energy V(L), defined in this module's docstring."""
         return energies([self])[0]
 
     @cached_property
@@ -207,7 +205,7 @@ class Level:
         """The asperities as linear springs, for `response`. Raises ProofError at L = 0."""
         state = self.trial
         if state is None:
-            raise ProofError("at no load the approach has no derivative")
+            raise ProofError("at the load 0 the approach has no derivative")
         stiffness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
         touching, bound, margin = state.inside, np.full(len(self.problem), np.inf), 0.0
         doubtful = np.zeros(len(touching), dtype=bool)
@@ -229,12 +227,11 @@ class Level:
 
         The equations hold for touching asperities; x is 0 for others. The solution is refined in
         pairs of float64 numbers until the residual no longer halves. The bounds on its error
-        (docs/theory/one-theorem.md) allow for asperities that are neither proved to touch nor
-        proved to be open.
+        (docs/theory/one-theorem.md) also hold if asperities without a proved status touch.
 
         right : (n,) the given right side;  total : the given sum of x
 
-        Raises SolverError where the system is singular or nearly so, and no derivative exists.
+        Raises SolverError if the system is singular or nearly singular.
         """
         problem, springs = self.problem, self.springs
         touching, c, compliance = springs.touching, springs.slopes, springs.compliance
@@ -257,7 +254,7 @@ class Level:
             return float(np.sqrt(c @ left.value**2))
 
         def known(left: Ball) -> bool:
-            """True if the residual is at most its error bound: it cannot be reduced."""
+            """True if the residual is at most its error bound, so that it cannot be reduced."""
             return size_of(left) <= float(np.sqrt(c @ left.radius**2)) < np.inf
 
         x = completed(Pair.exact(float(total.value) * weights))
@@ -287,9 +284,9 @@ class Level:
                 break
         if size > SOLVED * first and not known(left):
             raise SolverError(
-                "the state has no derivative: its linear system is singular, or nearly",
+                "the state has no derivative: its linear system is singular or nearly singular",
                 solver="response",
-                advice="the energy need not be convex there: press less hard",
+                advice="the energy may not be convex at this load: press with a smaller load",
             )
         return self._proved_response(x, left, beta, total)
 
@@ -302,9 +299,8 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Bounds on three things: the residual after x_j has been changed so that the total is
-            right; the size of this change; the displacements by this change and by the asperities
-            of `others`.
+            """Bounds on the residual after a change of x_j that makes the total right, on this
+            change, and on the displacements by this change and by asperities without proved status.
 
             others : bound on the sum of |x| of asperities neither proved to touch nor to be open
             """

@@ -1,7 +1,7 @@
 """The normal solutions of one scene at many total loads, solved one by one or together.
 
 Many problems are solved together as the rows of a stack. Then only the cheapest proof is tried; the
-caller solves, one by one, the rows for which it fails.
+caller solves the rows for which it fails one by one.
 """
 
 from __future__ import annotations
@@ -103,11 +103,10 @@ class Levels:
         return self._solved(self.problem.at_approach(approach))
 
     def _solved(self, problem: NormalProblem) -> Level:
-        """The level of `problem`, computed without initial loads or from the loads of `top`.
+        """The level of `problem`, proved in the box of `top` (`Box.closed`).
 
-        The second attempt is made if the first proves nothing. The level is proved in the box of
-        `top` (`Box.closed`). If the proof of `top` does not exclude solutions outside its box, only
-        the loads of `top` are tried as initial loads.
+        The problem is solved without initial loads and, if this proves nothing, from the loads of
+        `top`. If the box of `top` is local, only the latter is done.
         """
         box, trial = self.top.box, self.top.trial
         from_top = None if box is None or trial is None else trial.loads.high

@@ -1,4 +1,4 @@
-"""An a priori upper bound on the approach under a total load, and which asperities could touch."""
+"""An upper bound on the approach under a total load, and the asperities that could touch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
 #: In `all_that_could_touch` a scene extends to at least LEAST_REACH contact radii of a smooth body.
-#: If the weights are 0 beyond, the approach is bounded on a scene with a radius WIDER times this.
+#: If the weights are 0 beyond this, the bound is computed on a scene WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -62,14 +62,13 @@ def approach_bound(
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
-    It is (2) of docs/theory/certificate.md with q = weights / sum(weights). Its lambda is close to
-    the one that makes this bound least. In the code, c is A q and alpha is q k.
+    It is (2) of docs/theory/certificate.md with q = weights / sum(weights), and with a lambda close
+    to the one for which (2) is least. In the code, c is A q and alpha is q k.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) upper bounds on A times weights
     coefficients, offsets : (n,) k, and lower bounds on d
-    load         : L. For m problems the other arrays are (m, n), and the load and the bound are (m,
-        1)
+    load         : L; for m problems, L and the bound are (m, 1) and the other arrays (m, n)
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
@@ -88,7 +87,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # a step of nan means that it is high enough
+        height = height + np.fmax(step, 0.0)  # a step of nan: the height is large enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -125,16 +124,15 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     least = scene.offsets - scene.offset_errors
     bound = approach_bound(weights, displacement, coefficients, least, load)
     if not np.isfinite(bound):
-        raise InputError("load", found=load, expected="a load this scene's units can hold")
+        raise InputError("load", found=load, expected="a load within the range of float64")
     return float(bound)
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
     """(n,) [force] estimated loads with the total `load`.
 
-    From each offset the displacement by a smooth sphere under this load is subtracted. One number
-    is added to all these differences. Hertz's law gives the load at each sum, taken as an
-    indentation. The number is chosen so that the loads have the total `load`.
+    They are the loads by Hertz's law at the indentations  offset - w + tau,  with the displacement
+    w by a smooth sphere under this load, and the number tau for which they have this total.
     """
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)

@@ -62,8 +62,7 @@ class NormalProblem:
     shells        : (n,) 1 / (pi E* s_i) with the contact modulus E*. The radii s_i are so small
         that A + diag(shells) is positive semidefinite
     control       : the prescribed load if `by_load` is True, else the prescribed approach D0
-    highest       : upper bound on D0 at any solution; if it is infinite, `approach_bound` computes
-        a bound when one is needed
+    highest       : upper bound on D0 at any solution; if infinite, `approach_bound` computes one
 
     A stack (`normal.stack.Stack`) is many problems, one per row. Its arrays are (m, n), or (n,)
     where all rows are equal, and `control` and `highest` are (m, 1).
@@ -163,8 +162,7 @@ class NormalProblem:
         """(n,) A P for loads P >= 0, precise enough for a press.
 
         On large lattices it has fewer digits than `product`. With a stored matrix of more than
-        `ALL_SHARP` rows, only displacements of loaded asperities have thirty digits, so that the
-        product takes less time than the press.
+        `ALL_SHARP` rows, only displacements of loaded asperities have thirty digits.
         """
         if isinstance(self.influence, LatticeInfluence):
             sums = self.influence.sums(loads, self.influence.least_slices)
@@ -184,8 +182,7 @@ class NormalProblem:
         delta_i is the indentation of a touching asperity, and minus the gap of an open one.
 
         slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta)
-        enough : fraction of the defect that the step may leave;  todo : not used; `Stack.correct`
-            uses it
+        enough : fraction of the defect that the step may leave;  todo : used only by `Stack`
 
         If `Influence.cheap_sums` is True, asperities whose slope and defect are both 0 are left out
         to save time.
@@ -205,7 +202,7 @@ class NormalProblem:
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(n,) A times `others`; if possible by an update of `product`, that is A times `loads`."""
+        """(n,) A times `others`, if possible from `product`, which is A times `loads`."""
         change = (others - loads).high
         small = NEARBY * float(loads.high.max())
         few = self.influence.stored and len(self) <= ALL_SHARP
@@ -295,7 +292,7 @@ class NormalProblem:
         return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
 
     def energy(self, loads: Array, displacement: Array) -> float:
-        """The energy Phi(P), in which D0 counts as 0 under load control; `displacement` is A P."""
+        """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""
         local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
         prescribed = self.offsets + (self.approach or 0.0)
         return float(local + loads @ (0.5 * displacement - prescribed))

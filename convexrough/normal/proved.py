@@ -24,19 +24,18 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial
 from convexrough.roundoff import SAFETY
 
-#: Number of boxes that are tried in which only touching asperities can have a load; and the
-#: distance from the loads to the end of the next such box, divided by the latest error bounds.
-#: Heuristics.
+#: Largest number of boxes of touching asperities that are tried; and the least distance of the
+#: upper ends of the next such box from the loads, divided by the latest error bounds. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: A load with a relative error above this is also bounded by means of its indentation.
+#: If the relative error of a load is above this, its indentation gives a second error bound.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
 
-CROWDED = "their discs overlap so far that the energy is not known to be convex"
-POORLY_KNOWN = "their loads are not known well enough to stay in a box where the energy is convex"
-ELSEWHERE = "no given box is proved to hold their loads"
+CROWDED = "their discs overlap so much that the energy is not proved to be convex"
+POORLY_KNOWN = "their loads, with error bounds, may lie outside the box where the energy is convex"
+ELSEWHERE = "no given box is proved to contain their loads"
 NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
@@ -78,12 +77,12 @@ def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = N
 
 @np.errstate(all="ignore")
 def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
-    """The solution near the trial loads, by the theorem on the box and then on a smaller box.
+    """Three results on the solution near the trial loads. If the first is False, the other two
+    prove nothing.
 
-    There are three results. The first is True if it is proved that the box contains the solution;
-    (m,) for a stack of m problems. If it is False, the other two prove nothing. The second is (n,)
-    bounds on the errors of the trial loads, by the theorem on the box. The third is the level, by
-    the theorem on the smaller box.
+    1. True if it is proved that the box contains the solution; (m,) for a stack of m problems.
+    2. (n,) bounds on the errors of the trial loads, by the theorem on the box.
+    3. The level, by the theorem on a smaller box that contains the solution.
     """
     missing = _Missing.of(problem, state)
     inside, at_first, h, within, errors = _applied_twice(problem, box, state, missing)
@@ -124,7 +123,7 @@ def _applied_twice(
 class _Missing(NamedTuple):
     """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
 
-    docs/theory/one-theorem.md derives the bounds. The loads (1 + t) P have the prescribed total.
+    The loads (1 + t) P have the prescribed total: docs/theory/one-theorem.md, "Pressing".
 
     loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
         from P to (1 + t) P; 0 if P has the prescribed total
@@ -149,17 +148,14 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
-    """The balls of the loads, with smaller radii where possible.
-
-    For a load with a large error the ball of (indentation / k)^(3/2) is used if it is smaller.
-    """
+    """The balls of the loads, or those of (indentation / k)^(3/2) where these are smaller."""
     if not (loads.radius > POOR * loads.mid.high).any():
         return loads
     return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
 
 
 def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
-    """The balls of loads P or, where P is inexact and this is smaller, of (n / k)^(3/2).
+    """The balls of loads P, or of (n / k)^(3/2) where P is inexact and this ball is smaller.
 
     n : the indentations;  dP, dn, dk : radii of the balls
     """

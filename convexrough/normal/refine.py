@@ -36,8 +36,8 @@ ENOUGH = 0.1
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
 
-#: Loads to be refined that miss the total by less than this part of the largest load are not
-#: scaled, to save time.
+#: Loads to be refined are not scaled to the total, to save time, if their sum differs from it by
+#: less than this part of the largest load.
 FITS = 1e-6
 
 #: Number of loads up to which `math.fsum`, which rounds once, is fastest.
@@ -50,7 +50,7 @@ class Trial:
 
     loads, product : (n,) P and A P
     gap     : (n,) k P^(2/3) + A P - d - D0
-    approach : D0: the prescribed approach; if the load is prescribed, the approach that fits best
+    approach : D0: prescribed, or a weighted mean of k P^(2/3) + A P - d over loaded asperities
     missing : prescribed total minus the sum of the loads; 0 if no total is prescribed
     """
 
@@ -84,7 +84,7 @@ class Trial:
         return np.where(self.inside, gap, np.minimum(gap, 0.0))
 
     def frozen(self) -> Trial:
-        """The same trial with read-only arrays, because proofs rest on it."""
+        """This trial, with its arrays made read-only, because proofs use them."""
         for each in (self.loads, self.product, self.gap):
             of_rows(frozen, each)
         return self
@@ -114,7 +114,7 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
     if problem.load is None:
         gap = residual(data.coefficients, exact, product, data.offsets, problem.control)
         return Trial(problem, loads, product, gap, problem.control, missing)
-    above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))  # as D0
+    above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))
     weights = np.cbrt(loads.high)
     total = summed(weights)
     shift = summed(weights * above.value) / total
@@ -124,7 +124,7 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
 
 
 def refined(problem: NormalProblem, best: Trial) -> Trial:
-    """The trial `best`, corrected until its residual is within rounding or no longer halves."""
+    """The trial `best`, corrected until its residual is at most rounding or no longer halves."""
     size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
     for _ in range(CORRECTIONS):
@@ -132,7 +132,7 @@ def refined(problem: NormalProblem, best: Trial) -> Trial:
             break
         try:
             following = corrected(problem, best, ENOUGH * rounding / size, todo)
-        except SolverError:  # the energy is not known to be convex there
+        except SolverError:  # the energy may not be convex there
             break
         left = defect_of(following)
         better = todo & (left < size)
@@ -207,10 +207,9 @@ def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
     """The loads, scaled to the prescribed total, and a ball of the remaining difference.
 
-    The largest load takes up the rounding errors of the other loads.
+    The remaining difference, up to rounding, is added to the largest load.
 
-    roughly : True not to scale loads if they miss the total by a small part of the largest load,
-        which then takes up all
+    roughly : True to skip the scaling if the difference is less than FITS times the largest load
     """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))

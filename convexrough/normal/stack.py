@@ -23,11 +23,10 @@ from convexrough.normal.problem import NormalProblem
 class Stack(NormalProblem):
     """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal.
 
-    coupled : slices of the rows, each with a problem whose compliance operator is that of these
+    coupled : slices of the rows, each with a problem that has the compliance operator of these
         rows. Scene and units are those of the first problem
 
-    Only what `refine`, `proved` and `levels` use is meant for stacks: not `restricted`, `widened`,
-    `approach_bound`, `places`, `to_scene` and `assemble`.
+    `restricted`, `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work.
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
@@ -104,14 +103,11 @@ class Stack(NormalProblem):
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P for P = `others`, to about thirty digits.
-
-        The first two arguments are not used.
-        """
+        """(m, n) A P for P = `others`, to about thirty digits; other arguments are not used."""
         return self.product(others)
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
-        """(m, n) one Newton step of the indentations; nan in rows with an indefinite matrix.
+        """(m, n) a Newton step of the indentations; nan in rows whose matrix is indefinite.
 
         slopes, defect : (m, n) as in `NormalProblem.correct`
         todo   : (m,) True for rows that need a step; the step of all other rows is 0

@@ -75,8 +75,8 @@ class Asperities(Record):
 
         Random numbers are added to the heights, and the tip radii are multiplied by random factors
         of mean 1. The arguments are those of `hexagonal`. The random numbers depend only on the
-        seed, so use a new seed for each change: a second change with the same seed adds the same
-        numbers again. Raises InputError for bad values, and without a seed if there is a change.
+        seed: a second change with the same seed adds the same numbers again. Raises InputError for
+        bad values, and if heights or tip radii are changed without a seed.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -151,8 +151,7 @@ class Asperities(Record):
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities; the others keep their positions, random heights and random tip radii.
 
-        Raises InputError for bad values, and for more asperities than fit in memory. The class
-        docstring has an example.
+        Raises InputError for bad values, and for more asperities than fit in memory.
         """
         regular = cls._lattice(HEXAGONAL, spacing, tip_radius, within)
         return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)

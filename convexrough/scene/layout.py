@@ -59,7 +59,7 @@ class Pattern:
         taken = norms <= limit
         i, j = (each - top for each in np.nonzero(taken))
         x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of norms
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of two norms
         order = np.argsort(norms[taken] + turns)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))

@@ -10,7 +10,7 @@ from convexrough.errors import InputError
 
 @dataclass(frozen=True, init=False)
 class Material:
-    """The material of both bodies; `pair` combines two different materials.
+    """The elastic constants of both bodies; `pair` combines two different materials.
 
     contact_modulus : [force / length^2] E*, where 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
         with the Young's moduli E and Poisson's ratios nu of bodies 1 and 2
@@ -18,10 +18,10 @@ class Material:
         moduli G
     hardness        : [force / length^2] mean pressure at which asperities yield; None if unknown.
         The value is used only for a warning
-    mismatch        : Dundurs' beta of a pair, 0 for equal materials. This number measures the
-        coupling of normal and tangential displacements, which the package neglects
+    mismatch        : Dundurs' beta of a pair, 0 for equal materials. It measures the coupling of
+        normal and tangential displacements, which the package neglects
 
-    Raises InputError for values outside these ranges. Source: Johnson, Contact Mechanics (1985),
+    Raises InputError for values out of range. Source: Johnson, Contact Mechanics (1985),
     4.2 and 5.4; docs/theory/bodies.md.
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
@@ -62,7 +62,7 @@ class Material:
 
         modulus : [force / length^2] Young's modulus E;  hardness : as in `Material`
 
-        Raises InputError for bad values. The class docstring has an example.
+        Raises InputError for bad values.
         """
         modulus = checks.positive("youngs_modulus", modulus)
         ratio = checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)
@@ -77,8 +77,8 @@ class Material:
 
         Normal and tangential compliances are those of two equal bodies with
         2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by
-        Dundurs' beta (docs/theory/bodies.md). The hardness is the smaller of the known ones. Raises
-        InputError if one of the two is a pair.
+        Dundurs' beta (docs/theory/bodies.md). The hardness is the smaller one of those given.
+        Raises InputError if one of the two materials is itself a pair with a nonzero beta.
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))

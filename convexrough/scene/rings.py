@@ -9,7 +9,7 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 
-#: Distances that differ by less than this, relative to the largest, count as equal.
+#: Distances count as equal if they differ by less than this part of the largest distance.
 SAME = 1e-9
 
 Item = TypeVar("Item")

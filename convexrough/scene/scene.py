@@ -31,7 +31,7 @@ class Scene(Record):
 
     sphere_radius : [length] radius R of a sphere; inf for a flat. A pair (Rx, Ry) of radii of
         curvature along x and y makes an ellipsoid, or a cylinder if one of them is inf
-    friction      : Coulomb's coefficient f; None if the scene is not sheared
+    friction      : Coulomb's coefficient of friction f; None if the scene is not sheared
     geometry      : position of each contact: "closest" (where the undeformed paraboloids of sphere
         and asperity are closest) or "summit" (at the summit of the asperity, as in Dini and Hills
         2009)
@@ -150,7 +150,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points if it is that of the summits, or scaled; else None."""
+        """The lattice of the contact points: that of the summits, perhaps scaled; else None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -179,7 +179,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] d_i, heights minus `drops`. At the approach D0 the overlap is D0 + d_i."""
+        """(n,) [length] d_i, heights minus `drops`; at the approach D0, the overlap is D0 + d_i."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
@@ -190,9 +190,9 @@ class Scene(Record):
     def reach(self, approach: float) -> float:
         """[length] distance from the axis beyond which none of these asperities can touch.
 
-        approach : [length] D0
+        It is that for the largest height and tip radius; inf for a flat or a cylinder.
 
-        It is computed for the largest height and tip radius; inf on a flat or a cylinder.
+        approach : [length] D0
 
         >>> round(scene.reach(approach=5e-5), 10)
         0.01

@@ -18,8 +18,8 @@ STEPS = 5
 def slenderness(ratio: Number) -> Number:
     """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1.
 
-    The secant method finds it. The logarithm of Rx / Ry is nearly linear in that of b / a, so
-    `STEPS` steps reach rounding errors.
+    The logarithm of Rx / Ry is nearly linear in that of b / a, so `STEPS` steps of the secant
+    method reach the accuracy of float64.
     """
     from scipy.special import elliprd
 

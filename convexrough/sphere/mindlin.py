@@ -8,8 +8,8 @@ contact radius a, s = c / a and
     t = 1 - s^3,    phi = 1 - s^2.
 
 All results are polynomials of the width x = 1 - s of the slip annulus; the sphere slides at x = 1.
-The code writes them as sums of positive terms, so that each keeps its relative accuracy down to
-x = 0, even where it is small and proportional to t^3.
+The code writes them as sums of positive terms, so that they keep their relative accuracy down to
+x = 0.
 Source: Johnson, Contact Mechanics (1985), chapter 7.
 """
 

@@ -1,9 +1,9 @@
 """`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
 The smooth sphere is the scene's sphere, pressed with the same load on a plane without asperities.
-Under the normal load this is Hertz's contact; under shear the theory of Cattaneo, Mindlin and
-Deresiewicz holds. Results are for both bodies. Source: Johnson, Contact Mechanics (1985), chapters
-4 and 7; and Dini and Hills (2009), equations 12 to 16, in which results are for one body.
+The theory is that of Hertz for the normal load, and that of Cattaneo, Mindlin and Deresiewicz for
+shear. Displacements and losses are sums over both bodies. Source: Johnson, Contact Mechanics
+(1985), chapters 4 and 7; and Dini and Hills (2009), equations 12 to 16, for one of the bodies.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
-    """The contact of a scene without asperities: a `SmoothSphere` or `SmoothEllipsoid`.
+    """The smooth contact of the scene's sphere or ellipsoid, without asperities.
 
     load : [force] normal load P
 

@@ -53,10 +53,9 @@ def surface_displacement(
         (q0/(4 G a)) {(2 - nu) [pi (a^2 - b^2) + r^2 (sin(2 phi)/2 - phi cos(2 phi))]
                       + (nu/2) (x^2 - y^2) [phi - sin(4 phi)/4]},   sin(phi) = b/r,  b = min(a, r)
 
-    (Johnson 3.91; [A3] of the source paper, corrected). The stick disc subtracts the same
-    expression with c in place of a, except in q0/a. The difference of the two values of each
-    bracket is computed by the addition theorems of sine and cosine from the angle phi_a - phi_c,
-    which is accurate.
+    (Johnson 3.91; [A3] of Dini and Hills 2009, corrected). The stick disc subtracts the same
+    expression with c in place of a, except in q0/a. To avoid cancellation, the difference of each
+    bracket is computed from the angle phi_a - phi_c by the addition theorems of sine and cosine.
     """
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
     slip_area = a_squared * np.abs(
