@@ -90,7 +90,7 @@ class OwnCurves:
         return self.ended(front, front[1:])
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
-        """The step to these indentations (n,), at which the curves are cut, and deflections (n,)."""
+        """The step to these indentations and deflections; the curves are cut at `indentations`."""
         base, moved = self.indentations[:, -1], deflections - self.deflections[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
