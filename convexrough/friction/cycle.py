@@ -75,7 +75,7 @@ class Cycle(Table, Plottable):
         results
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
-    smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
+    smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
         if no asperity is loaded, or if the solution for the smooth shape is not known
     displacement_amplitude : [length] half the range of the displacement of one body relative to the
         other, at the points of the path

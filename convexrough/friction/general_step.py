@@ -335,7 +335,7 @@ class Stepper:
     def _newton(self, iterate: _Iterate) -> Array:
         """The change of eta and x in a Newton step.
 
-        The unknowns of its linear system are x and eta_i where the force depends on eta_i.
+        The unknowns of its linear system are x and those eta_i on which the force T_i depends.
         """
         some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
         slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)

@@ -111,7 +111,7 @@ class FrictionLevels:
         farthest = float((room * self.travel_unit).value)
         if not displacement <= farthest * (1 + 1e-14):
             found = f"{displacement:.17g}: gross sliding"
-            expected = f"at most X = {farthest:.17g}, where the last asperity slides"
+            expected = f"at most X = {farthest:.17g}, at which gross sliding starts"
             raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
         if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:

@@ -37,7 +37,7 @@ class PathEntry(Record):
     """The result of one method for a load path.
 
     way     : the method: "general step", "memory curve" or "conic step"
-    outcome : "answered", "refused" (the method does not apply to the scene) or "failed"
+    outcome : "answered", "refused" (the method does not apply to the path) or "failed"
     message : the reason why there is no result, or ""
     path    : the result; None if there is none
     force_disagreement : largest difference of a shear force Q_i from the result of the first method

@@ -35,8 +35,7 @@ MOST_VERTICES = 2 * 10**7
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A path that begins in the friction state `start` and leads through m points along straight
-    segments.
+    """A path of straight segments from the friction state `start` through m points.
 
     levels  : the normal solutions of the contact
     start   : the memory curve of the friction state before the first segment
@@ -67,7 +66,7 @@ class Walk:
             vertices += len(curve.levels)
             if vertices > MOST_VERTICES:
                 found = f"{vertices:,} vertices of memory curves up to point {k:,}"
-                expected = f"at most {MOST_VERTICES:,}, so fewer reversals within reversals"
+                expected = f"at most {MOST_VERTICES:,}: use fewer reversals within reversals"
                 raise InputError("path", found=found, expected=expected)
         return segments
 

@@ -65,7 +65,7 @@ class Sums(dict[Fraction, Weights]):
         self[level] = (V + weight * energy, D + weight * approach, S)
 
     def add_loss(self, piece: Piece, weight: Fraction) -> None:
-        """Add the loss (1 - c th) I on a piece, multiplied by a weight; `friction.loss` derives it.
+        """Add the loss (1 - c th) I on a piece times a weight; I is (4) of docs/theory/losses.md.
 
         c is the sign of the piece, th its slope.
 

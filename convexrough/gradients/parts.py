@@ -126,7 +126,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
-        expected = "a force below f P: where several asperities slide last there is no derivative"
+        expected = "a force below f P, as several asperities slide last, at the same force"
         raise InputError("force", found="gross sliding", expected=expected)
     zero = Ball.exact(np.zeros(len(offsets)))
     moved = where(first, zero - weight, zero)

@@ -175,7 +175,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         parts = [Part(low, indentations=only * (f * unit / slope))]
         total = (top.load - low.load) * f * unit
     elif np.count_nonzero(first) > 1 or not first[place]:  # all of these slide at f P
-        expected = "one that slides before another, or last and alone"
+        expected = "an asperity that does not slide last, or that slides last alone"
         said = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=said, expected=expected)
     explicit = {"load": f, "friction": total / f}
