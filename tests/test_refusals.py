@@ -18,7 +18,7 @@ def test_no_onset_where_an_indentation_falls() -> None:
     contact = cr.press(replace(case.scene, friction=0.5), load=0.98 * case.control["load"])
     assert cr.prove_order(contact) == "fails"
     assert np.isnan(cr.onset_of_sliding(contact)).all()
-    with pytest.raises(cr.ProofError, match="an indentation falls as the load rises"):
+    with pytest.raises(cr.ProofError, match="indentations may fall as the load rises"):
         cr.onset_gradient(contact, 0)
 
 

@@ -2,9 +2,9 @@
 
 The program and its symbols are those of docs/theory/without-order.md, "The step as one cone
 program". The force of an asperity is T_B, plus a part on the piece where it sticks, plus a part on
-each piece where it slips. Forces are in units of the coefficient of friction f, displacements in
-units of c_t f with Mindlin's ratio c_t. In the program of one asperity, forces and loads are also
-divided by its load, and lengths by its indentation.
+each piece where it slips. Shear forces are divided by the coefficient of friction f, displacements
+by c_t f with Mindlin's ratio c_t. In the energy of one asperity, forces and loads are also divided
+by its load, and lengths by its indentation.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from convexrough.influence.shells import shells
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.sphere import hertz
 
-#: Tolerance of the solver Clarabel, and the largest fraction of the way to the cones' boundary that
-#: one of its steps takes.
+#: Tolerance of the solver Clarabel, and the largest fraction of the distance to the boundary of the
+#: cones by which one of its steps moves.
 TOLERANCE, STEP = 1e-11, 0.9
 
-#: Layers thinner than this fraction of the load are omitted; the solver's error is larger.
+#: Layers thinner than this fraction of the load are omitted; the errors of the solver are larger.
 THIN = 1e-9
 
 
@@ -82,7 +82,7 @@ class ConicStepper(Stepper):
     """General steps that Clarabel solves as cone programs."""
 
     def _solve(self, step: Step) -> tuple[Array, float, OwnStep]:
-        """eta, x and own steps, from the forces of touching asperities and the multiplier of T."""
+        """eta, x and the own steps, from the solution of the cone program."""
         which = np.flatnonzero(step.loads)
         program, unit = self._program(step, which)
         raw = run_clarabel(program, "conic step", TOLERANCE, max_step_fraction=STEP)
@@ -99,8 +99,8 @@ class ConicStepper(Stepper):
         loads N_i; their n parts on the pieces where they stick; and the powers of N^(1/3) on each
         piece where they slip.
 
-        Raises SolverError if the shells, a diagonal that makes the compliance matrix positive
-        semidefinite, are too large for the cones.
+        Raises SolverError if the diagonal that makes the compliance matrix positive semidefinite
+        (`shells`) is too large for the cones.
         """
         from scipy import sparse  # 0.1 s to import: only when solving
 
@@ -108,7 +108,7 @@ class ConicStepper(Stepper):
         modulus, k = self.levels.scene.material.contact_modulus, self.coefficients[which]
         coupled = couple(self.levels.scene, which, 1.0 / (np.pi * modulus), "dense")
         wells = shells(coupled) if n > 1 else np.zeros(n)
-        shifts = wells * N * parts / own  # the shells in the units of the pieces
+        shifts = wells * N * parts / own  # `wells` in the units of the pieces
         if 1.5 * shifts.max(initial=0.0) > FIVE_CONES_LIMIT:
             raise SolverError("too dense for a convex program", solver="conic step")
         energies = N * own / parts  # the factors that turn scaled energies W into W_i / p_i

@@ -1,4 +1,4 @@
-"""The memory curve: the tangential state under varying normal load, as plane geometry.
+"""The memory curve: the friction state under varying normal load, as plane geometry.
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
 after any path of (P, T) is a polygonal line: the heights Th(s) at load levels 0 <= s <= P. It leads
@@ -51,12 +51,12 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Plottable):
-    """The friction state after a path: a polygonal line of load levels (docs/theory/paths.md).
+    """The friction state after a path: a polygonal line over the load (docs/theory/paths.md).
 
     levels, heights : (m + 1,) [force] coordinates s and Th of the vertices, from the origin
     slopes : (m,) slope of each layer, between a vertex and the next
-    front  : [force] level of the slip front at the end of the last segment, which has changed the
-        line above the front. None if nothing slips
+    front  : [force] level of the slip front at the end of the last segment of the path, above which
+        this segment has changed the line. None if nothing slips
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])
@@ -77,12 +77,12 @@ class MemoryCurve(Table, Plottable):
 
     @property
     def load(self) -> Fraction:
-        """[force] the load P, at the last vertex."""
+        """[force] the load P, the level of the last vertex."""
         return self.levels[-1]
 
     @property
     def height(self) -> Fraction:
-        """[force] T = Q / f, at the last vertex."""
+        """[force] T = Q / f, the height of the last vertex."""
         return self.heights[-1]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
@@ -142,9 +142,10 @@ class MemoryCurve(Table, Plottable):
         """The state after slip of this sign on a segment, and the pieces of its loss.
 
         The line of slope `sign` through the moving point (P, T) meets the old curve at the front.
-        The front reaches the lower end of a layer at the fraction `reach` of the segment. Within a
-        layer, this fraction is linear in the level of the front. The front passes a layer of slope
-        `sign` at once. If the load falls, the point may meet the curve again. Then slip ends.
+        The front reaches the lower end of a layer when the point has passed the fraction `reach` of
+        the segment. Within a layer, the level of the front is linear in this fraction. The front
+        passes a layer of slope `sign` at once. If the load falls, the point may meet the curve
+        again. Then slip ends.
         """
         added, shear = load - self.load, height - self.height
         rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0

@@ -2,7 +2,7 @@
 
 The path is a closed curve of the load P and the shear force Q; f is the coefficient of friction,
 and T = Q / f. docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from
-the second cycle on the memory curve does not change below it and is periodic above it.
+the second cycle on the memory curve is constant at loads below L* and periodic above.
 docs/theory/losses.md derives the loss.
 """
 
@@ -60,30 +60,31 @@ class Cycle(Table, Plottable):
     contact          : the contact, pressed with the highest load of the path
     loads, forces    : (m,) [force] load P and shear force Q at the points of the path
     loss             : [force length] energy lost per cycle by both bodies, from the second cycle on
-    loss_first       : [force length] energy lost from the unsheared start to the end of cycle 1
+    loss_first       : [force length] energy lost from the start without shear to the end of cycle 1
     loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
         (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
         lost in the cycle), "open" (never loaded) or "undecided"
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
-    slip_errors, stick_radius_errors : [length] proved bounds on their errors
+    slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
     level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
         L* is the same at every moment from the second cycle on
     balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
         docs/theory/losses.md, as a check of rounding; nan if P varies or general steps give the
         results
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
-        nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere
-    smooth_normalised : loss of the smooth sphere / W0; nan if P varies. Both ratios to W0 are nan
-        if no asperity is loaded, or if no smooth solution is known for the shape
+        nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
+    smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
+        if no asperity is loaded, or if the solution for the smooth shape is not known
     displacement_amplitude : [length] half the range of the displacement of one body relative to the
         other, at the points of the path
     displacement_error : [length] proved bound on the error of the displacement amplitude
-    order            : what is proved about order from L* to the highest P (docs/theory/states.md,
-        "Order"). "proved": loss and statuses are proved; "proved for one step": statuses hold for
-        one general step per segment, and no loss is proved; "fails": nothing is proved, and general
-        steps give the results, unless the normal solution at the highest P is not proved
+    order            : what is proved about order between the lowest and the highest load at which
+        normal solutions are used (docs/theory/states.md, "Order"). "proved": losses and statuses
+        are proved; "proved for one step": statuses hold for one general step per segment, and no
+        loss is proved; "fails": nothing is proved, and general steps give the results if the normal
+        solution at the highest P is proved
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding
@@ -143,12 +144,12 @@ class Cycle(Table, Plottable):
 
     @property
     def partial_slip_losses(self) -> Array:
-        """(n,) [force length] `asperity_losses` that are due to partial slip."""
+        """(n,) [force length] the part of `asperity_losses` that is due to partial slip."""
         return self._shares[0]
 
     @property
     def sliding_losses(self) -> Array:
-        """(n,) [force length] `asperity_losses` that are due to gross slip."""
+        """(n,) [force length] the part of `asperity_losses` that is due to gross slip."""
         return self._shares[1]
 
     @property
@@ -159,7 +160,7 @@ class Cycle(Table, Plottable):
         the ranges of load through which the slip fronts move are cut into cells, about 64 in total.
         The losses are sums over the cells, computed from the normal solutions at the ends of each
         cell. Their relative errors are about 0.1 %, except where a front hardly moves while the
-        load changes much; the proved bounds on the relative errors are some per cent.
+        load changes much. The proved bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -213,8 +214,7 @@ class Cycle(Table, Plottable):
             points. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if several asperities are the last to start to slide, all at
-        the same force.
+        approach is kept constant, or if several asperities start to slide last, at the same force.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -328,7 +328,7 @@ def loops(
 ) -> list[Loop]:
     """The force-displacement loops of several cycles of one contact at constant load.
 
-    points : approximate number of points of the widest loop; narrower ones have fewer
+    points : approximate number of points of the widest loop; narrower loops have fewer
     asperities : as in `Cycle.loop`
 
     Raises InputError if the load of a cycle varies.

@@ -23,7 +23,7 @@ from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
 #: The largest traction is sought at the contact radii a(s_k) and at about this number of other
-#: distances r. At constant load it lies at one of the a(s_k); otherwise its error is about 0.1 %.
+#: distances r. At constant load it lies at one of the a(s_k); else its error is about 0.1 %.
 DISTANCES = 64
 
 
@@ -35,20 +35,19 @@ class Fretting(Table, Plottable):
     maximum, minimum : [force] the largest and the smallest shear force of the cycle
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
-        load of the cycle; nan where contact is lost in the cycle ("intermittent"),
-        because slip while it is open is not known
+        load of the cycle; nan where contact is lost in the cycle ("intermittent"), because slip of
+        an open asperity is not known
     gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
         sticks, nan where "intermittent"
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
-        bounds on their errors. If the load varies, these losses are less exact than `Cycle.loss`;
-        see `Cycle.asperity_losses`
-    mean_tractions   : [force / length^2] shear force of the asperity divided by the area of its
-        contact disc, at the point of the path where this is largest
+        bounds on their errors. If the load varies, their sum is less exact than `Cycle.loss`
+    mean_tractions   : [force / length^2] the largest |shear force of the asperity / area of its
+        contact disc| at the points of the path
     largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
         the error is about 0.1 % where the load varies
 
-    If general steps give the results of the cycle (see `Cycle.order`), all arrays are nan, except
-    the status and `loss_errors`, which is infinite.
+    If general steps give the results of the cycle (see `Cycle.order`), `loss_errors` is infinite,
+    and all other arrays except the status are nan.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
     >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())
@@ -79,7 +78,7 @@ def fretting(cycle: Cycle) -> Fretting:
 
     docs/theory/losses.md, "Slip and traction inside a contact", gives the formulas.
 
-    Raises InputError if `cycle` is no `Cycle`.
+    Raises InputError if `cycle` is not a `Cycle`.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
@@ -135,7 +134,7 @@ def rim_gap(x: Array) -> Array:
 
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
-    """The columns of fretting.csv, with a row for each touching asperity in each cycle."""
+    """The columns of fretting.csv, with a row for each asperity that touches in each cycle."""
     names = ("status", "losses", "loss_errors", "slip_amplitudes", "gross_slip_amplitudes",
              "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()

@@ -1,14 +1,13 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
-docs/theory/without-order.md, "The general step", derives it. Shear forces are divided by the
-coefficient of friction f, tangential displacements by c_t f with Mindlin's ratio c_t. Each asperity
-has its own memory curve: its deflection, which its own shear force causes, as a function of its
-indentation. Newton's method solves (1) of that page for eta_i and x, the displacements of the
+docs/theory/without-order.md, "The general step", derives the equations (1) of a step. Shear forces
+are divided by the coefficient of friction f, tangential displacements by c_t f with Mindlin's ratio
+c_t. Each asperity has its own memory curve: the deflection that its own shear force causes, as a
+function of its indentation. Newton's method solves (1) for eta_i and x, the displacements of the
 asperities and of the bodies in the step.
 
-The curves of asperities change as in docs/theory/paths.md, "Changes of the curve", which
-also gives an equation for the front. The old curve is cut beforehand at the smaller of the old and
-the new indentation.
+A step cuts the old curve of an asperity at the smaller of the old and the new indentation. Then the
+curve changes as in docs/theory/paths.md, "Changes of the curve".
 """
 
 from __future__ import annotations
@@ -36,22 +35,22 @@ from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding prevents
-#: this, a residual up to a thousand times as large is accepted.
+#: this accuracy, a residual up to a thousand times as large is accepted.
 ACCURATE = 1e-14
 
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
-#: The residual after a Newton step may not exceed the largest of this many latest residuals. Within
-#: this limit it may grow, because slopes jump where an asperity begins or ceases to slide.
+#: The residual after a Newton step must be below the largest of this many latest residuals. It need
+#: not fall in each step, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
 #: The numbers of steps per segment that are tried.
 COUNTS = (4, 8, 16, 32, 64)
 
-#: The number of steps is doubled until each loss changes by less than SETTLED of itself, and the
-#: displacements by less than SETTLED_MOTION of the largest. The change of a loss is compared with
-#: the loss plus NEGLIGIBLE times the largest loss.
+#: The number of steps is doubled until each loss changes by at most SETTLED times the sum of this
+#: loss and NEGLIGIBLE times the largest loss, and each displacement by at most SETTLED_MOTION times
+#: the largest displacement.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
 #: A point on each of n curves: index of the next vertex, indentation and deflection, (n,) each.
@@ -86,15 +85,12 @@ class OwnCurves:
         return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
 
     def cut(self, indentations: Array) -> OwnCurves:
-        """The curves up to these indentations (n,); curves that end below them are unchanged."""
+        """The curves up to these indentations (n,); curves that end below these are unchanged."""
         front = self._front(np.zeros(len(indentations)), indentations)
         return self.ended(front, front[1:])
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
-        """A straight step to these indentations and deflections, (n,) each.
-
-        The curves must be cut at `indentations`.
-        """
+        """The step to these indentations and deflections; the curves are cut at `indentations`."""
         base, moved = self.indentations[:, -1], deflections - self.deflections[:, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
@@ -115,7 +111,7 @@ class OwnCurves:
         )
 
     def energies(self) -> Array:
-        """(n,) elastic energy of the own deflections, divided by c_t f^2."""
+        """(n,) elastic energies of the own deflections, divided by c_t f^2."""
         loads, forces, slope = self.layers
         plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.indentations)
         power = np.diff(loads * self.indentations)
@@ -155,9 +151,9 @@ class OwnCurves:
 class OwnStep(NamedTuple):
     """A straight step of n asperities from their curves `old`; arrays are (n,).
 
-    front     : the point up to which each old curve is kept; from it a line leads to `end`
+    front     : the point up to which each old curve is kept; a line leads from there to `end`
     end       : indentations and deflections after the step
-    fronts    : indentation at the slip front; the whole indentation where nothing slips
+    fronts    : indentation at the slip front; the whole indentation if the asperity sticks
     forces    : shear forces T_i
     stiffness : derivatives of the forces with respect to the deflections
     """
@@ -179,7 +175,7 @@ class Bundle(NamedTuple):
     """The state of n asperities after a step.
 
     load, height : [force] P and T = Q / f
-    indentations : (n,) at P; minus the gap where open
+    indentations : (n,) at P; minus the gap of an open asperity
     curves    : the memory curves of the asperities
     fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
     forces    : (n,) T_i, the shear forces of the asperities divided by f
@@ -205,10 +201,10 @@ class Bundle(NamedTuple):
 
 
 class Step(NamedTuple):
-    """The equations of a step from the state `now` to T_i with the sum `total`.
+    """The equations of a step from the state `now` to shear forces T_i with the sum `total`.
 
-    indentations : (n,) after the step; minus the gap where open
-    own, loads : (n,) indentations, 0 where open, and loads after the step
+    indentations : (n,) after the step; minus the gap of an open asperity
+    own, loads : (n,) indentations (0 if open) and loads after the step
     curves : the curves before the step, up to these indentations
     parts  : (n,) fraction of the step during which each asperity touches
     """
@@ -230,12 +226,12 @@ class Step(NamedTuple):
         return cls(now, total, indentations, own, loads, curves, parts)
 
     def taken(self, deflections: Array) -> Array:
-        """(n,) the displacements eta_i that lead to these own deflections; 0 where open."""
+        """(n,) the displacements eta_i that lead to these own deflections; 0 if open."""
         wanted, nothing = deflections - self.now.deflections, np.zeros(len(deflections))
         return np.divide(wanted, self.parts, out=nothing, where=self.parts > 0)
 
     def at(self, eta: Array) -> OwnStep:
-        """The step of each asperity i if it is displaced by eta_i."""
+        """The step of each asperity i that is displaced by eta_i."""
         targets = self.now.deflections + eta * self.parts
         return self.curves.step(self.own, np.clip(targets, -self.own, self.own))
 
@@ -276,7 +272,7 @@ class Stepper:
         return found
 
     def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
-        """The state after one step, which is halved if Newton's method does not converge."""
+        """The state after one step, which is cut in two if Newton's method does not converge."""
         if not load:
             lost = float(now.height) / 2 * now.displacement
             return self.start(load)._replace(work=now.work - lost)
@@ -337,9 +333,9 @@ class Stepper:
         return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
 
     def _newton(self, iterate: _Iterate) -> Array:
-        """The change of the unknown in a Newton step.
+        """The change of eta and x in a Newton step.
 
-        The linear system has only the asperities whose forces change with eta, and x.
+        The unknowns of its linear system are x and those eta_i on which the force T_i depends.
         """
         some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
         slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)
@@ -353,7 +349,7 @@ class Stepper:
         return np.append(moved + found[-1] - coupled @ found[:-1], found[-1])
 
     def stored(self, state: Bundle) -> float:
-        """The elastic energy divided by c_t f^2: that of own deflections, plus that of coupling."""
+        """The elastic energy, of own deflections and of coupling, divided by c_t f^2."""
         own = float(state.curves.energies().sum())
         return own + 0.5 * float(state.forces @ self.A @ state.forces)
 
@@ -363,16 +359,16 @@ class _Iterate(NamedTuple):
     own: OwnStep  # the steps of the asperities that are displaced by eta
     slopes: Array  # (n,) dT_i / deta_i
     defect: Array  # (n + 1,) the left sides of (1) minus the right sides
-    residual: float  # the largest defect of eta; if larger, the displacement that corrects T
+    residual: float  # the largest |defect| of eta or, if larger, the displacement to correct T
 
 
 class SteppedPath(NamedTuple):
     """Results of general steps at m points, without proofs.
 
-    losses : (m,) [force length] energy lost since the start; nan where doubling the number of steps
-        still changes it
+    losses : (m,) [force length] energy lost since the start; nan if it still changes by more than
+        SETTLED when the number of steps is doubled
     status : (m, N) "open" or "undecided"
-    fronts : (m, N) indentation at the slip front of each asperity; its indentation if it sticks
+    fronts : (m, N) as in `OwnStep`, for each asperity
     """
 
     states: States
@@ -391,17 +387,18 @@ def followed(
     """The results of general steps along a path.
 
     The loss W_n by n steps has an error of about e / n^2, with some constant e. By default the loss
-    returned is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
+    returned is (4 W_2n - W_n) / 3. The change of this value at the next doubling estimates its
+    error.
 
-    steps : number n of steps per segment; the loss returned is then W_n. With None, the number is
-        doubled until losses and displacements settle, to at most 64
+    steps : number n of steps per segment; the loss returned is then W_n. With None, n is doubled
+        until losses and displacements settle (SETTLED), up to 64
     """
     by = (stepper or Stepper)(levels)
     f = float(levels.coefficient.value)
     travel = float((levels.coefficient * levels.ratio).value)
 
     def found(count: int) -> SteppedPath:
-        LOGGER.info(f"solving {count} general steps per segment, as order is not proved")
+        LOGGER.info(f"computing {count} general steps per segment")
         bundles = by.along(start, points, count)
         positions = travel * np.array([each.positions for each in bundles])
         own = travel * np.array([each.deflections for each in bundles])

@@ -7,7 +7,7 @@ coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
 A rational number [force] identifies each level. If the load of the contact is prescribed, this
 number is the total load of the level. If the approach is prescribed, the load P of the contact is a
 result, known to about thirty digits. Then a float64 number p close to P identifies the level at P,
-and p - x the level at P - x. The number 0 always identifies the level at the load 0.
+and p - x identifies the level at P - x. The number 0 always identifies the level at the load 0.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class FrictionLevels:
     load  : [force] the number that identifies `top`: P or, if the approach is prescribed, p
     candidates : (n,) indices of the asperities that may touch at loads up to P
     coefficient, ratio : f and c_t
-    force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces, of
-        tangential displacements and of energy losses
+    force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces,
+        tangential displacements and energy losses
     """
 
     def __init__(self, contact: Contact) -> None:
@@ -91,7 +91,7 @@ class FrictionLevels:
         return self._named[load]
 
     def prepare(self, loads: Iterable[Fraction]) -> None:
-        """Find the levels at these loads together, if that is cheaper than one by one."""
+        """Compute the levels at these loads together, if this is cheaper than one by one."""
         new = sorted({x for x in loads if x not in self._named and 0 < x < self.load})
         if len(new) > 1:
             found = zip(new, self._levels.prepare(self._balls(new)), strict=True)
@@ -111,7 +111,7 @@ class FrictionLevels:
         farthest = float((room * self.travel_unit).value)
         if not displacement <= farthest * (1 + 1e-14):
             found = f"{displacement:.17g}: gross sliding"
-            expected = f"at most X = {farthest:.17g}, where the last asperity slides"
+            expected = f"at most X = {farthest:.17g}, at which gross sliding starts"
             raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
         if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:
@@ -143,7 +143,7 @@ class FrictionLevels:
         return self.indentations(self.at(load)).value * self.units.length
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) the indentations n_i of a level; in float64 if an asperity cannot touch."""
+        """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
         others = self._others
         if len(others) == 0:
@@ -195,8 +195,8 @@ def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
     docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
-    and "fails". Later results for this contact reuse the proof. Other functions try it only if at
-    most 20,000 asperities touch, because for more it takes seconds.
+    and "fails". Later results for this contact reuse the proof. Other functions try a proof only if
+    at most 20,000 asperities touch, because for more asperities it takes seconds.
 
     most : largest number of touching asperities for which a proof is tried
 

@@ -54,7 +54,7 @@ class Loop(Table):
 
     @property
     def area(self) -> float:
-        """[force length] area of the polygon through the points: a little less than the loss."""
+        """[force length] area of the polygon through the points, a little less than the loss."""
         return float(np.trapezoid(self.forces, self.displacements))
 
 
@@ -69,13 +69,13 @@ def loop_through(
 ) -> Loop:
     """The loop through the points at which Q has changed by 2 w since its last turning point.
 
-    There T is top - 2 w / f as Q falls, and bottom + 2 w / f as Q rises.
+    At these points T is top - 2 w / f as Q falls, and bottom + 2 w / f as Q rises.
 
     top, bottom : [force] the largest and the smallest T
     way      : the values of w [force], half of the change of Q
     chosen   : indices of the asperities whose own loops are given
-    by_steps : True if order fails, so that general steps (docs/theory/without-order.md) give the
-        results, one step from each point to the next
+    by_steps : True if general steps (docs/theory/without-order.md) give the results, one step from
+        each point to the next; False if the memory curve does
     """
     f = Fraction(checks.friction(levels.scene.friction))
     LOGGER.info(f"computing {len(way) + 1} levels of a loop")

@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) the parts of B_i by partial slip, and the parts by sliding, for k moments."""
+    """(k, n) the parts of B_i due to partial slip and those due to sliding, for k moments."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -150,10 +150,10 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     cells : total number of cells into which the pieces with a varying load are cut
 
-    The loss in a cell lies between two losses: those with a constant load, which is the load at one
-    end or at the other end of the cell (docs/theory/losses.md, "A front while the load changes").
-    The results are the means of these two. The relative errors of these means are about cells^-2;
-    the proved bounds on these errors are about 1 / cells.
+    The loss in a cell lies between the losses at two constant loads: those at the ends of the cell
+    (docs/theory/losses.md, "A front while the load changes"). The results are sums of the means of
+    these two. Their relative errors are about cells^-2, the proved bounds on these errors about
+    1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Ends, Ends]]()  # weight; P and front at both ends of a cell

@@ -2,8 +2,8 @@
 
 P is the load, Q the shear force and f the coefficient of friction. The onset of asperity i is the
 total load L at which its indentation n_i(L) rises to 0. On first loading the asperity slides once
-P - Q / f is below its onset. Newton's method finds the onset. Two proofs enclose it: that the
-asperity is open at a slightly smaller load, and that it touches at a slightly larger load.
+P - Q / f is below its onset. Newton's method computes the onset. Two proofs enclose it: the
+asperity is open at a slightly smaller load, and it touches at a slightly larger load.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ MOST_ONSETS = 256
 #: Relative distances of loads from the computed onset at which proofs are tried, smallest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: A level (normal solution) that is known already is tried first if the relative distance of its
-#: load from the onset is from TRIED[0] to TRIED[ENOUGH].
+#: Levels (normal solutions) that are known already are tried first if the relative distance of
+#: their load from the onset is between TRIED[0] and TRIED[ENOUGH].
 ENOUGH = 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, at which they end.
@@ -38,8 +38,7 @@ STEPS, SETTLED = 60, 2.0**-54
 class Onset(NamedTuple):
     """The load at which an asperity first touches, and two loads [force] below and above it.
 
-    If no indentation falls as the load rises, it is proved that the first touch is between `lower`
-    and `upper`.
+    If no indentation falls as the load rises, the first touch is proved to be between the two.
     """
 
     load: Fraction
@@ -53,12 +52,12 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     It is f (P - the load of the first touch): docs/theory/states.md, "First loading".
 
     In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
-    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load. The
-    result is also nan if `prove_order` gives "fails" between the load of the asperity's first touch
-    and the load of the contact: the asperity may then start to slide at another force.
+    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load, and
+    if order (docs/theory/states.md) "fails" between the load of the asperity's first touch and the
+    load of the contact: the asperity may then start to slide at another force.
 
-    which : indices of asperities, in the order of the result; default: all. Each asperity takes
-        several normal solutions
+    which : indices of asperities, in the order of the result; default: all. Several normal problems
+        are solved for each
 
     Raises InputError if the scene has no friction, or if more than 256 loaded asperities are chosen
     and no compliance matrix is stored.
@@ -79,7 +78,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
         raise InputError(
             "which",
             found=f"{len(loaded):,} loaded asperities",
-            expected=f"at most {MOST_ONSETS} of them, each of which takes some normal solutions",
+            expected=f"at most {MOST_ONSETS}: for each, several normal problems are solved",
         )
     found = enclosed(levels, asked[loaded].tolist())
     lowest = min(each.load for each in found.values())
@@ -91,13 +90,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
-    """The onsets of asperities that touch at P, by index. Bounds not proved become 0 or P."""
+    """The onsets of asperities that touch at P, by index. A bound that is not proved is 0 or P."""
     depths = levels.top.indentation.value[levels.top.problem.places[which]]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """The onset of one asperity, with bounds. Levels that are known already are tried first."""
+    """The onset of one asperity, with bounds."""
     place = int(levels.top.problem.places[asperity])
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -129,7 +128,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
         try:
             rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
             step = Fraction(value / rate)
-        except SolverError:  # happens near the load 0
+        except SolverError:  # near the load 0
             step = here - (low + high) / 2
         following = here - step
         if abs(step) <= Fraction(SETTLED) * levels.load or value == 0:
@@ -142,7 +141,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
-    """The index and the onset of the asperity that touches last, of those that touch at P."""
+    """The index and the onset of the asperity that touches last as the load rises to P."""
     touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
     depths = levels.top.indentation.value[touching]
     last = int(touching[np.argmin(depths)])

@@ -43,24 +43,24 @@ class LoadPath(Table, Plottable):
     loads, forces  : (m,) [force] load P and shear force Q
     displacements  : (m,) [length] tangential displacement X of one body relative to the other, at
         distant points
-    approaches     : (m,) [length] approach D0; at the load 0, the approach of the first touch
+    approaches     : (m,) [length] approach D0; at the load 0, the approach at the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] sum of the drift of each asperity (next field) and its
-        own deflection, the tangential displacement that its own shear force causes
+    asperity_displacements : (m, n) [length] for each asperity, its drift (next field) plus its own
+        deflection, the tangential displacement that its own shear force causes
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] level of the slip front at the end of the latest segment along
-        which P or Q changes. nan if nothing slips at this end, for example if the load has fallen
-        below the front
-    status         : (m, n) of each asperity at the end of the latest segment: "stuck" (no slip),
+    fronts         : (m,) [force] load down to which the contact slips at the end of the latest
+        segment along which P or Q changes; nan if nothing slips at this end, for example if the
+        load has fallen below the front
+    status         : (m, n) of each asperity at the end of this segment: "stuck" (no slip),
         "partial" (a disc sticks), "sliding" (the whole asperity slides), "open" (no contact) or
         "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
-    order          : "proved" if it is proved, for all total loads at which normal solutions are
-        used, that no indentation falls from one load to a higher one; other values as in `Cycle`
+    order          : "proved" if it is proved that no indentation falls as the load rises, between
+        the lowest and the highest load of all normal solutions used; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
 
@@ -126,8 +126,8 @@ class LoadPath(Table, Plottable):
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
             of the last loss is 1, and all other weights are 0
-        holding : quantity kept constant, as in `Contact.gradient`. Derivatives by other quantities
-            than `forces` are taken at constant forces Q, not at constant Q / (f P)
+        holding : quantity kept constant, as in `Contact.gradient`. All derivatives but those by
+            `forces` are taken at constant forces Q, not at constant Q / (f P)
 
         Raises InputError where there is no derivative, as for a history in gross sliding.
 
@@ -157,11 +157,10 @@ def load_path(
         separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
-    general_steps : number of general steps per segment. General steps also apply if an indentation
-        falls as the load rises, that is, if order fails (docs/theory/without-order.md), but their
-        results are not proved. With None, the states come from the memory curve; if order fails and
-        the normal solution of the contact is proved, they come from 16, 32 or 64 general steps per
-        segment
+    general_steps : number of general steps per segment (docs/theory/without-order.md). They also
+        apply if an indentation falls as the load rises (order fails), but nothing is proved about
+        their results. With None, the states come from the memory curve; if order fails and the
+        normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem is not solved.

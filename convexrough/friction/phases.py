@@ -1,7 +1,7 @@
 """Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude.
 
-A smooth path is replaced by chords between some of its points. Among these are the extremes of
-P, P + Q/f and P - Q/f, with the load P, the shear force Q and the coefficient of friction f.
+A smooth path is replaced by chords between some of its points. Among these points are the extremes
+of P, P + Q/f and P - Q/f, with the load P, the shear force Q and the coefficient of friction f.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ def elliptic_path(
     phase  : [rad] from -pi to pi. At 0 the axes of the ellipse are parallel to those of P and Q; at
         pi/2 the ellipse is a straight line, as P and Q are in phase
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
-        points of the path, so that `Cycle.level` is exact
-    chords : approximate number of chords that replace the ellipse. In tests the loss was smaller
-        than that of the ellipse by a fraction of at most 12 / chords^2
+        points of the path, so `Cycle.level` is that of the ellipse
+    chords : approximate number of chords that replace the ellipse. In tests the loss along the
+        chords was smaller than that of the ellipse by a fraction of at most 12 / chords^2
 
     Raises InputError if the phase is not from -pi to pi, or if `friction` is not positive.
 
@@ -97,10 +97,9 @@ class PhaseLosses(Table, Plottable):
         replace the ellipse
     loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
         the chords
-    smooth  : (c,) [force length] losses of the shape without roughness; nan if no solution of the
-        smooth contact is known
-    levels  : (c,) [force] the load L* up to which the memory curve is the same at every moment from
-        the second cycle on, as in `Cycle.level`
+    smooth  : (c,) [force length] losses of the shape without roughness; nan if the solution of the
+        smooth contact is not known
+    levels  : (c,) [force] `Cycle.level`, the load L* up to which the memory curve no longer changes
     sliding : (c,) number of asperities that, on this ellipse, slide as a whole or lose contact in
         the steady cycle
     order   : the weakest `Cycle.order` of all cycles
@@ -146,13 +145,12 @@ def phase_losses(
 ) -> PhaseLosses:
     """The energy losses of cycles along ellipses with several phases and amplitudes.
 
-    docs/theory/paths.md, "Lines and ellipses", explains what the losses depend on.
+    docs/theory/paths.md, "Lines and ellipses", explains how the losses depend on the phase.
 
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
     phases  : (m,) [rad] from -pi to pi
     factors : (k,) factors by which both amplitudes are multiplied
-    chords  : approximate number of chords per ellipse. In tests the loss was smaller than that of
-        the ellipse by a fraction of at most 12 / chords^2
+    chords  : approximate number of chords per ellipse, as in `elliptic_path`
     influence : how the compliance matrix is stored, as in `press`
 
     Raises the errors of `elliptic_path` and `steady`.
@@ -208,7 +206,7 @@ def phase_losses(
 
 
 def _smooth_alone(scene: Scene, load: float) -> Scene | None:
-    """The smooth contact as a scene with one asperity; None if no smooth solution is known."""
+    """The smooth contact as a scene with one asperity; None if its solution is not known."""
     if (reference := smooth_reference(scene, load)) is None:
         return None
     twice = 2.0 * reference.radius

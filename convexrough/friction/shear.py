@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearCertificate(Table):
-    """What is proved about a friction state, independent of how it was computed.
+    """What is proved about a friction state, independently of how it was computed.
 
     Arrays are (n,), in the order of the scene's asperities.
 
-    scope  : scope of the certificate of the pressed contact; "none" if nothing is proved
+    scope  : as in `Certificate`, for the pressed contact; "none" if nothing is proved
     order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
         "Order"). "proved": statuses and bounds hold for the true state. "proved for one step": they
-        hold for one general step from rest to Q, which gives the true state unless the deflection
-        of some asperity decreased on the way. "fails": nothing is proved
+        hold for the result of one general step from rest to Q, which is the true state unless the
+        deflection of some asperity decreased on the way. "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
@@ -134,8 +134,7 @@ class ShearState(Table, Plottable):
             too; `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError if there is no derivative. In gross sliding there is none if the approach
-        is kept constant, or if several asperities are the last to start to slide, at the same shear
-        force.
+        is kept constant, or if several asperities start to slide last, at the same shear force.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -174,9 +173,9 @@ def shear(
     force        : [force] shear force Q
     displacement : [length] relative tangential displacement of distant points
 
-    If the relative difference of |Q| from the friction limit f P is at most 16 * 2^-53, it counts
-    as f P: gross sliding. So does a displacement this close to that at which gross sliding starts.
-    Then the result contains the force f P and the displacement at which gross sliding starts.
+    If |Q| differs from the friction limit f P by at most 16 * 2^-53 f P, it counts as f P: gross
+    sliding. A displacement this close to that at which gross sliding starts also counts as gross
+    sliding. Then the result contains f P and the displacement at which gross sliding starts.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
     that at which gross sliding starts; SolverError if a normal problem is not solved.
@@ -216,7 +215,7 @@ def shear(
         radii, radius_errors = stick_radii(levels, level)
         total = (levels.top.load - level.load) * levels.force_unit
         total = total if height >= 0 else -total
-    if abs(height) == levels.load:  # what is given may differ from gross sliding by rounding
+    if abs(height) == levels.load:  # the given value may differ from gross sliding by rounding
         force = displacement = None
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
@@ -247,7 +246,7 @@ def shear(
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The value of T = Q / f for which one general step from rest gives this displacement."""
+    """The value of T = Q / f for which general steps from rest give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     def beyond(part: float) -> float:

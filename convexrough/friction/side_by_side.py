@@ -1,9 +1,9 @@
 """Comparison of three methods for a load path: agreement and time.
 
 The memory curve holds only if no indentation falls as the load rises. The general step
-(docs/theory/without-order.md) needs no such condition; Newton's method computes this step. The
-conic step minimises the energy of the same step as a cone program. Both take one step per segment,
-which is exact if no indentation falls as the load rises.
+(docs/theory/without-order.md), computed by Newton's method, needs no such condition. The conic step
+minimises the energy of the same step as a cone program. General and conic step are taken once per
+segment, which is exact if no indentation falls as the load rises.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ class PathEntry(Record):
     """The result of one method for a load path.
 
     way     : the method: "general step", "memory curve" or "conic step"
-    outcome : "answered", "refused" (the method does not apply to the scene) or "failed"
-    message : the reason why there is no result; else ""
+    outcome : "answered", "refused" (the method does not apply to the path) or "failed"
+    message : the reason why there is no result, or ""
     path    : the result; None if there is none
-    force_disagreement : largest difference of a shear force Q_i from that of the first method that
-        answered, divided by the largest friction limit f P_i
-    displacement_disagreement : largest difference of the displacement X from that method, divided
-        by its largest |X|
+    force_disagreement : largest difference of a shear force Q_i from the result of the first method
+        that answered, divided by the largest friction limit f P_i
+    displacement_disagreement : largest difference of the displacement X from the same result,
+        divided by the largest |X| of that result
     seconds : [s] time, including the normal solutions that were not cached
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])

@@ -1,9 +1,9 @@
 """Friction states as weighted sums of solutions under normal load.
 
 The weights are the changes of slope of the memory curve. Equation (1) of docs/theory/paths.md gives
-the shear forces Q_i of the asperities and the displacement X of the bodies. With indentations in
-place of approaches, the sum for X is the own deflection plus drift of an asperity. Equation (1) of
-docs/theory/states.md is the special case of first loading.
+the shear forces Q_i of the asperities and the displacement X of the bodies. The sum for X, with the
+indentations of an asperity in place of the approach, gives the own deflection plus drift of this
+asperity. Equation (1) of docs/theory/states.md is the special case of first loading.
 """
 
 from __future__ import annotations
@@ -27,13 +27,12 @@ from convexrough.normal.level import Level
 class States(NamedTuple):
     """m states of N asperities in the scene's units.
 
-    Each array is a `Ball`: values, and radii that bound their errors. Without a proof the radii are
-    infinite.
+    Each array is a `Ball`: values, and radii that bound their errors (infinite without a proof).
 
-    displacements : (m,) X, of the two bodies relative to each other
+    displacements : (m,) X, tangential displacement of one body relative to the other
     forces        : (m, N) Q_i, shear forces of the asperities
     asperity_displacements : (m, N) own deflection plus drift
-    drifts        : (m, N) displacements relative to the opposite surface, also of open asperities
+    drifts        : (m, N) displacements of asperities, open ones too, along the opposite surface
     """
 
     displacements: Ball
@@ -52,7 +51,7 @@ class LevelSums(NamedTuple):
     used    : the k total loads of the levels of all curves, sorted
     places  : (m, j) the levels of each curve, as indices into `used`
     weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above.
-        Rows of curves with fewer than j levels end with the weight 0
+        If a curve has fewer than j levels, its row ends with zeros
     """
 
     used: list[Fraction]
@@ -119,7 +118,7 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) for each asperity the status whose mask in `proved` is true for it.
+    """(N,) for each asperity the last status in `proved` whose mask is true for this asperity.
 
     If no mask is true, the status is "open" if the asperity is proved to be open, else "undecided".
     """

@@ -29,8 +29,8 @@ def cycle(
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
     displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
 
-    As in `shear`, a force or displacement that differs only by rounding from the value at the
-    onset of gross sliding is replaced by that value, also in the result.
+    As in `shear`, a force or displacement that differs only by rounding from its value at the onset
+    of gross sliding is replaced by that value, also in the result.
 
     Raises InputError if the scene has no friction, if the minimum exceeds the maximum, if a force
     exceeds the friction limit f P, or if the displacement exceeds that of gross sliding.
@@ -91,7 +91,7 @@ def cycles(
             raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
         ends = zip(upper.tolist(), lower.tolist(), strict=True)
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]
-        LOGGER.info("pressing at the level of a cycle")
+        LOGGER.info("pressing at the load P - T of each cycle")
     paths = [[(levels.load, T) for T in each] for each in heights]
     return steady_cycles(contact, MemoryCurve.pressed(levels.load), paths)
 
@@ -104,8 +104,8 @@ def steady(
     docs/theory/paths.md, "Closed paths", derives it.
 
     loads, forces : (m,) [force] load P and shear force Q at the points of the path, |Q| <= f P;
-        segments between points are straight, and the last one returns to the first point. As in
-        `shear`, Q counts as f P if they differ only by rounding
+        segments between points are straight, and the last segment returns to the first point. As
+        in `shear`, Q counts as f P if they differ only by rounding
     influence : how the compliance matrix is stored, as in `press`
 
     Raises the errors of `load_path`.

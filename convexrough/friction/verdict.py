@@ -20,7 +20,7 @@ from convexrough.record import Record
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
-#: An asperity keeps the status "sliding" of the solution if the error bound of its given force is
+#: An asperity keeps the status "sliding" of the solution if the error bound of its claimed force is
 #: smaller than this fraction of the friction limit f P_i.
 NEAR_SLIDING = 1e-2
 
@@ -32,6 +32,7 @@ CLAIMS_SLIDING = 1e-4
 class ShearVerdict(Claim, Record):
     """Comparison of claimed shear forces with what is proved about the state on first loading.
 
+    contact : the pressed contact
     forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] the prescribed sum Q of the shear forces
     claimed : (n,) true where the asperity is claimed to slide
@@ -88,9 +89,9 @@ class ShearVerdict(Claim, Record):
         by_forces = (self.claimed == claims_sliding(self.contact, self.forces)).all()
         if by_forces and (count := int(close[self.wrongly_sticking].sum())):
             yield (
-                f"{count:,} of the shear forces, on asperities proved to slide, are less than "
-                f"{100 * WITHIN:g} % below f P, but not within {100 * CLAIMS_SLIDING:g} %: without "
-                "a column status they claim to stick"
+                f"{count:,} of the shear forces, on asperities proved to slide, are between "
+                f"{100 * CLAIMS_SLIDING:g} % and {100 * WITHIN:g} % below f P_i: without a column "
+                "status these asperities count as claimed to stick"
             )
 
     @property
@@ -163,10 +164,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     forces : (n,) [force] shear forces in the order of the scene's asperities
     force  : [force] the prescribed sum of the shear forces
 
-    `force_errors` are bounds on the differences between the given forces and the solution. An
-    asperity gets the status that it has in the solution if it is open there, or if its entry of
-    `force_errors` is small enough. For "sliding" it must be below 1 % of the friction limit f P_i;
-    for "partial" it must be below the margin f P_i - |Q_i|, with the force Q_i of the solution.
+    `force_errors` are bounds on the differences between the given forces and the exact ones. An
+    asperity that is open in the solution has the status "open". "sliding" and "partial" are taken
+    from the solution if the entry of `force_errors` is small enough: below 1 % of the friction
+    limit f P_i for "sliding", below f P_i - |Q_i| with the force Q_i of the solution for "partial".
     Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or

@@ -1,10 +1,10 @@
 """Paths of load P and shear force Q, followed from one straight segment to the next.
 
 With the coefficient of friction f, the points of a path are (P, T) with T = Q / f. The memory curve
-stores the friction state; docs/theory/paths.md defines it, its layers and the slip front, and shows
-that forces and displacements are sums over its vertices. The loss along a segment is a sum over the
-pieces of the segment (`curve.Piece`). If order fails (`friction.order`), the memory curve does not
-apply. Then `general_step` computes the states, without proofs.
+stores the friction state. docs/theory/paths.md defines the curve, its layers and the slip front,
+and shows that forces and displacements are sums over its vertices. The loss along a segment is a
+sum over the pieces of the segment (`curve.Piece`). If order fails (`friction.order`), the memory
+curve does not apply. Then `general_step` computes the states, without proofs.
 """
 
 from __future__ import annotations
@@ -29,20 +29,19 @@ from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
 from convexrough.friction.state import States, states_of, statuses_of
 
-#: Largest number of vertices of the memory curves at all points of a path. One takes 300 bytes.
+#: Largest total number of vertices of the memory curves along a path. A vertex takes 300 bytes.
 MOST_VERTICES = 2 * 10**7
 
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A path that begins in the friction state `start` and leads through m points along straight
-    segments.
+    """A path of straight segments from the friction state `start` through m points.
 
     levels  : the normal solutions of the contact
     start   : the memory curve of the friction state before the first segment
     points  : the m points (P, T)
-    steps   : number of general steps per segment; with None, general steps are taken only if order
-        fails and the normal solution of the contact is proved
+    steps   : number of general steps per segment. None: no general steps, unless order fails and
+        the normal solution of the contact is proved
     stepper : solver of the general steps
     """
 
@@ -67,7 +66,7 @@ class Walk:
             vertices += len(curve.levels)
             if vertices > MOST_VERTICES:
                 found = f"{vertices:,} vertices of memory curves up to point {k:,}"
-                expected = f"at most {MOST_VERTICES:,}, so fewer reversals within reversals"
+                expected = f"at most {MOST_VERTICES:,}: use fewer reversals within reversals"
                 raise InputError("path", found=found, expected=expected)
         return segments
 
@@ -95,11 +94,7 @@ class Walk:
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """Results of general steps, or None.
-
-        General steps are taken if the caller asks for them, or if order fails and the normal
-        solution of the contact is proved.
-        """
+        """Results of general steps; None if no general steps are taken (see `steps`)."""
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
@@ -147,7 +142,7 @@ class Closed(Walk):
 
     @property
     def cycles(self) -> tuple[list[Piece], list[Piece]]:
-        """The pieces of the loss up to the end of the first cycle, and in every later cycle."""
+        """The pieces of the loss up to the end of the first cycle, and of each later cycle."""
         parts = self.pieces[: self.once + 1], self.pieces[self.once + 1 :]
         first, later = ([piece for cost in part for piece in cost] for part in parts)
         return first, later

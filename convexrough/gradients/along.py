@@ -1,9 +1,9 @@
-"""Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
+"""Gradients along load paths, from weighted sums of energies V and approaches D0 at total loads L.
 
-docs/theory/gradients.md, "Along a path", explains the method. The path is compared, in exact
-arithmetic, with a shifted path, on which some loads P_k, or some T_k = Q_k / f, differ by at most
-SHIFT. Q_k is a shear force, f the coefficient of friction. V and D0 at the levels of the shifted
-path are expanded about those of the original path, with S = dD0/dL.
+docs/theory/gradients.md, "Along a path", explains the method. Q_k are the shear forces of the path,
+f is the coefficient of friction. The path is compared, in exact arithmetic, with a shifted path, on
+which some loads P_k, or some T_k = Q_k / f, differ by at most SHIFT. V and D0 at the levels of the
+shifted path are expanded about the levels of the original path, with S = dD0/dL.
 """
 
 from __future__ import annotations
@@ -28,28 +28,25 @@ from convexrough.friction.walk import Walk
 from convexrough.gradients.parts import ZERO, Moves, Part
 
 #: The shift of P_k or T_k, and the distance below which levels of the two paths correspond, both
-#: divided by the largest load. SHIFT is less than any difference of two
-#: unequal float64 numbers.
+#: divided by the largest load. SHIFT is below any relative difference of unequal float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
-#: Coordinates of memory curves that differ by less than this part of the largest load count as
-#: equal in the search for ties (docs/theory/gradients.md): rounded decimals often miss a tie by
-#: less.
+#: Coordinates of memory curves that differ by less than this part of the largest load may be a tie
+#: (docs/theory/gradients.md, "Along a path") that rounded decimals miss.
 ROUNDED = Fraction(1, 2**46)
 
 #: One-sided derivatives are compared at this distance from a near tie, divided by the largest load.
-#: They count as equal if they differ by at most the part AGREES.
+#: They count as equal if their relative difference is at most AGREES.
 PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 
-#: A difference of one-sided derivatives counts if it exceeds this part of the largest derivative.
+#: A difference of one-sided derivatives below this part of the largest derivative is neglected.
 NEGLIGIBLE = 2.0**-40
 
 #: The weights of V, D0 and S at one level in a weighted sum.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: For each segment: index of its end point, weight of its loss, weight of the displacement at its
-#: end.
+#: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
 #: Changes of P or of T at all points of a path, per unit of a parameter.
@@ -68,7 +65,7 @@ class Sums(dict[Fraction, Weights]):
         self[level] = (V + weight * energy, D + weight * approach, S)
 
     def add_loss(self, piece: Piece, weight: Fraction) -> None:
-        """Add the loss (1 - c th) I on a piece, multiplied by a weight; `friction.loss` derives it.
+        """Add the loss (1 - c th) I on a piece times a weight; I is (4) of docs/theory/losses.md.
 
         c is the sign of the piece, th its slope.
 
@@ -111,9 +108,9 @@ class Along:
 
     @cached_property
     def sums(self) -> tuple[Sums, Sums]:
-        """Weights in (sum of losses) / (c_t f^2), and in (sum of displacements) / (c_t f).
+        """Weights at each level, in the sum of losses and in the sum of displacements.
 
-        c_t is the ratio of tangential to normal compliance.
+        The sums are divided by c_t f^2 and by c_t f, with c_t = tangential / normal compliance.
         """
         lost, moved = Sums(), Sums()
         for step, curve, pieces in zip(self.steps, self.walk.curves, self.walk.pieces, strict=True):
@@ -144,9 +141,9 @@ class Along:
 
     @cached_property
     def nearly_tied(self) -> bool:
-        """True if unequal P, unequal P + T or unequal P - T of two vertices nearly agree.
+        """True if two unequal values of P, of P + T or of P - T differ by less than ROUNDED.
 
-        The vertices are those of all memory curves along the path.
+        The values are those at the vertices of all memory curves along the path.
         """
         vertices = {
             vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
@@ -168,8 +165,8 @@ class Along:
     ) -> Ball:
         """`times` times the derivative from above (sign 1) or below (-1), along these changes.
 
-        off : [force] if it is not 0, the derivative of a path that is first shifted by this much to
-            the same side; the error bound does not cover this shift
+        off : [force] distance by which the path is first shifted to the same side; the error bound
+            does not include the effect of this shift
         """
         unit, force = max(self.loads), self.known.units.force
         longest = max(map(abs, (*loads, *heights))) or Fraction(1)
@@ -201,8 +198,8 @@ class Along:
 
         The one-sided values are the derivatives from below and from above. The derivative is their
         mean if they agree within their error bounds. It is nan if they differ or one does not
-        exist. If rounding may have moved the path off a tie, one-sided derivatives past the tie are
-        computed, too; if these differ, they replace the others, and the derivative is nan.
+        exist. If the path is nearly tied, one-sided derivatives at the distance PAST are computed,
+        too. If these differ, they become the one-sided values, and the derivative is nan.
 
         directions : changes of P and of T at all points
         """

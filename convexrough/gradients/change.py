@@ -43,8 +43,8 @@ class Direction(Record):
     sphere_radius : [length]
     contact_modulus : [force / length^2] at constant Poisson's ratio
     poisson_ratio : at constant contact modulus
-    load      : [force] total load; give at most one of load and approach
-    approach  : [length]. If neither load nor approach is given, the prescribed one is kept constant
+    load, approach : [force], [length] give at most one. Without either, the quantity that was
+        prescribed for the contact is kept constant
     friction, force : coefficient of friction and shear force [force]; only for friction states
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
@@ -72,7 +72,7 @@ class Direction(Record):
 class ContactChange(Table):
     """First-order changes of a contact when the scene or the load changes.
 
-    contact, direction : the contact, and the changes that cause those of the results
+    contact, direction : the contact, and the given changes of scene and load
     loads    : (n,) [force] loads, in the scene's order
     gaps     : (n,) [length] gaps, in the scene's order
     approach : [length] approach
@@ -96,7 +96,7 @@ class ContactChange(Table):
 class ShearChange(Table):
     """First-order changes of a friction state when the scene, load or shear force changes.
 
-    contact, direction : the pressed contact, and the changes that cause those of the results
+    contact, direction : the pressed contact, and the given changes of scene, load and shear force
     pressed : changes of the pressed contact (loads, gaps, approach)
     forces  : (n,) [force] shear forces, in the scene's order
     slips   : (n,) [length] gross slips, in the scene's order
@@ -133,7 +133,7 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
 def _pressed(
     contact: Contact, direction: Direction, bent: _Bent
 ) -> tuple[ContactChange, Ball, Response]:
-    """The change of the contact; also the changes of its load and solution, in scaled units."""
+    """The change of the contact; also that of its load, and of its solution, in scaled units."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)

@@ -1,8 +1,8 @@
-"""`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
+"""`Gradient`: derivatives of a number by all parameters of a scene, with proved error bounds.
 
 The number is a weighted sum of energies V, approaches D0, loads and indentations at some levels.
-A level is the normal solution at one total load (`gradients.parts`). These total loads depend on
-the prescribed loads and shear forces, and on the coefficient of friction.
+A level is the normal solution at one total load (`gradients.parts`). The total loads depend on the
+prescribed loads and shear forces, and on the coefficient of friction.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class Number:
 
     @cached_property
     def turning(self) -> Ball:
-        """(n, 2) derivatives by the contact points c, which change A."""
+        """(n, 2) derivatives by the contact points c, on which A depends."""
         n, turned = len(self.offsets), [(part.slopes.left, part.level.loads) for part in self.parts]
         carrying = np.zeros(n, dtype=bool)
         for left, loads in turned:
@@ -188,15 +188,16 @@ class Gradient(Table, Plottable):
 
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
     derivative is at constant values of the other parameters named here. So shear forces Q are
-    constant, but neither their fractions Q / (f P) nor the displacements are;
-    docs/theory/gradients.md, "Derivatives at a prescribed approach or displacement", tells how to
-    keep a displacement constant.
+    constant, but the fractions Q / (f P) and the displacements are not. docs/theory/gradients.md,
+    "Derivatives at a prescribed approach or displacement", tells how to keep a displacement
+    constant.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
-    contact is not proved at some load that the number depends on. With more than 1,000 loaded
-    asperities and no stored matrix, bounds for positions are also infinite, and in the geometry
-    "closest" those for radii, too. An infinite derivative, in gross sliding, has the error 0.
+    normal solution is not proved at some load on which the number depends. With more than 1,000
+    loaded asperities and no stored compliance matrix, bounds for positions are also infinite, and
+    in the geometry "closest" those for radii, too. The bound of an infinite derivative, in gross
+    sliding, is 0.
 
     contact         : the contact on which the number depends
     value           : the number itself
@@ -212,8 +213,8 @@ class Gradient(Table, Plottable):
     force           : derivative by the shear force of a friction state
     maximum, minimum : derivatives by the largest and smallest shear force of a cycle
     forces, loads   : (m,) derivatives by the forces and loads of a history or path; nan where the
-        derivatives from below and above differ, as at a point that repeats an earlier one, up to
-        rounding
+        derivatives from below and above differ, as at a point that agrees with an earlier point
+        (up to rounding)
     force_sides, load_sides : (m, 2) the derivatives by `forces` and `loads` from below and above
     balance_defect  : difference between two formulas for the derivative by the modulus, divided by
         the largest term of both formulas; a check of rounding

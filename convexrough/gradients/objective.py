@@ -23,7 +23,7 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
 
-#: The possible values of `of`, each with a quantity that must then be prescribed.
+#: The possible values of `of`, each with the quantity that must be prescribed for it.
 NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
 
 #: The possible parameters: of asperities, of the scene, of the material, and prescribed quantities.
@@ -34,7 +34,7 @@ PARAMETERS = (*EACH, *WHOLE, *ELASTIC, *PRESCRIBED)
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Objective(Record):
-    """A result for a scene as a function of a vector of parameters, with its gradient.
+    """A result for a scene as a function of a vector of parameters, with the gradient.
 
     scene : the scene, with the values of all parameters that are not in the vector
     of    : the result: "loss" of the symmetric cycle with the amplitude `force`, "displacement"
@@ -48,9 +48,9 @@ class Objective(Record):
     influence : how the compliance matrix is stored, as in `press`
 
     `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
-    For scipy, divide value and gradient by the initial value: scipy's tolerances are absolute, and
-    a loss may be 1e-13. `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
-    docs/theory/gradients.md derives the gradient.
+    For scipy, divide value and gradient by the initial value, because scipy's tolerances are
+    absolute and a loss may be as small as 1e-13. `to_jax`, `to_torch` and `to_autograd` return
+    functions for those packages. docs/theory/gradients.md derives the gradient.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
     >>> value, slopes = loss(loss.start)
@@ -220,7 +220,7 @@ class Objective(Record):
         except ImportError as error:
             raise ExtraError("autograd") from error
 
-        @lru_cache(maxsize=1)  # the backward pass asks for the gradient at the last point
+        @lru_cache(maxsize=1)  # the backward pass uses the gradient at the last point
         def at(point: bytes) -> tuple[float, Array]:
             return self(np.frombuffer(point))
 

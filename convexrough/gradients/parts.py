@@ -1,8 +1,8 @@
 """A scalar result as a sum of parts, one for each load level, and the derivatives of the parts.
 
 Parts and derivatives are balls (numbers with error bounds). A level is the normal solution at a
-total load L (`normal.level`): loads P, approach D0, indentations n (the negative of the gap where
-open), and energy V, in scaled units. A level depends on the offsets d, the coefficients k of
+total load L (`normal.level`): loads P, approach D0, indentations n (minus the gap of an open
+asperity), and energy V, in scaled units. A level depends on the offsets d, the coefficients k of
 Hertz's law and the compliance matrix A. Its derivatives are (1), (2) and (4) of
 docs/theory/gradients.md. The names v, w and lambda in this module are those of (4).
 """
@@ -61,21 +61,13 @@ class Part:
 
     @property
     def scaled(self) -> Ball:
-        """The terms with V and P.
-
-        If the modulus and all prescribed forces are multiplied by one factor, these terms are
-        multiplied by the same factor.
-        """
+        """The terms with V and P, which are proportional to the modulus if forces are, too."""
         total = self.energy * self.level.energy if self.energy.size > 0.0 else ZERO
         return total if self.loads is None else total + self.loads.dot(self.level.loads)
 
     @property
     def value(self) -> Ball:
-        """The whole sum.
-
-        The terms with D0 and n do not change if the modulus and all prescribed forces are
-        multiplied by one factor.
-        """
+        """The weighted sum."""
         total = self.scaled + self.approach * self.level.approach
         if self.indentations is not None:
             total = total + self.indentations.dot(self.level.indentation)
@@ -98,7 +90,7 @@ class Part:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """The derivative of the sum.
+        """The derivative of the weighted sum.
 
         Raises InputError if the sum has no derivative: at the load 0, if several asperities may
         touch first.
@@ -134,7 +126,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
-        expected = "a force below f P: where several asperities slide last there is no derivative"
+        expected = "a force below f P, as several asperities slide last, at the same force"
         raise InputError("force", found="gross sliding", expected=expected)
     zero = Ball.exact(np.zeros(len(offsets)))
     moved = where(first, zero - weight, zero)

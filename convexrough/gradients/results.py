@@ -1,4 +1,4 @@
-"""Gradients of results: the parts at each load level, and the derivatives of the levels' loads.
+"""Gradients of results: their parts at each level, and the derivatives of the levels' loads.
 
 A result is a sum over levels (`gradients.parts`): a contact has one level, its load P; a friction
 state and a cycle have two, P and L = P - T with T = Q / f; a load path has many. Q is the shear
@@ -37,13 +37,13 @@ from convexrough.normal.levels import Levels
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 
-#: Number of Newton steps to the level at which an asperity starts to slide. The relative error is
-#: about 1e-15 at first, and each step raises it to the power 3/2.
+#: Number of Newton steps to the level at which an asperity starts to slide. The initial relative
+#: error is about 1e-15, and each step raises the error to the power 3/2.
 NEWTON = 3
 
 
 def with_friction(result: ShearState | Cycle | LoadPath) -> FrictionLevels:
-    """The levels of a result. Raises InputError if its order fails, or if there is no load."""
+    """The levels of a result. Raises InputError if its order "fails", or if there is no load."""
     if result.order == "fails":
         expected = "a result whose indentations do not fall as the load rises"
         raise InputError("order", found='"fails"', expected=expected)
@@ -68,7 +68,7 @@ def by_load(units: Units) -> Moves:
 def by_forces(known: FrictionLevels, height: Ball, /, **shares: float) -> Moves:
     """Derivatives of the level L = P - T, with T = Q / f, by load, friction and forces.
 
-    shares : for each force, under its name, the derivative of Q with respect to it
+    shares : derivatives of Q with respect to forces, by the names of the forces
     """
     by_force = -1.0 / known.force_unit
     rates = {name: by_force * share for name, share in shares.items()}
@@ -149,8 +149,8 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     holding  : quantity kept constant, as in `Contact.gradient`
 
     Raises InputError if the scene has no friction, if the asperity carries no load, or if it is one
-    of several that slide last: then there is no derivative. Raises ProofError if it is not proved
-    that indentations do not fall as the load rises.
+    of several that slide last: then there is no derivative. Raises ProofError if indentations may
+    fall as the load rises.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
@@ -169,13 +169,13 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     if start > 0:
         low, slope = _just_touching(found, place, known.at(start).load)
         if known.order([start]) == "fails":
-            raise ProofError("an indentation falls as the load rises: no onset is known")
+            raise ProofError("indentations may fall as the load rises, so the onset is not proved")
         only = Ball.exact(among_zeros(np.ones(1), np.array([place]), len(first)))
         # n(L) = 0, so that -f dL = f dn / (dn/dL)
         parts = [Part(low, indentations=only * (f * unit / slope))]
         total = (top.load - low.load) * f * unit
     elif np.count_nonzero(first) > 1 or not first[place]:  # all of these slide at f P
-        expected = "one that slides before another, or last and alone"
+        expected = "an asperity that does not slide last, or that slides last alone"
         said = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=said, expected=expected)
     explicit = {"load": f, "friction": total / f}
@@ -187,7 +187,7 @@ def _just_touching(known: Levels, place: int, near: Ball) -> tuple[Level, Ball]:
 
     near : an estimate of the load L of this level
 
-    The load of the result is an interval that contains the root of n; n increases on all of it.
+    The load of the result is an interval that contains the root of n, and on which n increases.
     """
 
     def at(load: Ball) -> tuple[Level, Ball]:
@@ -299,12 +299,12 @@ def _gradient(
 
 
 def _loss(number: Number, order: Order) -> Number:
-    """The given sum with losses; its error bounds are infinite unless order is proved."""
+    """The number, a sum with losses; with infinite error bounds if order is not proved."""
     return number if order == "proved" else number.times(Ball.around(1.0, np.inf), {})
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """(n,) weights of gaps: 0 where touching; where undecided, intervals from 0 to the weight."""
+    """(n,) weights of gaps; 0 if an asperity touches, an interval from 0 if this is undecided."""
     if level.box is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))

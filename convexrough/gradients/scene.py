@@ -127,7 +127,8 @@ class Geometry:
         scale is 1 / (pi E*), in scaled units.
 
         loads : vectors P, (m,) each, of the asperities `which`. For more than IN_BALLS asperities
-            the sums are computed in float64, and error bounds are infinite if no matrix is stored
+            the sums are computed in float64, and the error bounds are infinite if no compliance
+            matrix is stored
         """
         if len(which) <= IN_BALLS:
             return self._in_balls(loads, which)

@@ -1,9 +1,9 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
 docs/theory/shakedown.md, "Melan's program", states the program (2), in which the points of a path
-of shear forces are t0 + lambda t_v, and derives both bounds on lambda: the lower one from residual
-forces, the upper one, (3), from slips. A solver, which need not be accurate, finds residual forces
-and slips. The section "Elastic shares" derives the elastic forces and bounds on their errors. All
+of shear forces are t0 + lambda t_v. It derives a lower bound on lambda from residual forces, and
+the upper bound (3) from slips. A solver, which need not be accurate, finds residual forces and
+slips. The section "Elastic shares" derives the elastic forces and bounds on their errors. All
 shear forces are divided by the coefficient of friction.
 """
 
@@ -33,7 +33,7 @@ STEPS = 2.0**30
 
 
 class Limit(NamedTuple):
-    """The results of a shakedown theory: fields of `Shakedown`; forces are divided by friction."""
+    """Fields of `Shakedown`; shear forces are divided by the coefficient of friction."""
 
     factor: float
     lower: float
@@ -139,7 +139,7 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
 
 def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved off the limits P.
+    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved away from the limits.
 
     limits : (n,) the friction limits P
     """
@@ -151,7 +151,7 @@ def _inwards(limits: Array, state: Array, mean: Array) -> Array:
 def _lower(
     known: FrictionProblem, rest: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
-    """A lower bound on the largest lambda, from residual forces `rest`; 0 if they prove nothing.
+    """A lower bound on the largest lambda, from residual forces `rest`; 0 without a proof.
 
     elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
     """

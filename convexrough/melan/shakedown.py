@@ -1,7 +1,7 @@
 """`shakedown`: the largest factor by which a load path may be scaled so that sliding dies out.
 
-In this module, sliding dies out if after some cycles no asperity slides as a whole, and none that
-touches at the mean load opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
+In this module, sliding dies out if after some cycles no asperity that touches at the mean load
+slides as a whole or opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
 derives the limit with partial slip, and Melan's limit for asperities that stick until they slide.
 """
 
@@ -45,16 +45,16 @@ class Shakedown(Table, Plottable):
         stick until they slide as a whole, by Melan's theorem at constant load. "elastic" uses the
         scalar tangential kernel, "vector" the full one, with shear forces in the plane
     factor  : the largest factor, at most `gross`, at which after some cycles no asperity that
-        touches at P0 slides as a whole or opens; `limited_by` says which of the two happens above
+        touches at P0 slides as a whole or opens; `limited_by` says which happens at larger factors
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
-    factors : (n,) the largest factor, for each asperity, at which its own sliding dies out; nan
-        where it is not computed or the asperity does not touch at P0; for "vector" all are equal
+    factors : (n,) the same limit for each asperity alone; nan if it is not computed or the asperity
+        does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
     witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
         path scaled by `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
-    order   : for "exact" as `Cycle.order`; there are bounds only if it is "proved". None for others
+    order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
     load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
 
@@ -133,9 +133,9 @@ def shakedown(
 ) -> Shakedown:
     """The largest factor by which a closed path may be scaled so that sliding dies out.
 
+    The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
     Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
     docs/theory/shakedown.md derives the limits.
-    The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
 
     load, force : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
     load_amplitudes : [force] (m,) or one number for all points; must be 0 unless `kind` is "exact"
@@ -146,7 +146,7 @@ def shakedown(
     Raises InputError for invalid values, if |Q0| >= f P0 with the coefficient of friction f, or if
     all points of the path are equal.
 
-    Example: in the scene of Dini and Hills (2009), sliding ceases for all amplitudes up to
+    Example: in the scene of Dini and Hills (2009), sliding dies out for all amplitudes up to
     0.3517 f P. Here f = 0.5, so Q is 0.1 f P, and the largest amplitude is factor / 10 times f P.
 
     >>> Q = 0.05 * contact.load
@@ -213,7 +213,7 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
     def factor(onset: Fraction) -> float:
         """The factor at which L* = `onset`, or that of gross sliding if that is smaller.
 
-        L* is the load of docs/theory/shakedown.md: what touches at L* stays stuck in part.
+        L* is defined in docs/theory/shakedown.md; an asperity that touches at L* sticks in part.
         """
         return float(min((P0 - onset) / fall if fall > 0 else np.inf, gross))
 

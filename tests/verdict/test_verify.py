@@ -177,7 +177,7 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     ):
         assert judged(state.forces, **{column: values}).refuses(f"column {column}: {expected}")
     rounded = judged(0.998 * state.forces)
-    assert "below f P, but not within 0.01 %: without a column status" in rounded.err
+    assert "between 0.01 % and 1 % below f P_i: without a column status" in rounded.err
     for factor, said in ((-1, "have the other sign than"), (-1e3, "total and are 10^3"),
                          (1e-6, "are 10^-6 times what they should be: another unit, as MN for N?"),
                          (1.25, "are 1.25 times those of the solution")):  # fmt: skip
