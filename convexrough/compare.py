@@ -228,7 +228,7 @@ def solver_named(name: str) -> solvers.Solver:
     module, _, attribute = name.rpartition(".")
     if not module:
         return solvers.named(name)
-    expected = "package.Class of a solver that can be imported and needs no arguments"
+    expected = "package.Class, the import path of a solver that needs no arguments"
     try:
         made = getattr(import_module(module), attribute)()
     except (Exception, SystemExit) as error:  # a user's module may raise anything

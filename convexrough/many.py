@@ -74,7 +74,7 @@ class Contacts(Table):
     def __getitem__(self, k: int) -> Contact:
         """The contact of scene k. Raises IndexError if there is none."""
         if not -len(self) <= index(k) < len(self):
-            raise IndexError(f"scene {k} of {len(self):,}: the first is 0")
+            raise IndexError(f"scene {k}: expected an index from 0 to {len(self) - 1:,}")
         k = index(k) % len(self)
         if k not in self._known:
             name, start = "load" if self.by_load else "approach", self.asperity_loads[k]

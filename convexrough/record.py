@@ -107,9 +107,9 @@ class Table(Record):
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas data frame with a row for each asperity, step, point or solver.
 
-        Columns are named in the singular; components of vectors end in _x and _y. Fields that are
-        one number or text are in `attrs`. Two-dimensional arrays that are not vectors, such as the
-        forces of asperities at each step of a history, are only in `to_xarray`.
+        Columns are named in the singular; names of components of vectors end in _x and _y. Fields
+        that are one number or text are in `attrs`. Other two-dimensional arrays, such as the forces
+        of asperities at each step of a history, are only in `to_xarray`.
 
         Raises ExtraError if pandas is not installed.
         """

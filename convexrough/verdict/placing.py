@@ -267,14 +267,14 @@ class Placing:
 
     @cached_property
     def _apart(self) -> Array:
-        """(n,) [length] the distance of each asperity from its neighbour, if it has any."""
+        """(n,) [length] the distance of each asperity from its nearest neighbour, if it has one."""
         if len(self.scene) == 1:
             return np.array([np.min(self.scene.sphere_radius)])
         return nearest_distances(self.scene.asperities.positions)
 
     @cached_property
     def _spacing(self) -> float:
-        """[length] the smallest distance of two asperities; the tip radius if there is only one."""
+        """[length] the smallest distance of two asperities, or the tip radius of the only one."""
         alone = len(self.scene) == 1
         return float(self.scene.asperities.tip_radii[0] if alone else self._apart.min())
 

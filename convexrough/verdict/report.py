@@ -27,7 +27,7 @@ MOST_LISTED = 10
 
 
 def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
-    """The verdicts and a row for each asperity, in the scene's units; `--json` prints this."""
+    """What `--json` prints: the verdicts and a row for each asperity, in the scene's units."""
     summary: dict[str, Any] = {}
     for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
         names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
