@@ -308,7 +308,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     """A sentence for each kind of contradiction between two results.
 
     Two results contradict each other if loads, gaps or approaches differ by more than the sum of
-    their error bounds, or if one proves that an asperity touches and the other that it is open. A
+    their error bounds, or if an asperity is proved to touch by one and to be open by the other. A
     result of scope "none" contradicts no other.
 
     >>> one = cr.compare.Answer.of(contact)

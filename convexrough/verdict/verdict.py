@@ -1,8 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-If the certificate of the loads does not prove the whole claim, Newton's method looks for a
-solution, first from these loads, then from its default start. The certificate of that solution
-shows which loads are wrong. `friction.verdict` compares shear forces with the solution.
+If the certificate of the loads does not prove the whole claim, Newton's method computes a solution,
+first from these loads or, if it fails, from its default start. The certificate of the solution
+shows which loads are wrong. `friction.verdict` compares shear forces with a solution.
 """
 
 from __future__ import annotations
