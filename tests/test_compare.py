@@ -300,7 +300,7 @@ def test_a_solver_of_ones_own_by_its_name(
     for name, said in (
         ("desk_solvers.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),
-        ("desk_solvers.Needs", "missing 1 required .* of a solver that .* needs no arguments"),
+        ("desk_solvers.Needs", "missing 1 required .* of a solver that needs no arguments"),
         ("desk_solvers.NoSolver", "found type NoSolver, which has no method solve, expected one"),
         ("desk_solvers.NoName", "found type NoName, expected an attribute `name`"),
         ("newtom", "found 'newtom', expected one of"),
