@@ -204,7 +204,8 @@ def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[st
     """A mistake if cells such as 1.013 seem to have thousands separators, as beside 827.
 
     This is so if all other cells are whole numbers of at most three digits, and one of them has
-    three digits; but 999 often marks a hole. Beside `SURELY_GROUPED` such cells, any will do.
+    three digits (not 999, which often marks a hole). If at least `SURELY_GROUPED` cells have the
+    form of 1.013, one whole number with fewer digits is enough.
     """
     mark = source.style.decimal
     if not mark or not any(mark in "\n".join(cells) for cells in columns):
