@@ -4,9 +4,9 @@ Each public name is imported when it is first used, so that the command line sta
 `__init__.pyi` lists the public names.
 
 The examples in docstrings use these names: `cr` is this package and `np` is numpy; `scene` has the
-61 asperities of the source paper (Dini and Hills 2009), and in `contact`, the example of `press`,
-37 of them touch; `new_scene` is the scene file that `convexrough new` writes; `folder` is an empty
-folder.
+61 asperities of the source paper (Dini and Hills 2009); `contact` is the contact in the example of
+`press`, in which 37 asperities touch; `new_scene` is the scene file that `convexrough new` writes;
+`folder` is an empty folder.
 """
 
 import lazy_loader

@@ -1,6 +1,6 @@
 """The entry point of `python -m convexrough` and of the command `convexrough`.
 
-`main` does all imports itself, so that an interrupt prints one line at any time.
+`main` contains all imports, so that an interrupt during an import also prints only one line.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def main() -> int:
 
         status = run()
         if status == INTERRUPTED:
-            os._exit(status)  # compiled code that was interrupted can abort when Python ends
+            os._exit(status)  # a normal exit can abort in compiled code that was interrupted
         import signal
 
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the exit is left
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Python only has to exit
         return status
     except KeyboardInterrupt:
         _say_interrupted()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
 
-#: A float or a float64 array. A result of this type has the shape of the arguments.
+#: A float or a float64 array. A function of a `Number` returns a result of the same shape.
 Number: TypeAlias = Any
 
 
@@ -44,7 +44,7 @@ def evenly(function: Callable[[Array], Array], values: Array) -> Array:
 
 
 def taken(values: Array, which: Indices) -> Array:
-    """values[which]. If `values` stores only one number (`even`), the result does, too."""
+    """values[which]. If `even` made `values`, the result also stores only one number."""
     if values.strides == (0,) and len(values):
         return even(values[0], len(which))
     return np.asarray(values[which])

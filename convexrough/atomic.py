@@ -1,4 +1,4 @@
-"""Files that replace earlier files only when they are complete, and JSON without infinities."""
+"""Writing of files that replace earlier ones only when complete, and of JSON without infinities."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def unfinished(path: Path) -> Path:
 def replacing(path: Path) -> Iterator[Path]:
     """A context manager that yields a temporary path, to which the body writes a file.
 
-    If the body succeeds, this file replaces `path`; otherwise it is removed. A killed process
-    leaves the temporary file. Raises FileError if `path` cannot be written.
+    If the body succeeds, the temporary file replaces `path`; otherwise it is removed. It remains if
+    the process is killed. Raises FileError if `path` cannot be written.
     """
     temporary = unfinished(path)
     try:

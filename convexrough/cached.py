@@ -1,4 +1,4 @@
-"""Objects that store what was computed from them."""
+"""Base class of objects that store results computed from them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Made = TypeVar("Made")
 
 
 class Cached:
-    """Base class of objects that store what is computed from them for as long as they exist."""
+    """Base class of objects that store results computed from them for as long as they exist."""
 
     def cached(self, make: Callable[[Self], Made]) -> Made:
-        """make(self), computed once. The result must not refer to self, or memory is freed late."""
+        """make(self), computed once. Its memory is freed late if the result refers to self."""
         cache: dict[Any, Any] = self.__dict__.setdefault("_cache", {})
         if make not in cache:
             cache[make] = make(self)

@@ -1,4 +1,4 @@
-"""Checks of arguments; they raise an InputError that says what was found and what is expected."""
+"""Checks of arguments, which raise InputError with the value found and what is expected."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array, even, evenly
 from convexrough.errors import InputError
 
-#: Smallest and largest absolute value of a number in a scene's units, so that products of such
-#: numbers do not underflow or overflow.
+#: Smallest and largest absolute value of a number in a scene's units. Within these limits products
+#: of a few numbers do not underflow or overflow.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: The description of valid numbers in the error message for a number outside these limits.
+#: What a message expects if a number is outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
 class Kind(NamedTuple):
-    """A check of a number. Calling it with a name and a value returns the value as a float.
+    """A check of a number; an instance is called with a name and a value.
 
     expected : description of valid numbers, for error messages
     holds    : function that returns True for a valid number; called with finite numbers only
@@ -47,14 +47,14 @@ variation = Kind(
     "a standard deviation over the mean, from 0 to 1: not in per cent",
     lambda number: 0 <= number <= 1,
 )
-#: The limit is a little above pi, because the user may round pi up.
+#: The limit is a little above pi, because users may give pi rounded up.
 phase = Kind(
     "a phase in radians, from -pi to pi; 90 degrees are 1.5708", lambda number: abs(number) < 3.15
 )
 
 
 def is_sized(number: float) -> bool:
-    """True for 0 and for numbers of an absolute value from `SMALLEST` to `LARGEST`."""
+    """True for 0, and for numbers with an absolute value from `SMALLEST` to `LARGEST`."""
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
@@ -101,8 +101,8 @@ def array(
     """A read-only copy of a vector; raises InputError for values that are not valid or finite.
 
     length : required number of values; a single number stands for this many equal values
-    sign : "", "positive" or "not negative"
-    smallest : smallest absolute value of values that are not 0
+    sign : required sign: "" (any), "positive" or "not negative"
+    smallest : smallest allowed absolute value of values other than 0
     one  : noun for messages such as "one per asperity"
     """
     vector = numbers(what, values)
@@ -165,7 +165,7 @@ def friction(coefficient: float | None) -> float:
 
 
 def bearable(what: str, forces: ArrayLike, limit: float | Array) -> Array:
-    """The shear forces Q as an array of any shape; raises InputError unless |Q| <= limit = f P."""
+    """The shear forces Q as an array; raises InputError unless |Q| is at most the limit f P."""
     given = numbers(what, forces)
     limits = np.broadcast_to(limit, given.shape)
     good = np.abs(given) <= limits * (1 + 1e-15)  # False for nan
@@ -231,7 +231,7 @@ def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """A suggestion for an unknown name: the most similar valid name or, if none is, all names."""
+    """A suggestion for an unknown name: the most similar valid name, or all if none is similar."""
     import difflib  # only when something is misspelt
 
     names = {each.lower(): each for each in valid}

@@ -1,9 +1,8 @@
-"""Comparison of all formulations and solvers on one scene: agreement, certificate and time.
+"""Comparison of all solvers on one scene: agreement, certificate and time.
 
 The same code certifies all results, whichever solver found them. If a certified result contradicts
 a result of global scope, there is a mistake in the mathematics or in the code of the package. Two
-results of local scope may differ without a mistake: each certificate proves that its own box of
-loads contains a solution, and the two solutions may be different.
+results of local scope may differ without a mistake, because they may be about different solutions.
 """
 
 from __future__ import annotations
@@ -41,7 +40,8 @@ from convexrough.solvers import named
 #: A message names at most this many asperities, and gives the number of the others.
 MOST_NAMED = 5
 
-#: Loads above this fraction of the largest count as contact in a comparison of solvers.
+#: A contact differs if one load is above this fraction of the reference's largest load, and the
+#: other below a tenth of it.
 CARRIES = 1e-6
 
 #: Solvers that CVXPY can call if the packages with these names are installed.
@@ -53,20 +53,20 @@ class Entry(Record):
     """The result of one solver.
 
     outcome : "answered", "refused" (the solver does not accept the scene) or "failed"
-    message : the reason where there is no solution, else ""
-    contact : the certified solution, or None
-    disagreement : largest |load - load of the reference|, divided by the reference's largest load;
-        nan if this solver or the reference has no solution
-    different_statuses : number of asperities whose proved status differs from that in the
-        reference; None if this solver or the reference has no solution
+    message : the reason if there is no solution, else ""
+    contact : the solution with its certificate; None if there is no solution
+    disagreement : largest |load - load of the reference|, divided by the reference's largest load
+    different_statuses : number of asperities whose status, also "undecided", differs from that in
+        the reference
     different_contacts : number of asperities whose load is above 1e-6 of the reference's largest
-        load in one of the two solutions, and below 1e-7 of that load in the other; None if this
-        solver or the reference has no solution
+        load in one of the two solutions, and below 1e-7 of it in the other
     steps : for each iteration its solver, step, objective and residual, if `compare` was called
         with `log`; OSQP and the solvers of CVXPY do not report their iterations
-    memory : [bytes] largest increase of the resident memory of the process, which does not count
-        memory that the allocator reused; None if there is no solution, or if the system is not
-        Linux
+    memory : [bytes] largest increase of the resident memory of the process, without memory that the
+        allocator reused; None if there is no solution, or if the system is not Linux
+
+    The reference is Newton's method. If it or this solver has no solution, `disagreement` is nan,
+    and the two numbers of asperities are None.
 
     >>> reference, found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"]).entries
     >>> found.outcome, found.disagreement < 1e-9, found.different_statuses
@@ -88,9 +88,8 @@ class Entry(Record):
 class Comparison(Table, Plottable):
     """The entries of all solvers. The first is that of Newton's method, the reference.
 
-    contradictions : a sentence for each contradiction between two certified results of which at
-        least one has global scope. Each contradiction shows a mistake in the mathematics or in the
-        code
+    contradictions : a sentence for each contradiction between two certified results, at least one
+        of global scope; each shows a mistake in the mathematics or in the code of the package
 
     >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
     >>> len(found.contacts), found.certified, found.disagreeing(within=1e-9)
@@ -107,7 +106,7 @@ class Comparison(Table, Plottable):
 
     @property
     def certified(self) -> bool:
-        """True if at least one result has a proved status for every asperity."""
+        """True if at least one solver's loads prove the status of every asperity."""
         return any(contact.certificate.holds for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
@@ -128,7 +127,7 @@ class Comparison(Table, Plottable):
         yield "contradictions", "; ".join(self.contradictions) or "none"
 
     def _variables(self) -> Variables:
-        """Columns with a row for each entry; nan and "" where there is no solution."""
+        """Columns with a row for each entry; nan or "" if it has no solution."""
         none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
         answers = [entry.contact for entry in self.entries]
         statuses = [entry.different_statuses for entry in self.entries]
@@ -157,16 +156,16 @@ def compare(
     influence: Kind | None = None,
     log: bool = False,
 ) -> Comparison:
-    """Compare the results of every solver for one normal contact.
+    """Compare the results of solvers for one normal contact.
 
     approach [length] or load [force] : the prescribed quantity, exactly one
-    solvers  : solvers or their names; default `every_solver()`. Newton's method is always first, as
-        the reference
+    solvers  : solvers or their names; default `every_solver()`. Newton's method is always added as
+        the first, the reference
     influence : compliance operator, as for `press`
-    log : store the steps of each solver in its entry
+    log : True to store the steps of each solver in its entry
 
-    Raises InputError if the reference refuses the input. Errors of the other solvers are reported
-    in their entries.
+    Raises InputError if the reference does not accept the scene. Errors of the other solvers are
+    reported in their entries.
 
     >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
     >>> [entry.outcome for entry in found.entries], found.contradictions
@@ -196,9 +195,9 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers of the package, and SCS and QOCO through CVXPY if installed.
+    """All solvers of the package, and SCS and QOCO through CVXPY if they are installed.
 
-    Those of the package that end with a Newton step are also used without this step.
+    Solvers of the package that end with a Newton step are also included without this step.
 
     >>> [solver.name for solver in cr.compare.every_solver()][:3]
     ['newton', 'conic + Newton step', 'conic']
@@ -218,8 +217,8 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 def solver_named(name: str) -> solvers.Solver:
     """The solver with this name.
 
-    name : the name of a solver of the package, as in scene files, such as "newton"; or, with a dot,
-        the path of a class, such as "mine.Solver", of which an instance is made without arguments
+    name : the name of a solver of the package, as in scene files, such as "newton"; or the import
+        path of a class, such as "mine.Solver", which is called without arguments
 
     Raises InputError if there is no such solver.
 
@@ -229,7 +228,7 @@ def solver_named(name: str) -> solvers.Solver:
     module, _, attribute = name.rpartition(".")
     if not module:
         return solvers.named(name)
-    expected = "package.Class of a solver that can be imported and needs no arguments"
+    expected = "package.Class, the import path of a solver that needs no arguments"
     try:
         made = getattr(import_module(module), attribute)()
     except (Exception, SystemExit) as error:  # a user's module may raise anything
@@ -286,7 +285,7 @@ def _different_contacts(loads: Array, reference: Array) -> int:
 
 
 def _load_code_of(solver: solvers.Solver) -> None:
-    """Make a solver import what it needs now, so that no measured time contains imports."""
+    """Solve a small problem, so that later times do not include imports by the solver."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
     with suppress(Exception, SystemExit):  # `_enter` handles the same error later
@@ -294,7 +293,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
 
 
 class Answer(NamedTuple):
-    """Loads with their certificate; `name` is the origin of the loads in messages."""
+    """Loads with their certificate; `name` says in messages where the loads come from."""
 
     name: str
     loads: Array
@@ -306,11 +305,11 @@ class Answer(NamedTuple):
 
 
 def contradictions(first: Answer, second: Answer) -> list[str]:
-    """A sentence for each kind of contradiction between two results; empty if there is none.
+    """A sentence for each kind of contradiction between two results.
 
     Two results contradict each other if loads, gaps or approaches differ by more than the sum of
-    their bounds, or if one proves that an asperity touches and the other that it is open. A result
-    without a proof contradicts nothing.
+    their error bounds, or if an asperity is proved to touch by one and to be open by the other. A
+    result of scope "none" contradicts no other.
 
     >>> one = cr.compare.Answer.of(contact)
     >>> other = one._replace(name="another", loads=1.1 * contact.loads)
@@ -347,7 +346,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
 
 
 def joined(items: Iterator[str]) -> str:
-    """The first `MOST_NAMED` items as text, and the number of the others."""
+    """The first `MOST_NAMED` texts in one, with the number of the others."""
     named = list(items)
     more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more

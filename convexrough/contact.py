@@ -1,4 +1,4 @@
-"""`press`: assemble the normal problem of a scene, solve it and certify the loads."""
+"""`press`: solve the normal contact problem of a scene, and certify the loads."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
-#: In a scene of at most FEW asperities Newton's method under a load includes all of them, because a
-#: bound on the approach, from which some are known to be open, takes more time.
+#: Under a prescribed load, Newton's method includes all asperities if they are at most FEW: a bound
+#: on the approach, by which some of them are known to be open, takes more time.
 FEW = 128
 
-#: An open summit is beside a contact disc up to this multiple of the disc's radius from its centre.
-#: At this distance a point force gives displacements that are 5 % too small, at the rim 15 %.
+#: A summit counts as beside a contact disc up to this multiple of the contact radius from the
+#: centre. There the displacements by a point force are 5 % too small, at the rim of the disc 15 %.
 BESIDE = 1.5
 
 if TYPE_CHECKING:
@@ -60,12 +60,12 @@ class Contact(Cached, Table, Plottable):
     approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : estimate of the relative error of displacements at loaded asperities that arises
-        because point forces replace pressures: the largest of `surface.model_errors`
+    model_error   : estimate of the largest relative error of a displacement at a loaded asperity
+        that is due to point forces in place of pressures: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii
         a and distances r; 0 if fewer than two touch. If it exceeds 1, contact discs overlap and the
-        model fails. `covered` counts open summits under a disc
-    candidates    : number of asperities that may touch; the solver leaves out the others
+        model fails
+    candidates    : number of asperities that the solver included; all others are proved open
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
@@ -106,15 +106,15 @@ class Contact(Cached, Table, Plottable):
 
     @cached_property
     def covered(self) -> int:
-        """Number of open summits under or beside a contact disc, up to 1.5 radii from its centre.
+        """Number of open summits within 1.5 contact radii of the centre of a contact disc.
 
-        There a point force does not represent the pressure.
+        At these summits a point force does not represent the pressure of the disc.
         """
         return covered(self.scene, self.contact_radii)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the loads, each a sentence: no certificate, crowding, few contacts, ...
+        """Reasons to doubt the loads, as sentences: no certificate, crowding, few contacts, ...
 
         >>> contact.warnings
         ()
@@ -126,13 +126,12 @@ class Contact(Cached, Table, Plottable):
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
-        sheared : results of `shear` for this contact, with 0 < |Q| < f P. For each, the proof
-            includes the state at the shear force Q and the loss of the cycle between +Q and -Q; the
-            sign of Q does not matter
+        sheared : results of `shear` for this contact, with shear forces 0 < |Q| < f P. For each,
+            the proof includes the state at Q and the loss of the cycle between Q and -Q
 
         docs/theory/proof-file.md describes the file. Raises InputError for scenes too large for
-        exact arithmetic, and ProofError if nothing is proved, as for states whose `order` is
-        "fails".
+        exact arithmetic, and ProofError if nothing is proved, for example because the `order` of a
+        shear state is "fails".
 
         >>> print(contact.proof().proved.splitlines()[0])
         proved: under the approach 5e-05 there is a solution, the only one
@@ -180,12 +179,12 @@ class Contact(Cached, Table, Plottable):
         load: float | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum of results with respect to the scene, by one linear system.
+        """Derivatives of a weighted sum of results with respect to the scene.
 
         docs/theory/gradients.md derives them.
 
-        loads, gaps    : (n,) weights of the asperities' loads and gaps
-        approach, load : weights of the approach and the total load
+        loads, gaps    : (n,) weights of the asperities' loads and gaps in the sum
+        approach, load : weights of the approach and the total load in the sum
         holding        : quantity kept constant, "load" or "approach"; default: the prescribed one
 
         Raises InputError if no weight is given or no asperity is loaded, and SolverError if the
@@ -202,7 +201,7 @@ class Contact(Cached, Table, Plottable):
     def change(self, direction: Direction) -> ContactChange:
         """First-order changes of loads, gaps and approach when the scene changes by `direction`.
 
-        direction : changes of the scene and of the prescribed quantity
+        direction : the changes of the scene and of the prescribed quantity
 
         Raises InputError and SolverError as `gradient` does.
 
@@ -240,12 +239,13 @@ def press(
     approach [length] or load [force] : the prescribed quantity, exactly one; at the approach 0 the
         undeformed sphere just touches the plane of height 0
     solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
-    start  : (n,) [force] initial loads; a globally certified solution does not depend on them
+    start  : (n,) [force] initial loads; if the scope is "global", the solution does not depend on
+        them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
-        on a lattice), "scattered" (transforms on a mesh); None for the cheapest
+        on a lattice), "scattered" (transforms on a mesh); None for the cheapest of these
 
     Raises InputError for wrong values and SolverError if the solver stops without a solution.
-    Loads that could not be certified are returned too: check `contact.certificate.scope`.
+    Loads about which nothing is proved are returned too: check `contact.certificate.scope`.
 
     >>> contact = cr.press(scene, approach=5e-5)
     >>> print(f"{contact.load:.4g}", (contact.status == "contact").sum(), contact.certificate.scope)
@@ -262,15 +262,12 @@ def solve(
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
 ) -> Contact:
-    """The contact of an assembled problem; the other arguments are as for `press`."""
+    """The contact of an assembled problem; `solver` and `start` are as for `press`."""
     return _contact(problem, solvers.named(solver), start, time.perf_counter())
 
 
 def levels_of(contact: Contact) -> Levels:
-    """The normal solutions of a contact's scene at loads up to that of the contact.
-
-    `contact.cached(levels_of)` returns the same object each time.
-    """
+    """The normal solutions (levels) of a contact's scene at loads up to that of the contact."""
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
     top = vars(contact).get("_top") or _proved_again(contact, solver)
@@ -302,9 +299,7 @@ def assembled(
     influence: Kind | None = None,
     highest: float | None = None,
 ) -> NormalProblem:
-    """The problem that `press` solves. Newton's method under a prescribed load includes all
-    asperities if these are at most `FEW`; else those that can touch are included.
-    """
+    """The problem that `press` solves, with the asperities that can touch (see `FEW`)."""
     few = len(scene) <= FEW and isinstance(solver, solvers.Newton)
     if few and highest is None and load is not None:
         highest = np.inf
@@ -362,13 +357,13 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles omit these two. For an unpickled contact `levels_of` therefore proves the loads again.
+    # Pickles omit these two, so `levels_of` proves the loads of an unpickled contact again.
     contact.__dict__.update(_by=solver, _top=top)
     return contact
 
 
 def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
-    """The checked solution. SolverErrors keep the latest loads, in the scene's units and order."""
+    """The checked solution. SolverErrors get the latest loads in the scene's units and order."""
     try:
         solution = solver.solve(problem, start)
     except SolverError as error:
@@ -388,7 +383,7 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
-    """`model_error` and `crowding` of Contact, from contact radii (n,) of the problem [length]."""
+    """`model_error` and `crowding` of `Contact`, from the candidates' contact radii [length]."""
     prescribed = solution.approach + problem.offsets
     touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
     if len(touching) < 2:
@@ -402,7 +397,7 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
 
 
 def covered(scene: Scene, radii: Array) -> int:
-    """The number of open summits under or beside contact discs with these radii (n,) [length]."""
+    """`covered` of `Contact`, from contact radii (n,) [length]."""
     radii = BESIDE * radii
     discs, summits = np.flatnonzero(radii), np.flatnonzero(radii == 0)
     nearest = 0.0 if scene.lattice is None else scene.lattice.spacing
@@ -416,14 +411,14 @@ def covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """(n,) [force] first-order changes of loads if the geometry changes to "closest".
+    """(n,) [force] first-order changes of loads at constant approach, from "summit" to "closest".
 
-    They are 0 if the scene has this geometry already. In this geometry an asperity of tip radius
-    rho at the distance r from the axis touches a sphere of radius R at the distance r R / (R + rho)
-    from the axis. Its offset (`Scene.offsets`) is greater by r^2 rho / (2 R (R + rho)) than in the
-    geometry "summit". The contact points are closer to each other by a fraction of about rho / R,
-    and the compliances between them are greater by this fraction. At the same approach, the changes
-    of loads dP satisfy, with the compliance operator A,
+    They are 0 if the scene has the geometry "closest" already. In this geometry an asperity of tip
+    radius rho at the distance r from the axis touches a sphere of radius R at the distance
+    r R / (R + rho) from the axis. Its offset (`Scene.offsets`) is greater by
+    r^2 rho / (2 R (R + rho)) than in the geometry "summit". The contact points are nearer to each
+    other by a fraction of about rho / R, and the compliances between them are greater by this
+    fraction. With the compliance operator A, the changes of loads dP satisfy
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
@@ -452,9 +447,7 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """(m,) the increase of the displacements A P of the touching asperities for P = `loads`, in
-    scaled units, if each point moves towards the axis by the fraction rho / R of its distance.
-    """
+    """(m,) increase of A P, P = `loads`, if points move towards the axis by a fraction rho / R."""
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

@@ -1,4 +1,4 @@
-"""The errors of the package. Each message says what is wrong and, for input, what is expected."""
+"""The errors of the package. A message says what is wrong and, for input, what is expected."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class InputError(ConvexroughError, ValueError):
         super().__init__(f"{place}{what}: found {found}, expected {expected}")
 
     def located(self, where: str, table: str = "") -> InputError:
-        """The same error, with `where` (a file, for example) in front of the message.
+        """The same error, with `where` (a file, for example) at the beginning of the message.
 
-        table : the name of a table of this file, in brackets in front of the name of the value
+        table : a table of this file; its name in brackets is put before the name of the value
         """
         place = f"{where}: {self.where}" if self.where else where
         what = f"[{table}] {self.what}" if table else self.what
@@ -63,11 +63,11 @@ class InputError(ConvexroughError, ValueError):
 
 @contextmanager
 def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> Iterator[None]:
-    """A context manager: put `where` (a file, a table) in front of InputErrors of the body.
+    """A context manager: put `where` at the beginning of the message of an InputError of the body.
 
-    table : as for `InputError.located`
-    unless_known : True to leave errors unchanged that name a place already. A MistakesError never
-        changes
+    where, table : as for `InputError.located`
+    unless_known : True to leave errors that already name a place unchanged; a MistakesError is
+        always left unchanged
     """
     try:
         yield
@@ -125,7 +125,7 @@ class SolverError(ConvexroughError):
     what    : the reason, with the number that shows it
     solver  : name of the solver
     advice  : what to try, or ""
-    iterate : [force] the latest loads (n,), or shear forces (n,) or (n, 2); None if there are none
+    iterate : [force] the loads (n,), or shear forces (n,) or (n, 2), of the last iteration, or None
 
     >>> print(cr.SolverError("no descent after 3 steps", solver="mine", advice="a smaller load"))
     mine: no descent after 3 steps; a smaller load
@@ -156,7 +156,7 @@ class ProofError(ConvexroughError):
     """
 
 
-#: Packages to install for an extra, if their names differ from that of the extra.
+#: For an extra whose name is not that of its package: the packages to install.
 PACKAGES = {"parquet": "pyarrow", "dask": "'dask[dataframe]' distributed"}
 
 
@@ -184,9 +184,9 @@ def needed(module: str, extra: str = "") -> Any:
 
 
 class WorkerError(ConvexroughError):
-    """Workers of a sweep stopped, or run another version of a package.
+    """Worker processes of a sweep stopped, or have another version of a package.
 
-    Computed rows are kept; `cr.sweep` with `resume=True` computes the rest.
+    Computed rows are kept; `cr.sweep` with `resume=True` computes the other rows.
 
     >>> try:
     ...     table = cr.sweep([scene], load=3e-7, measure=["load"], out=folder / "c", workers=1)

@@ -1,10 +1,10 @@
 """Pressure, traction and displacement at any points of the surface, from contacts and shear states.
 
 Pressure and traction are sums over the contact discs that contain a point; displacements are sums
-over all asperities. Shear is along x. Points are an array (..., 2) [length] with the axis of the
-sphere as origin, and a result is an array (...) with a value for each point. Disc i has the centre
-r_i, the contact radius a_i and the peak pressure p0_i. Points that are not finite, or of another
-shape, raise InputError.
+over all loaded asperities. Shear is along x. `points` is an array (..., 2) [length] with the axis
+of the sphere as origin, and a result is an array (...) with a value for each point. Disc i has the
+centre r_i, the contact radius a_i and the peak pressure p0_i. If points are not finite, or an array
+has another shape, InputError is raised.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.sphere import hertz, surface_shear
 
-#: Number of pairs of a point and an asperity that are evaluated at a time, so that they fit in a
-#: cache.
+#: Number of pairs of a point and an asperity that are evaluated at a time; they fit in a cache.
 BLOCK = 2**14
 
 
 def peak_pressures(contact: Contact) -> Array:
-    """(n,) [force / length^2] p0_i = 2 E* a_i / (pi R_i) with relative radii R_i, 0 where open.
+    """(n,) [force / length^2] peak pressures p0_i = 2 E* a_i / (pi R_i); 0 where open.
+
+    E* is the contact modulus, and R_i is the relative radius of asperity i.
 
     >>> print(f"{cr.fields.peak_pressures(contact).max():.4f} E*")
     0.0214 E*
@@ -59,7 +60,7 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """(...) [length] sum of the normal displacements of both surfaces.
 
     The displacement of each surface is relative to distant points of its body. Each asperity
-    contributes the field of its Hertz pressure (Johnson 1985, 3.42).
+    contributes the displacement under its Hertz pressure (Johnson 1985, equation 3.42).
 
     >>> far = cr.fields.normal_displacement(contact, [1.0, 0.0])
     >>> print(f"{far * np.pi / contact.load:.4f} / E*")  # as of a point force
@@ -73,11 +74,11 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
 
 
 def traction(state: ShearState, points: ArrayLike) -> Array:
-    """(...) [force / length^2] shear traction along x after loading from rest.
+    """(...) [force / length^2] shear traction along x on first loading.
 
-    At the distance r from its centre an asperity contributes f p0 sqrt(1 - r^2/a^2), with the
+    At the distance r from its centre a contact disc contributes f p0 sqrt(1 - r^2/a^2), with the
     coefficient of friction f. Within its stick radius c, f p0 (c/a) sqrt(1 - r^2/c^2) is
-    subtracted. A negative shear force has the opposite traction.
+    subtracted. If the shear force is negative, the traction has the opposite sign.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> q, p = cr.fields.traction(state, [0.0, 0.0]), cr.fields.pressure(contact, [0.0, 0.0])
@@ -96,11 +97,11 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     """(...) [length] sum of the displacements of both surfaces along x.
 
-    The displacement of each surface is relative to distant points of its body. The sum is over the
-    asperities; each contributes the displacement (3.91) of Johnson (1985) for both bodies. Dini and
-    Hills (2009) give it as [A3] and [A4]. Where the surfaces stick, the exact value is the relative
-    displacement of the bodies. This sum only approximates it: in `shear` the compliance between two
-    asperities is a mean over all directions from one to the other.
+    The displacement of each surface is relative to distant points of its body. Each asperity
+    contributes the displacement of Johnson (1985, equation 3.91) for both bodies, which Dini and
+    Hills (2009) give as [A3] and [A4]. Where the surfaces stick, the exact sum is the relative
+    displacement of the bodies. This sum is only near it, because `shear` averages the compliance
+    between two asperities over all directions from one to the other.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> at_centre = cr.fields.shear_displacement(state, [0.0, 0.0])
@@ -124,9 +125,9 @@ def _discs(contact: Contact) -> tuple[Indices, Array, Array]:
 
 
 def _sheared(state: ShearState) -> tuple[Array, Array, Array, Array]:
-    """Centres (n, 2), contact radii, Q_i / (f P_i) and f p0 of the n loaded asperities.
+    """Centres (n, 2), contact radii, Q_i / (f P_i) and f p0_i of the n loaded asperities.
 
-    Q_i / (f P_i) is exactly 1 or -1 where the asperity slides.
+    Q_i / (f P_i) is exactly 1 or -1 if the asperity slides.
     """
     contact = state.contact
     friction = checks.friction(contact.scene.friction)
@@ -189,7 +190,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """(...) sum_i profile(|r - r_i|, i) over the discs that contain the point r."""
+    """(...) sum_i profile(|r - r_i|, i) over the discs that may contain the point r."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
@@ -210,7 +211,7 @@ def _sum_over_discs(
 def _sum_everywhere(
     points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
 ) -> Array:
-    """(...) sum_i field_i(r - r_i); `field` takes x and y (m, n) of points relative to centres."""
+    """(...) sum_i field_i(r - r_i); `field` takes x and y (m, n) of m points from n centres."""
     places = _places(points)
     flat = places.reshape(-1, 2)
     total = np.zeros(len(flat))

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: By name: the names of an array's dimensions, and the array. The first has the rows of a frame.
+#: By name: the dimensions of an array, and the array. Those of the first are the rows of a frame.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
-#: The names of the components of a vector, and of the sides of a point of a path.
+#: For a dimension: the names of the components of a vector, or of the sides of a point of a path.
 NAMED = {"direction": ["x", "y"], "side": ["below", "above"]}
 
 

@@ -1,7 +1,7 @@
 """Press many scenes with equal numbers of asperities at once, and compute a cycle of each.
 
-Scenes with the same positions and tip radii share one matrix. Where possible, the scenes are solved
-and proved together; the others are pressed one by one.
+Scenes with the same positions and tip radii share one compliance matrix. Where possible, scenes are
+solved and proved together; the others are pressed one by one.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Contacts(Table):
 
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
-    controls : (m,) what was prescribed: loads [force] if `by_load` is True, or approaches [length]
+    controls : (m,) the prescribed loads [force] if `by_load` is True, else approaches [length]
     loads, approaches : (m,) total loads [force], and approaches [length]
-    load_errors, approach_errors : (m,) bounds on their errors
+    load_errors, approach_errors : (m,) bounds on the errors of `loads` and `approaches`
     asperity_loads, asperity_load_errors : (m, n) [force] loads, and bounds on their errors
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
     alone    : (j,) indices of the j scenes that were pressed one by one
@@ -74,7 +74,7 @@ class Contacts(Table):
     def __getitem__(self, k: int) -> Contact:
         """The contact of scene k. Raises IndexError if there is none."""
         if not -len(self) <= index(k) < len(self):
-            raise IndexError(f"scene {k} of {len(self):,}: the first is 0")
+            raise IndexError(f"scene {k}: expected an index from 0 to {len(self) - 1:,}")
         k = index(k) % len(self)
         if k not in self._known:
             name, start = "load" if self.by_load else "approach", self.asperity_loads[k]
@@ -87,8 +87,8 @@ class Contacts(Table):
         maximum, minimum : (m,) [force] largest and smallest shear force, or one number for all
             contacts; the default minimum is -maximum
 
-        Raises InputError if a scene has no friction, a minimum exceeds its maximum, or a force
-        exceeds the friction limit in size.
+        Raises InputError if a scene has no friction, if a minimum exceeds its maximum, or if the
+        absolute value of a force exceeds the limiting shear force f P of its contact.
 
         >>> found = cr.press_many([scene, scene], load=3.6e-7).cycles([9e-8, 4e-8])
         >>> print([f"{loss:.4g}" for loss in found.losses], found.order.tolist())
@@ -133,13 +133,13 @@ class Contacts(Table):
 
     @cached_property
     def _together(self) -> list[PressedRows]:
-        """The scenes that were proved together; an unpickled object proves them again."""
+        """The scenes that were proved together; computed again for an unpickled object."""
         return in_rows(self.scenes, self.controls, self.by_load)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cycles(Table):
-    """The steady cycles of m contacts. Arrays are (m,), `status` is (m, n); meanings as in `Cycle`.
+    """The steady cycles of m contacts. Arrays are (m,), `status` is (m, n); `Cycle` explains them.
 
     `cycles[k]` is the `Cycle` of contact k.
 
@@ -180,8 +180,8 @@ def press_many(
 
     approach [length] or load [force] : the prescribed quantity, (m,) or one number for all scenes
 
-    The result is the same as that of `press` for each scene. Raises InputError for scenes with
-    different numbers of asperities, and the errors of `press`.
+    Results agree with those of `press` for each scene to within their error bounds. Raises
+    InputError for scenes with different numbers of asperities, and the errors of `press`.
 
     >>> contacts = cr.press_many([scene, scene], load=[3e-7, 2e-7])
     >>> bool((contacts[1].loads == contacts.asperity_loads[1]).all())

@@ -1,4 +1,4 @@
-"""Measurement of the memory that a computation takes."""
+"""Measurement of the memory that a computation needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measures of the validity of the asperity model for a contact, and warnings if it may fail."""
+"""Measures of the validity of the asperity model for a contact, and warnings about its limits."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from convexrough.tabular.units import UnitNames
 #: Contacts with fewer touching asperities than this cause a warning.
 FEW = 5
 
-#: Least number of asperities that count as a part of a larger array, in general and on a lattice.
+#: Least numbers of asperities that may be a part of a larger array: in general, and on a lattice.
 ARRAY, ON_LATTICE = 20, 7
 
-#: An array with a smaller `array_extent` is cut off. At this extent the smooth pressure is 0.7 of
-#: its peak.
+#: An `array_extent` below this causes a warning. At this fraction of the contact radius of a smooth
+#: sphere, its pressure is 0.7 of the peak.
 CUT_OFF = 0.7
 
-#: At most this part of the asperities at the rim of an array may touch without a warning, because
-#: single tall asperities touch there.
+#: Above this fraction of touching asperities at the rim of an array there is a warning. It is not
+#: 0, because single tall asperities can touch there.
 CUT_RIM = 0.5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
 
-#: Few pairs, such as clean metals in vacuum and soft rubber, have a larger coefficient of friction.
+#: A larger coefficient of friction causes a warning. Clean metals in vacuum have a larger one.
 HIGH_FRICTION = 2.0
 
 #: At this ratio of contact radius to radius of curvature, paraboloid and sphere differ by 1 %.
@@ -49,15 +49,15 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     array_extent : the smaller of max |x| / a and max |y| / b over the asperities. a and b are the
         half widths of a smooth body's contact at this load. None for a flat or a cylinder, at load
         0, and if the asperities are too few for an array (`is_array`)
-    rim_touching : share of the asperities at the rim that touch; the rim consists of the farthest
-        asperity in each of 16 sectors
+    rim_touching : fraction of the asperities at the rim that touch; the rim consists of the
+        farthest asperity in each of 16 sectors
     axis_outside : True for an array whose asperities do not surround the axis of the sphere
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
         None
-    contact_modulus : [force / length^2];  friction : its coefficient or None
+    contact_modulus : [force / length^2];  friction : coefficient of friction or None
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
-    mismatch     : Dundurs' beta of two bodies, which the model neglects
+    mismatch     : Dundurs' beta of the two bodies, whose effect the model neglects
     """
     areas = contact.crowding, contact.covered
     return limits(contact.scene, contact.loads, contact.contact_radii, *areas)
@@ -91,13 +91,13 @@ def limits(
 
 
 def warnings_of(contact: Contact) -> Iterator[str]:
-    """Reasons not to rely on a contact, each a sentence with numbers."""
+    """Reasons to doubt a contact, each a sentence with numbers."""
     yield from doubts_of(contact)
     yield from cautions_of(contact)
 
 
 def doubts_of(contact: Contact) -> Iterator[str]:
-    """The reason why a contact is not certified, if it is not."""
+    """The reason why not every status is proved, if that is so."""
     if contact.certificate.scope == "none":
         yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
@@ -129,8 +129,8 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact extends to {normal['extent']:.3g} of the sphere's radius from the axis: from "
-            f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
+            f"contact extends to {normal['extent']:.3g} of the sphere's radius from the axis; "
+            f"above {STEEP:g} the paraboloid of the model differs from a sphere by more than 1 %"
         )
     if normal["axis_outside"]:
         yield (
@@ -142,18 +142,19 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["rim_touching"] > CUT_RIM:
         yield (
-            f"{normal['rim_touching']:.0%} of the asperities at the rim of the array touch: those "
-            "that are missing beyond the rim could carry load, too; use a larger array"
+            f"{normal['rim_touching']:.0%} of the asperities at the rim of the array touch; "
+            "asperities beyond the rim, which the scene lacks, could carry load too; use a larger "
+            "array"
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius is {normal['steepness']:.3g} of the tip radius: from {STEEP:g} on, "
-            "the paraboloid of the model differs from a sphere by more than 1 %"
+            f"the contact radius is up to {normal['steepness']:.3g} of the tip radius; above "
+            f"{STEEP:g} the paraboloid of the model differs from a sphere by more than 1 %"
         )
     if normal["crowding"] > 1:
         yield (
             f"contact discs overlap (crowding {normal['crowding']:.3g}, above 1): the asperity "
-            "model does not hold; check the units of the modulus, the load and the radii"
+            "model does not apply; check the units of the modulus, the load and the radii"
         )
     if normal["covered"]:
         yield (
@@ -183,7 +184,7 @@ def is_array(scene: Scene) -> bool:
 
 
 def axis_outside(scene: Scene) -> bool:
-    """True for an array of asperities that do not surround the axis of the sphere."""
+    """`axis_outside` as in `limits_of`."""
     if not is_array(scene):
         return False
     low, high = scene.asperities.layout.corners
@@ -192,24 +193,21 @@ def axis_outside(scene: Scene) -> bool:
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """The share of the asperities at the rim that touch; 0 if they are too few for an array."""
+    """`rim_touching` as in `limits_of`; 0 if the asperities are too few for an array."""
     return float(touching[scene.asperities.layout.rim].mean()) if is_array(scene) else 0.0
 
 
 def at_the_rim(extent: float) -> str:
     """A warning for an `array_extent` below `CUT_OFF`."""
     return (
-        f"contact reaches the rim of the array, which ends at {extent:.3g} of the contact radius "
-        "of the smooth sphere: the loads depend on where it ends; check the unit of the sphere's "
-        "radius, or use a larger array"
+        f"contact reaches the rim of the array, which is at {extent:.3g} of the contact radius of "
+        "the smooth sphere: the loads depend on the size of the array; check the unit of the "
+        "sphere's radius, or use a larger array"
     )
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """`array_extent` as in `limits_of`.
-
-    For asperities in a row along x or y it is the ratio for this axis.
-    """
+    """`array_extent` as in `limits_of`; for a row of asperities, the ratio along the row."""
     smooth = smooth_reference(scene, load) if load > 0 and is_array(scene) else None
     if smooth is None:
         return None
@@ -225,8 +223,8 @@ def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
     if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
         limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
         yield (
-            f"contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that it "
-            "is in the units of [units]"
+            f"the contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that "
+            "it is in the units of [units]"
         )
 
 

@@ -1,4 +1,4 @@
-"""The method `plot` of results. It imports the plotting modules when called."""
+"""The method `plot` of results. Only its call imports the plotting modules."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ class Plottable:
     """A result with a method `plot`."""
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the main figure of the result into `axes`, by default new ones; return the axes.
+        """Draw the main figure of the result into `axes` (default: new ones); return the axes.
 
-        `cr.plots.plot` says which figure this is.
+        The docstring of `cr.plots.plot` lists the figures.
 
         >>> print(contact.plot().get_title(loc="left"))
         touching: 37 of 61
@@ -24,7 +24,7 @@ class Plottable:
         return plot(self, axes)
 
     def _picture(self) -> str:
-        """A small map of the result as an HTML image, for which nothing is solved."""
+        """A small map of the result as an HTML image."""
         from convexrough.plots import thumbnail
 
         return thumbnail(self)

@@ -1,4 +1,4 @@
-"""The logger `convexrough`, to which long computations report progress that commands show."""
+"""The logger `convexrough`, to which long computations report their progress."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LOGGER = logging.getLogger("convexrough")
 
 
 def log_step(solver: str, step: int, objective: float, residual: float) -> None:
-    """Log a step of an iteration at level DEBUG, with the four values in `args` of the record."""
+    """Log a step of an iteration at level DEBUG; `args` of the record has the four values."""
     LOGGER.debug(
         "%(solver)s: step %(step)d, objective %(objective).12g, residual %(residual).1e",
         {"solver": solver, "step": step, "objective": objective, "residual": residual},
@@ -40,7 +40,7 @@ def logged(
 
 @contextmanager
 def logged_steps() -> Iterator[list[Mapping[str, Any]]]:
-    """A list of the steps that solvers log in the body: solver, step, objective and residual."""
+    """A context manager that yields a list, to which each logged step of the body is appended."""
     steps: list[Mapping[str, Any]] = []
 
     def keep(record: logging.LogRecord) -> None:

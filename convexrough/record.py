@@ -1,4 +1,4 @@
-"""Base classes of results. Results print a short summary, convert to tables, and can be pickled."""
+"""Base classes of results, which print a summary, convert to tables, and can be pickled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: Dimension names, and the attributes whose arrays have these dimensions.
+#: For names of dimensions: the attributes whose arrays have these dimensions.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
 
 #: Names that `singular` leaves in the plural: counts and times.
@@ -26,7 +26,7 @@ FEW, LINE = 4, 76
 
 
 class Record:
-    """Base class of results. `repr` has a line for each field that is not empty."""
+    """Base class of results. `repr` gives a line for each field that is not empty."""
 
     #: Names of properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -73,7 +73,7 @@ class Record:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the result, each a sentence: those of its `contact`, if it has one."""
+        """Reasons to doubt the result, as sentences: the warnings of its `contact`, if any."""
         return getattr(getattr(self, "contact", None), "warnings", ())
 
     def _headline(self) -> str:
@@ -88,8 +88,7 @@ class Record:
 class Table(Record):
     """A result with arrays that have an entry for each asperity, step or point.
 
-    Columns of data frames and files are named in the singular: `load` for `loads`. `contact` is a
-    result of `press` here:
+    Columns of data frames and files are named in the singular: `load` for `loads`.
 
     >>> list(contact.columns("loads", "gaps"))
     ['load', 'gap']
@@ -97,20 +96,20 @@ class Table(Record):
     (np.int64(37), ('asperity',))
     """
 
-    #: Rows of a data frame belong to the dimension of the first key.
+    #: A data frame has the arrays of the first key.
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays with these names, or those of all columns, by their names in the singular."""
+        """The arrays with these names, or all columns, by their names in the singular."""
         wanted = names or next(iter(self._along.values()))
         return {singular(name): getattr(self, name) for name in wanted}
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas data frame with a row for each asperity, step, point or solver.
 
-        Columns are named in the singular; components of vectors end in _x and _y. Fields that are
-        one number or text are in `attrs`. Two-dimensional arrays that are not vectors, such as the
-        forces of asperities at each step of a history, are only in `to_xarray`.
+        Columns are named in the singular; names of components of vectors end in _x and _y. Fields
+        that are one number or text are in `attrs`. Other two-dimensional arrays, such as the forces
+        of asperities at each step of a history, are only in `to_xarray`.
 
         Raises ExtraError if pandas is not installed.
         """
@@ -133,7 +132,7 @@ class Table(Record):
         arrays = {}
         for along, names in self._along.items():
             for name in names:
-                if getattr(self, name) is None:  # as forces, of which only some gradients have any
+                if getattr(self, name) is None:  # for example the forces of some gradients
                     continue
                 one = singular(name)
                 column = f"asperity_{one}" if one != name and one in taken else one
@@ -148,7 +147,7 @@ class Table(Record):
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """For each row, a mapping from the names of the columns to its values, as Python objects."""
+    """For each row, its values as Python objects, by the names of the columns."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
 

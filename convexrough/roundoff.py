@@ -3,12 +3,11 @@
 #: Unit roundoff of float64.
 ROUNDOFF = 2.0**-53
 
-#: Allowance in a bound for the relative rounding error of a few float64 operations. It is far
-#: larger than this error.
+#: A bound is enlarged by this fraction, far more than the rounding errors of a few operations.
 SAFETY = 1e-12
 
-#: Number of roundoffs allowed for computing k P^(2/3) in float64 and adding it to A P and D.
+#: Bound, in roundoffs, on the rounding error of k P^(2/3) in float64 and of its sum with A P and D.
 SUM_ROUNDOFFS = 16
 
-#: A shear force within this number of roundoffs of f P counts as f P: gross sliding.
+#: A shear force that differs from f P by at most this number of roundoffs counts as gross sliding.
 AT_THE_END = 16

@@ -1,7 +1,7 @@
 """Scenes with equal numbers of asperities, pressed and cycled together as rows of arrays.
 
-Scenes that differ only in heights and friction are a family, which shares one matrix. Scenes that
-are not proved in this way are left out.
+Scenes that differ only in heights and friction are a *family*, which shares one compliance matrix.
+Scenes whose solutions are not proved in this way are left out.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_error
 
 
 class PressedRows(NamedTuple):
-    """Scenes that were proved together: a stack of m rows.
+    """m scenes whose solutions were proved together, in a stack of m rows.
 
     places  : (m,) indices of the scenes;  problem : a problem that has the units of the stack
     stack, box : the problems, and the boxes of loads in which their solutions were proved
@@ -71,7 +71,7 @@ class PressedRows(NamedTuple):
     ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
         """A mask (m,) of the proved cycles, and the fields of `Cycles` for these rows, by name.
 
-        upper, lower : (m,) [force] ends of the cycles;  friction : (m,) coefficients
+        upper, lower : (m,) [force] largest and smallest shear forces;  friction : (m,) coefficients
         """
         problem, high, units = self.problem, self.high, self.problem.units
         f, nu = Ball.exact(friction), Ball.exact(problem.scene.material.poisson_ratio)
@@ -101,7 +101,7 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """The scenes that can be pressed and proved together, in stacks.
+    """Stacks of the scenes that can be pressed and proved together.
 
     controls : (m,) loads [force] if `by_load` is True, else approaches [length]
     """

@@ -1,8 +1,8 @@
 """Assertions for the tests of other software: forces are certified, or two results agree.
 
-Each function raises AssertionError with the asperities concerned, their errors and statuses, and
-InputError for values that are not finite, for negative loads, and for a wrong number of values. No
-function needs a test framework.
+An AssertionError names the asperities for which the assertion fails, with their errors and
+statuses. Each function raises InputError for values that are not finite, for negative loads, and
+for a wrong number of values. No function needs a test framework.
 """
 
 from __future__ import annotations
@@ -39,16 +39,14 @@ def assert_certified(
 ) -> Certificate:
     """The certificate of loads, after a check that they are right.
 
-    The check is passed if it is proved that exactly the asperities with a load touch, and that all
-    errors are within the limit.
+    The check is passed if it is proved that exactly the asperities with a load touch, and that no
+    error exceeds `within`; otherwise AssertionError is raised.
 
     loads  : (n,) [force] from any source, in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed for a load, as a fraction of the largest load, and for a
-        prescribed total, as a fraction of this total
-    floor  : [force] a load up to this size counts as 0, that is, its asperity is claimed to be open
-
-    Raises AssertionError with the asperities concerned.
+    within : largest error allowed: of a load, as a fraction of the largest load; of the sum, as a
+        fraction of a prescribed total
+    floor  : [force] a load up to this size counts as 0: its asperity is claimed to be open
 
     >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
     'global'
@@ -71,17 +69,15 @@ def assert_shear_certified(
 ) -> ShearCertificate:
     """The certificate of shear forces, after a check that they are right.
 
-    The check is passed if it is proved that exactly the claimed asperities slide, and that all
-    errors are within the limit.
+    The check is passed if it is proved that exactly the claimed asperities slide, and that no error
+    exceeds `within`; otherwise AssertionError is raised.
 
     forces  : (n,) [force] shear force of each asperity on first loading, from any source
     force   : [force] the prescribed sum of the shear forces
-    within  : largest error allowed for a force, as a fraction of the largest force, and for the
-        sum, as a fraction of the prescribed sum
-    sliding : (n,) True where sliding is claimed; default: where the force is the coefficient of
-        friction times the load, within a fraction 1e-4
-
-    Raises AssertionError with the asperities concerned.
+    within  : largest error allowed: of a force, as a fraction of the largest force; of the sum, as
+        a fraction of the prescribed sum
+    sliding : (n,) True where sliding is claimed; default: where |force| is at least (1 - 1e-4) f
+        P_i, with the coefficient of friction f and the load P_i
 
     >>> state = cr.shear(contact, force=9e-8)
     >>> proof = cr.testing.assert_shear_certified(contact, state.forces, force=9e-8, within=1e-9)
@@ -103,7 +99,7 @@ def assert_agree(
     load: float | None = None,
     within: float = WITHIN,
 ) -> None:
-    """Check that two results of one problem are certified and agree.
+    """Check that two results of one problem have certificates (scope not "none") and agree.
 
     They agree if no loads differ by more than `within`, and if they do not contradict each other.
 
@@ -112,9 +108,8 @@ def assert_agree(
     within : largest difference of two loads of one asperity, as a fraction of the largest load
 
     Two results contradict each other if proved statuses differ, or if values differ by more than
-    the sum of their error bounds (`compare.contradictions`). Raises AssertionError with the
-    asperities concerned; InputError if the numbers of asperities differ, or the prescribed
-    quantities of two contacts.
+    the sum of their error bounds (`compare.contradictions`). Raises AssertionError if the check
+    fails, and InputError if two contacts have different prescribed quantities.
 
     >>> other = cr.press(scene, approach=5e-5, solver="conic")
     >>> cr.testing.assert_agree(contact, other, within=1e-9)
@@ -155,7 +150,7 @@ def assert_agree(
 
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
-    """The result of a function; the traceback of an InputError shows no frames of the package."""
+    """question(...); the traceback of an InputError shows no frames of the package."""
     __tracebackhide__ = True
     try:
         return question(*arguments, **options)
@@ -182,9 +177,9 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
     __tracebackhide__ = True
     if certificate.scope == "none":
         raise AssertionError(
-            f"nothing is proved of the loads{whose}: they are too far from a solution, or the "
-            f"asperities are too dense (convexity number {certificate.convexity_number:.3g}; the "
-            "energy is convex below 1)"
+            f"nothing is proved about the loads{whose}: they are too far from a solution, or the "
+            f"contacts are too crowded (convexity number {certificate.convexity_number:.3g}; the "
+            "energy is proved convex below 1)"
         )
 
 

@@ -1,4 +1,4 @@
-"""Work on parts of large arrays in several threads, where numpy and Fourier transforms allow it."""
+"""Work on parts of large arrays in several threads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
-#: Work on at most this many numbers takes less time than starting threads.
+#: Up to this many numbers, the work takes less time than starting threads.
 MANY = 2**18
 
 
@@ -29,8 +29,8 @@ def worthwhile(numbers: int) -> int:
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
     """Call work(part) for each part, in any order; no call may write what another call reads.
 
-    The calling thread works, too. When `each` returns, all other threads have ended, so the process
-    may be forked. If calls raise errors, `each` raises one of these errors.
+    The calling thread is one of the threads. When `each` returns, all others have ended, so the
+    process may be forked. If calls raise errors, `each` raises one of these errors.
     """
     todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
 
@@ -63,10 +63,10 @@ _inside: list[Any] = []
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """A context in which linear algebra uses one thread.
+    """A context manager: linear algebra in the body uses one thread.
 
     Several threads would round sums differently and slow down the threads of `each`. The former
-    number of threads is restored when the last thread leaves the context.
+    number of threads is restored when the last thread leaves the body.
     """
     with _lock:
         if not _inside:
@@ -90,7 +90,7 @@ def one_thread() -> Iterator[None]:
 
 
 def _free() -> None:
-    """Let this thread set limits, because threadpoolctl 3.8 lets only the first thread set them."""
+    """Let this thread set limits; threadpoolctl 3.8 accepts them only from the first thread."""
     from threadpoolctl import OpenBLASController
 
     if hasattr(OpenBLASController, "clear_controlling_thread"):
@@ -98,8 +98,5 @@ def _free() -> None:
 
 
 def one_where(numbers: int) -> AbstractContextManager[object]:
-    """The context `one_thread` if arrays of this many numbers use several threads.
-
-    For other arrays, a context without effect.
-    """
+    """`one_thread()` if arrays of this many numbers use several threads, else no effect."""
     return one_thread() if worthwhile(numbers) > 1 else nullcontext()

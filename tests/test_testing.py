@@ -90,10 +90,10 @@ def test_nothing_to_prove() -> None:
     dense, load = twins()
     loads = cr.press(dense, load=load).loads
     message = failure(assert_certified, dense, loads, load=load)
-    assert message.startswith("nothing is proved of the loads: ")
+    assert message.startswith("nothing is proved about the loads: ")
     assert "convexity number" in message
     found = failure(assert_agree, loads, loads, scene=dense, load=load)
-    assert found.startswith("nothing is proved of the loads of first: ")
+    assert found.startswith("nothing is proved about the loads of first: ")
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])

@@ -201,9 +201,9 @@ def check(proof: Path) -> int:
     """Check the claims of a proof file, in exact arithmetic.
 
     PROOF is a file that `run --proof` or `verify --proof` wrote. It claims bounds on loads and
-    losses, and statuses of asperities. Exit status: 0 if all claims are proved; 1 if the proof is
-    refused, with the reason; 2 if the file is unreadable. The checker is one file of the package,
-    checker.py, which needs only Python: python checker.py PROOF does the same.
+    losses, and statuses of asperities. Exit status: 0 if all claims are proved; 1 if a claim is not
+    proved, and the reason is printed; 2 if the file is unreadable. `python checker.py PROOF` does
+    the same; the file checker.py of this package needs only Python.
     """
     from convexrough import checker
 

@@ -26,7 +26,8 @@ from convexrough.errors import FileError, blamed_on
 @solver_option
 @click.option("--within", metavar="PART", type=click.FloatRange(0, min_open=True), default=1e-3,
               show_default=True,
-              help="Largest difference allowed, as a fraction of the largest load.")  # fmt: skip
+              help="Largest difference allowed between a load and that of Newton's method, as a "
+              "fraction of the largest load.")  # fmt: skip
 @click.option("--log", metavar="FILE", type=PATH,
               help="Write the iterations of Newton's method and Clarabel to a CSV file."
               )  # fmt: skip
@@ -36,14 +37,14 @@ def compare(
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
-    SCS and QOCO take part if they are installed; like Clarabel, they solve a cone program. With
-    --solver, only the named solvers are compared with Newton's method.
+    All solvers of the package are compared with Newton's method, and so are SCS and QOCO, which
+    solve a cone program, if they are installed. With --solver, only the named solvers are compared.
 
     Exit status, by the first case that applies: 2 if the input is wrong; 3 if a certified result
     contradicts another result that is proved to be the only solution; 4 if a solver failed; 3 if no
-    result is certified, if a load differs from Newton's by more than --within, or if a solver does
-    not accept the scene; else 0. A contradiction would reveal a mistake in the mathematics or the
-    code.
+    result is certified, if a load differs from that of Newton's method by more than --within, or if
+    a solver does not accept the scene; else 0. A contradiction shows a mistake in the mathematics
+    or the code of this package.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -67,18 +67,18 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.argument("loads", type=PATH)
 @click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
               help="Largest error allowed: of a load or shear force, as a fraction of the largest "
-              "one; of a prescribed total, as a fraction of this total.")  # fmt: skip
+              "one; of a sum with a prescribed total, as a fraction of the total.")  # fmt: skip
 @click.option("--floor", metavar="X", type=float, default=0.0,
-              help="Treat loads up to X as zero: their asperities are claimed to be open."
+              help="Treat loads from -X to X as zero: their asperities are claimed to be open."
               )  # fmt: skip
 @click.option("--tolerance", metavar="X", type=float,
-              help="Largest distance of a position from its asperity; default 1 % of the smallest "
-              "spacing.")  # fmt: skip
+              help="Largest distance of a position in the file from its asperity; default 1 % of "
+              "the smallest distance of two asperities.")  # fmt: skip
 @click.option("--column", metavar="NAME=COLUMN", multiple=True,
               help="Read NAME (load, x, index, ...) from this column: a header, or a number from 1."
               )  # fmt: skip
 @click.option("--scale", metavar="NAME=FACTOR", multiple=True,
-              help="Multiply the numbers of a column by FACTOR.")  # fmt: skip
+              help="Multiply the numbers of the column NAME by FACTOR.")  # fmt: skip
 @click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
               help="Use -1 if compression is negative in the file.")  # fmt: skip
 @click.option("--missing-open", is_flag=True,
@@ -86,9 +86,10 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.option("--nodes", is_flag=True,
               help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
 @click.option("--shear", metavar="FORCES", type=PATH,
-              help="Also check the shear forces in this file.")  # fmt: skip
+              help="Also check the shear forces in this file, under a shear force that has grown "
+              "from 0 to Q.")  # fmt: skip
 @click.option("--shear-force", metavar="Q", type=float,
-              help="Prescribed total of the forces in FORCES.")  # fmt: skip
+              help="Prescribed sum of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
 @click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML.")
 @output_options("proof", "out", "force", "as_json")
@@ -115,10 +116,10 @@ def verify(
     the command writes a table, a figure and verdict.json.
 
     Exit status: 0 if it is proved that exactly the claimed asperities touch (with --shear also that
-    exactly the claimed ones slide), and that no error exceeds the limit set with --within; 2 if the
-    input is wrong; 3 if a claim is wrong or not proved, if an error exceeds this limit, or if
-    --proof finds no proof; 4 if the shear problem could not be solved. With --explain nothing is
-    checked, and the status is 0 if the files can be read.
+    exactly the claimed ones slide), and that no error exceeds --within; 2 if the input is wrong; 3
+    if a claim is wrong or not proved, if an error may exceed --within, or if --proof finds no
+    proof; 4 if the shear problem could not be solved. With --explain nothing is checked, and the
+    exit status is 0 if the files can be read.
     """
     import numpy as np
 

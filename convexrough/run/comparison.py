@@ -57,17 +57,19 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
     """The printed report of a comparison, in aligned lines."""
     rows = [_cells(row) for row in summary["compare"]]
     first = summary["compare"][0]
-    lines, work = [], unit_of("duality_gap", units)
+    lines, work, reference = [], unit_of("duality_gap", units), first["solver"]
     if first["outcome"] == "answered":
         counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
         lines.append(f"asperities         {counts}")
     lines += [
-        f"disagreement       largest difference from the loads of {first['solver']} / largest load",
-        "load error         bound on the error of every load / largest load of the solver",
-        f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
-        "statuses           those proved from the solver's loads; a contact differs if only one of",
-        f"                   the two solvers gives it more than {CARRIES:g} of the largest load",
-        "MB                 increase of the memory of the process during the solution",
+        f"disagreement       largest difference from the loads of {reference} / largest load",
+        "load error         largest bound on the error of a load / largest load of the solver",
+        f"duality gap        {f'in {work}, ' if work else ''}bound on the energy of the loads minus"
+        " that of the solution",
+        f"statuses           those proved from the solver's loads, compared with {reference};",
+        f"                   a contact differs if one solver gives it more than {CARRIES:g} of the",
+        f"                   largest load, and the other solver less than {CARRIES / 10:g}",
+        "MB                 largest increase of the memory of the process during the solution",
         "",
         *aligned([HEADING, *rows], left=1),
     ]
@@ -102,13 +104,14 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
     for row in rows:
         if count := row["different_contacts"]:
             yield (
-                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: only "
-                f"one of the two solvers gives them more than {CARRIES:g} of the largest load"
+                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: one "
+                f"solver gives them more than {CARRIES:g} of the largest load, the other less than "
+                f"{CARRIES / 10:g}"
             )
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
-        yield "not certified: no answer has a proved status for every asperity"
+        yield "not certified: no solver's loads prove the status of every asperity"
 
 
 def _two(value: float) -> str:

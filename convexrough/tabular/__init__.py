@@ -1,1 +1,1 @@
-"""Files of numbers and names of units in common forms: text, arrays and workbooks."""
+"""Tables of numbers read from text, workbooks and files of arrays; names of units."""

@@ -18,20 +18,20 @@ from convexrough.errors import ConvexroughError, FileError
 
 Columns = dict[str, list[Any]]
 
-#: Names of arrays beside the columns that can change what the numbers in the columns mean.
+#: Names of arrays that may hold factors or offsets of the columns in the same file.
 FACTORS = re.compile(r"(?<![a-z])(scales?|factors?|multipliers?|gain|offsets?)(?![a-z])", re.I)
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: Errors, besides OSError, from a file that is corrupted or not in the format of its extension.
-#: `foreign` converts errors of other packages to ValueError.
+#: Errors, besides OSError, raised for a file that is corrupted or not in the format of its
+#: extension. `foreign` converts errors of other packages to ValueError.
 SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn every error that keeps a file from being read into a FileError."""
+    """A context manager: turn errors of the body, in which a file is read, into FileErrors."""
     try:
         yield
     except ConvexroughError:
@@ -49,10 +49,10 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """Turn any error that another package raises on a corrupted file into a ValueError.
+    """A context manager: turn errors of the body, except OSError, into ValueErrors.
 
-    numpy, scipy, pyarrow and openpyxl raise errors of many kinds that they do not document. The
-    body of the `with` statement should only call readers.
+    For corrupted files numpy, scipy, pyarrow and openpyxl raise errors of many undocumented kinds.
+    The body should only call readers of these packages.
     """
     try:
         yield
@@ -63,7 +63,7 @@ def foreign() -> Iterator[None]:
 
 
 def needed(path: Path, package: str) -> Any:
-    """The imported `package`, which reads such files. Raises FileError if it is not installed."""
+    """The imported `package`, which reads the file. Raises FileError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -91,7 +91,7 @@ def named_arrays(path: Path) -> dict[str, Any]:
 
 
 def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[str, str]]]:
-    """Columns of a file by name, and the places and texts of arrays that state units.
+    """Columns of a file by name; and for each array that may state units, its place and text.
 
     Columns without names are numbered from "1".
 
@@ -99,8 +99,8 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[s
         If no column has one of these names, all columns are read
 
     Raises FileError if the package for such files is missing, if no columns are found, or if the
-    file has a factor or an offset besides; OSError; and
-    ValueError, or another error of corrupted files, if the file is corrupted or lengths differ.
+    file also has a factor other than 1 or an offset other than 0. Raises OSError; and ValueError,
+    EOFError or zlib.error if the file is corrupted or lengths differ.
     """
     named = named_arrays(path) or {"": np.zeros(0)}
     first, values = next(iter(named.items()))
@@ -140,7 +140,7 @@ def _parts(value: Any) -> list[Any]:
 
 
 def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
-    """True if the only array of a file holds columns, such as x, y and load, not one quantity."""
+    """True if the only array of a file holds several columns (x, y, load), not one quantity."""
     if not name or name.startswith("arr_"):
         return True
     is_matrix = isinstance(values, np.ndarray) and values.ndim > 1 and min(values.shape) > 1
@@ -148,7 +148,7 @@ def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
 
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
-    """All vectors or, if the `known` arrays have one shape of two dimensions, all of that shape."""
+    """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
@@ -169,7 +169,7 @@ def _table(values: NDArray[Any]) -> Columns:
 
 
 def _matlab(path: Path) -> dict[str, Any]:
-    """The variables of a file or, if its only variable is a structure, the fields of this."""
+    """The variables of a file or, if its only variable is a structure, the structure's fields."""
     from scipy.io import loadmat  # takes 0.1 s to import
 
     with path.open("rb") as raw:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-#: A table: a row of headings, and rows with the same number of cells.
+#: A table: a row of headings, then rows with the same number of cells.
 PrintedTable = Sequence[Sequence[Any]]
 
 
@@ -16,12 +16,12 @@ def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
 
 
 def aligned(table: PrintedTable, *, left: int = 0, digits: int = 6) -> list[str]:
-    """The lines of a table; the first `left` columns are aligned to the left, others right."""
+    """The lines of a table; the first `left` columns are aligned left, the others right."""
     return ["  ".join(row).rstrip() for row in _padded(table, left, digits)]
 
 
 def markdown(table: PrintedTable, *, left: int) -> list[str]:
-    """The lines of a table in Markdown; the first `left` columns are aligned to the left."""
+    """The lines of a table in Markdown, aligned as by `aligned`."""
     rows = _padded(table, left, digits=6)
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
     rule = [each if column < left else f"{each[:-1]}:" for column, each in enumerate(rule)]
@@ -29,7 +29,7 @@ def markdown(table: PrintedTable, *, left: int) -> list[str]:
 
 
 def bound(value: float) -> str:
-    """A bound as text, never smaller than the value, with two digits; "unknown" if infinite."""
+    """An upper bound as text: two digits, rounded up; "unknown" if it is infinite."""
     return f"{float(f'{1.05 * value:.2g}'):g}" if math.isfinite(value) else "unknown"
 
 

@@ -1,4 +1,4 @@
-"""Columns of tables: known names, what they measure, their units, and messages on these."""
+"""Columns of tables: known names, their quantities and units, and messages on wrong ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from convexrough.tabular.units import NAMELESS, Unit, UnitNames, bare, in_text, 
 
 
 class Column(NamedTuple):
-    """A known column: the quantity that it measures, "" for text, and its other names."""
+    """A known column: its quantity, "" for text; other names; True if numbers must be positive."""
 
     kind: str = "length"
     also: tuple[str, ...] = ()
@@ -51,7 +51,7 @@ MOST_SHOWN = 60
 #: Similarity above which the name of an unread column may be a misspelling of a missing one.
 LOOKS_LIKE = 0.75
 
-#: Relative difference up to which two factors count as equal.
+#: Largest relative difference of two factors that count as equal.
 SAME = 1e-9
 
 
@@ -59,12 +59,12 @@ SAME = 1e-9
 class Reading:
     """How columns of a file are read.
 
-    columns : names in the file, by known name;  scales : factors of the numbers
-    units   : units of the scene;  convert : convert columns in other units, else refuse them
-    scalable : messages may propose the options --scale and --column
+    columns : names in the file, by known name;  scales : factors of the numbers, by known name
+    units   : units of the scene;  convert : True to convert columns in other units, False to refuse
+    scalable : True if messages may propose the options --scale and --column
     shared  : columns that are also read from another file; no message proposes --scale for them,
         because the option would apply to both files
-    alike   : columns of one quantity must have one unit, even if the scene names none
+    alike   : True if columns of one quantity must have one unit, even if the scene names none
     """
 
     columns: Mapping[str, str] = field(default_factory=dict, hash=False)
@@ -80,7 +80,7 @@ AS_IT_IS = Reading()
 
 
 def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """The header of each known column that `given` names.
+    """The header of each known column in `given`, by known name.
 
     An entry of `given` is a known name and a header, in either order.
     """
@@ -97,9 +97,9 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
 def places_of(
     wanted: Sequence[str], names: Sequence[str], how: Reading, found: str
 ) -> tuple[dict[str, int], list[str]]:
-    """The number of the column of each wanted name that the file has, from 0; and mistakes.
+    """The place of each wanted column that the file has, from 0, by its name; and mistakes.
 
-    names : the headers of the file;  found : what messages say about them
+    names : the headers of the file;  found : these headers as text for messages
     """
     bared = [bare(name) for name in names]
     lowered = [each.lower() for each in bared]
@@ -130,7 +130,7 @@ def places_of(
 
 
 def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
-    """Mistakes: columns that are not read, with names similar to one that is missing."""
+    """A mistake for each unread column whose name is similar to that of a missing one."""
     from difflib import SequenceMatcher  # only when a column is missing
 
     for name, each in product(unread, missing):
@@ -142,7 +142,7 @@ def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
 def factors_of(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
-    """The factors of the columns, by name, and mistakes in their units."""
+    """The factors of the columns, by name; and mistakes in their units."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
     first: dict[str, tuple[str, Unit]] = {}  # of each quantity, the first column with a unit
     for name in (name for name in names if name in units):
@@ -184,10 +184,10 @@ def factors_of(
 
 
 def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each text of `said` that names another unit than the scene's.
+    """A mistake for each text that names another unit than the scene's.
 
-    said  : pairs of the place in the file and the text
-    names : columns that have no unit in the header, so that the text may be about them
+    said  : for each text its place in the file, and the text
+    names : columns without a unit in the header, whose unit the text may state
     """
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:

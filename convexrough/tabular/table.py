@@ -39,8 +39,8 @@ TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "
 #: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
-#: If at least this many cells are such as 1.013, whole numbers below 100 beside them also show that
-#: the mark separates thousands.
+#: If at least this many cells have the form of 1.013, whole numbers below 100 in the same column
+#: are enough to show that the mark separates thousands.
 SURELY_GROUPED = 10
 
 _WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
@@ -54,10 +54,9 @@ class ReadTable(NamedTuple):
         .npz, .mat, .parquet)
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the columns that were not read. The key is the header, which may be empty, or the
-        number of the column (from 1) if there is no header. If `Reading.columns` names a column as
-        index, this column is included here, with the key "index". A column is text if one of its
-        cells is not a number
+    others  : the columns that were not read, by header, which may be empty, or by number from 1 if
+        there is no header. The column that `Reading.columns` names as index has the key "index". A
+        column is text if one of its cells is not a number
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -71,15 +70,15 @@ class ReadTable(NamedTuple):
     factors: dict[str, float]
 
     def mistake(self, row: int, what: str) -> str:
-        """The message of a mistake in a row, with the line."""
+        """The message of a mistake in a row: name of the row, `what`, text of the line."""
         return _shown(f"{self.rows[row]}{what}", self.lines[row])
 
 
 class _Source(NamedTuple):
     """Cells of a file by column. Without a header, columns are named by numbers from 1.
 
-    lines : text of each row, "" in files of arrays;  mistakes : messages on rows that are left out
-    said  : places and texts, besides the header, that may name units
+    rows, lines : as in `ReadTable`;  mistakes : messages on rows that are left out
+    said  : for each text besides the header that may name units, its place and the text
     """
 
     header: list[str] | None
@@ -105,14 +104,14 @@ def read_table(
 ) -> ReadTable:
     """Columns of a file by known names. The numbers of other columns are not checked.
 
-    required, optional : names of columns, all of them in `COLUMNS`
-    instead : columns that are read in place of the only required one, if the file lacks that one
-        but has the first of these
+    required, optional : names of columns in `COLUMNS`
+    instead : columns that replace the only required one, if the file lacks the required one but has
+        the first of these
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
-    line : a file that is one line without a header is read as one column if it has exactly this
-        number of cells, or more than 3 (only with `unnamed`, and if `how` names no columns)
-    table : the cells of the file, if they are read already
+    line : number of cells of one line without a header that is read as one column; a line of more
+        than 3 cells always is (only with `unnamed`, and if `how` names no columns)
+    table : the cells of the file, if they are already read
 
     Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
@@ -202,10 +201,11 @@ def matrix(path: Path, table: TextTable) -> Array:
 
 
 def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[str]:
-    """A mistake if cells such as 1.013 beside 827 seem to have thousands separators.
+    """A mistake if cells such as 1.013 seem to have thousands separators, as beside 827.
 
-    They seem to if every cell is such a cell or a whole number, and if at least one whole number
-    has three digits or `SURELY_GROUPED` cells are of this form. But 999 often marks a hole.
+    This is so if all other cells are whole numbers of at most three digits, and one of them has
+    three digits (not 999, which often marks a hole). If at least `SURELY_GROUPED` cells have the
+    form of 1.013, one whole number with fewer digits is enough.
     """
     mark = source.style.decimal
     if not mark or not any(mark in "\n".join(cells) for cells in columns):
@@ -268,7 +268,7 @@ def _text_source(table: TextTable) -> _Source:
 
 
 def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
-    """The reason why cells are not a row of the table; "" if they are one."""
+    """The reason why the cells are not a row of the table; "" if they are one."""
     if len(cells) != width:
         expected = f"{width}, as in {'the header' if header else 'most rows'}"
         return f"found {len(cells)} cells, expected {expected}"
@@ -293,7 +293,7 @@ def _named(source: _Source) -> str:
 
 
 def in_sheet(style: str) -> str:
-    """The end of a message: the sheet that was read, and others that fit; "" for other files."""
+    """The end of a message: the sheet that was read, and others that fit; "" if no workbook."""
     return f" in {style}" if style.startswith("sheet ") else ""
 
 
@@ -338,7 +338,7 @@ def _shown(mistake: str, line: str) -> str:
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:
-    """The first mistakes, and the number of the others."""
+    """The first `most` mistakes, and the number of the others."""
     if (more := len(mistakes) - most) > 0:
         return [*mistakes[:most], f"and {more:,} more mistakes"]
     return mistakes

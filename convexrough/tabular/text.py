@@ -1,8 +1,8 @@
 """Tables in text files, with any separator, decimal commas, comments, titles and encodings.
 
-Some common readers (csv.Sniffer, numpy.loadtxt) support no decimal commas and no D exponents;
-others (pandas, polars) stop at the first mistake without showing the line. So this module chooses
-the separator and the decimal mark, and the standard library splits lines.
+csv.Sniffer and numpy.loadtxt support no decimal commas and no D exponents; pandas and polars stop
+at the first mistake without showing the line. So this module chooses the separator and the decimal
+mark itself.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ LONGEST_NUMBER = 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: The separator and the decimal mark are chosen from at most SAMPLE first lines and LATER others
-#: that contain a mark.
+#: The separator and the decimal mark are chosen by means of the first SAMPLE lines, and of at most
+#: LATER other lines that contain a comma or a point.
 SAMPLE, LATER = 200, 20
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
-#: The sign # that starts a comment, but not the # in #N/A or -1.#IND.
+#: The sign # that starts a comment, but not the # in #N/A.
 _SIGN = r"#(?![A-Z]+[/!?])"
 
 #: The beginning of a line that is a comment, and of a comment that follows cells on a line.
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
-#: `_GROUPED`: a number whose digits are certainly in groups of three, as 1,234,567.
-#: `PERHAPS_GROUPED`: one such as 3,134, in which the mark can also precede three decimals.
+#: `_GROUPED`: a number whose digits are certainly in groups of three, such as 1,234,567.
+#: `PERHAPS_GROUPED`: a number such as 3,134, whose mark can also precede three decimals.
 _GROUPED = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
@@ -77,8 +77,8 @@ _BINARY = {
 class Style(NamedTuple):
     """The separator of cells, the decimal mark and, for a workbook, the name of the sheet.
 
-    In a column alone the separator is "". In a file of arrays the decimal mark is "", too: cells
-    are numbers.
+    The separator of a single column is "". For a file of arrays, whose cells are numbers, the
+    decimal mark is "" too.
     """
 
     separator: str
@@ -106,7 +106,7 @@ class Style(NamedTuple):
         return [cell.strip() for cell in next(reader, [])]
 
     def number(self, cell: Any) -> float | None:
-        """The number in a cell, with E or Fortran's D exponent; None if it is not a number."""
+        """The number in a cell, perhaps with E or Fortran's D exponent; None if it is none."""
         if not self.decimal:
             is_number = isinstance(cell, (int, float)) and not isinstance(cell, bool)
             return float(cell) if is_number else None
@@ -121,7 +121,7 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[Any]) -> Array | None:
-        """The numbers in cells; None if any cell is not a number. Plain numbers are read faster."""
+        """The numbers in cells; None if any cell is not a number."""
         if not self.decimal:
             return (
                 np.array(cells, dtype=np.float64) if {*map(type, cells)} <= {int, float} else None
@@ -147,7 +147,7 @@ class TextRow(NamedTuple):
     wrong: str = ""
 
 
-#: Names of columns with the rows and columns of a matrix, which are no coordinates.
+#: Headers of columns with the row and column numbers of a matrix.
 PLACES = ("row", "col", "column", "i", "j", "zeile", "spalte")
 
 
@@ -171,10 +171,9 @@ def read_text_table(
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
     known : names of columns, in lower case; the line with most of them is the header
-    required : names of columns; of a workbook, the sheet with most of them is read. Among equal
-        sheets it is the first that has a column of `known`, or else the first
-    is_map : True for a map of heights; of several sheets of a workbook, exactly one must hold a
-        map, and this sheet is read
+    required : names of columns; the sheet of a workbook that has most of them is read. Among sheets
+        with equally many, it is the first that has a column of `known`, or else the first
+    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
@@ -255,7 +254,7 @@ def _headed(
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """True for a line of units, possibly in brackets; a dash or nothing where there is none."""
+    """True for a line of units, perhaps in brackets; a cell may be a dash or empty."""
     bared = [cell.strip("[]() ") for cell in cells]
     return any(bared) and all(cell in ("", "-") or parsed(cell) is not None for cell in bared)
 
@@ -270,9 +269,9 @@ def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
 
 
 def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) -> list[TextRow]:
-    """The rows of a finite-element listing without titles, repeated headers and last lines.
+    """The rows of a finite-element listing, without titles, repeated headers and closing lines.
 
-    first : number of the first row of the table, of those in `rows`
+    first : place in `rows` of the first row of numbers
     """
     width = len(rows[first].cells)
 
@@ -313,11 +312,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _sheet_lines(
     path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
 ) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
-    """The name and the numbered rows of the first sheet with most of the columns `required`.
+    """The name, the numbered rows and the comments of the sheet that `read_text_table` reads.
 
-    Without any, it is the first with a column of `known`, or the first. Tabs separate cells. The
-    name is in quotes, and followed by the names of other sheets that would do as well. For a map
-    it is the only sheet that holds one; the rows of the others are returned as comments.
+    Tabs separate cells. The name is in quotes, and followed by the names of other sheets that fit
+    equally well. For a map, the comments are the rows of the other sheets.
     """
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
@@ -351,7 +349,7 @@ def _sheet_lines(
 
 
 def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
-    """True if at least three rows hold at least three numbers each; True and False count, too."""
+    """True if at least three rows hold at least three numbers, True or False each."""
     style = Style("\t", ".")
 
     def numbers(row: Sequence[str]) -> int:
@@ -361,7 +359,7 @@ def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
 
 
 def _plain(cell: Any) -> str:
-    """The text of a cell, on one line and without quotes, with a point for a decimal comma."""
+    """The text of a cell, on one line, without quotes and with a decimal point."""
     text = " ".join(str(cell).replace('"', "").split())
     return text if Style("\t", ",").number(text) is None else text.replace(",", ".")
 
@@ -381,7 +379,7 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
 
 
 def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
-    """The style in which most lines have the same number of cells and most cells are numbers."""
+    """The style in which most lines have equally many cells, and most cells are numbers."""
     marked = (line for line in islice(lines, SAMPLE, None) if "," in line or "." in line)
     sample = [*lines[:SAMPLE], *islice(marked, LATER)]
 
@@ -446,7 +444,7 @@ def _width(cells: Sequence[str]) -> int:
 def _trimmed(
     header: TextRow | None, rows: list[TextRow], style: Style
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """Header and rows without empty cells at the end; the column of R's row numbers is named ""."""
+    """Header and rows without empty cells at the end; the name of R's row numbers is ""."""
     widths = [_width(row.cells) for row in rows]
     width = max(widths, default=0)
     if header:

@@ -53,7 +53,7 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A message for a file with TOML mistakes: a line for each, with place, text and correction."""
+    """A message with a line for each TOML mistake of a file: place, text and correction."""
     lines = text.split("\n")
     found: list[str] = []
     while len(found) < MOST_SLIPS:
@@ -79,7 +79,7 @@ def explained(path: object, text: str, error: Exception) -> str:
 
 
 def _corrected(line: str) -> tuple[str, str] | None:
-    """The corrected line, and what was expected; None if no correction is known."""
+    """The corrected line and the reason; None if no correction is known."""
     for pattern, meant, why in _SLIPS:
         if found := re.fullmatch(rf"\s*(?P<key>{_KEY})\s*{pattern}\s*(?:#.*)?", line):
             parts = {name: part.strip() for name, part in found.groupdict().items()}

@@ -11,7 +11,7 @@ from convexrough.errors import InputError
 
 
 class Unit(NamedTuple):
-    """A unit: the size in SI units, the powers of length and force, and the name to show."""
+    """A unit: its size in SI units, its powers of length and force, and its name in messages."""
 
     size: Fraction
     length: int
@@ -59,8 +59,8 @@ _ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
-#: A unit of length or force in a sentence. Short names count only after a digit, a mark, "in" or
-#: "unit", as "um" is also a German word.
+#: A unit of length or force in a sentence. "um", "m" and "N" count only after a digit, a mark, "in"
+#: or a word such as "unit", because they can also be words or symbols.
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
     r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
@@ -79,7 +79,7 @@ _WITH_UNIT = re.compile(
 
 
 def in_text(text: str) -> list[str]:
-    """The units of length and force that a sentence, or a row of units alone, seems to name."""
+    """The units of length and force in a sentence, or all units in a row of units."""
     cells = re.split(r"\s*[;,\t]\s*", text.strip(" #%"))
     if len(cells) > 1 and all(each and parsed(each) for each in cells):
         return cells
@@ -119,11 +119,11 @@ def unit(name: str) -> str:
 
 def _with_unit(name: str) -> re.Match[str] | None:
     found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
-    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as in p/p0
+    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as for p/p0
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit `name` of the quantity `what`; None for "". Raises InputError for other kinds."""
+    """The unit `name`; None for "". Raises InputError about `what` if it is no unit of `kind`."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -137,7 +137,7 @@ def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> U
 
 
 def one_unit(what: str, given: str | None, found: str) -> Unit | None:
-    """The unit of length named by the caller or the file. Raises InputError if the two differ."""
+    """The unit of length that the caller or the file names. Raises InputError if they differ."""
     said, there = known_unit(what, given or ""), known_unit(what, found)
     if said and there and said.size != there.size:
         expected = f"{there.name}, as the file says, or none given"
@@ -153,7 +153,7 @@ class UnitNames(NamedTuple):
 
     @classmethod
     def of(cls, names: object) -> UnitNames:
-        """`UnitNames` of a pair of names. Raises InputError for anything else."""
+        """The `UnitNames` of a pair of names. Raises InputError for anything else."""
         if not isinstance(names, tuple) or len(names) != 2:
             raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
         for kind, name in zip(cls._fields, names, strict=True):
@@ -189,7 +189,7 @@ NAMELESS = UnitNames()
 
 
 def force_of(pressure: Unit, length: Unit) -> str:
-    """The name of the unit pressure * length^2, such as mN for GPa and µm; "" if it has none."""
+    """The name of the unit pressure * length^2, such as mN for GPa and µm; "" if none is known."""
     made = pressure * length**2
     names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
     return names[0] if names else ""

@@ -1,4 +1,4 @@
-"""Claimed forces from files, one per asperity of a scene, and the verdicts on them."""
+"""Claimed loads and shear forces from files, one per asperity of a scene, and verdicts on them."""
 
 from __future__ import annotations
 
@@ -28,37 +28,36 @@ from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import rounded_up, verify_on
 
-#: Negative loads up to this fraction of the largest load may be noise.
+#: Negative loads up to this fraction of the largest load, in absolute value, may be noise.
 SMALL = 1e-3
 
-#: What a word in a column "status" or "contact" claims, and what a flag in "contact" claims.
+#: The status that a word in a column "status" or "contact", or a flag in "contact", claims.
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
 FLAGS = {"1": "contact", "1.0": "contact", "true": "contact", "yes": "contact", "0": "open",
          "0.0": "open", "false": "open", "no": "open"}  # fmt: skip
 
-#: What the entries of each column claim.
+#: The status that each entry of these columns claims.
 CLAIMS = {
     "status": WORDS,
     "contact": WORDS | FLAGS,
     "no_contact": {flag: "open" if it == "contact" else "contact" for flag, it in FLAGS.items()},
 }
 
-#: Difference of heights or tip radii, divided by the largest, that may be due to rounding.
+#: Largest difference of heights or tip radii due to rounding, as a fraction of the largest.
 ROUNDED = 1e-2
 
-#: A grid line lacks points if it misses more than GAPS times as many as it has under pressure. A
-#: grid lacks points if such lines miss more than FEW_GAPS times as many as it has.
+#: A grid line is incomplete if it lacks more than GAPS times as many points as it has under
+#: pressure. A grid is refused if such lines together lack more than FEW_GAPS times as many.
 GAPS, FEW_GAPS = 0.5, 0.05
 
 #: Largest number of unknown words of a column in a note.
 MOST = 3
 
-#: Words that are statuses of shear in a column of any name.
+#: Words that mark a column as one of shear statuses, whatever its header.
 OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
 
-
-#: The statuses accepted in a file of shear forces. An asperity with "undecided" is claimed to slide
-#: or to stick according to its force.
+#: The statuses accepted in a file of shear forces. For "undecided" the force decides whether the
+#: asperity is claimed to slide or to stick.
 STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
@@ -66,8 +65,9 @@ STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 class Manner(Reading):
     """How a file of forces is read.
 
-    sign      : -1 if compression is negative;  floor : [force] loads of at most this size are noise
-    tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
+    sign      : -1 if compression is negative;  floor : [force] loads up to this size count as 0
+    tolerance : [length] largest error of a position; default: 1 % of the smallest distance of two
+        asperities
     missing_open : True if asperities without a row are open
     nodes     : True if rows are nodes or pixels, summed at the nearest asperity
     """
@@ -86,9 +86,9 @@ class Manner(Reading):
 
 
 class Claimed(NamedTuple):
-    """Forces of a file in the order of the scene's asperities.
+    """Forces of a file, in the order of the scene's asperities.
 
-    status : (n,) the statuses in the file, None without them
+    status : (n,) the statuses in the file; None if it has no such column
     note   : how the file was read, on one line;  explained : how each column was read
     """
 
@@ -100,11 +100,11 @@ class Claimed(NamedTuple):
 
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Loads [force] from a file; negative loads are accepted as noise down to -`floor`.
+    """Loads [force] from a file; negative loads down to -`floor` are accepted.
 
-    Rows are matched by positions if the file has them, or by an index, or else by the scene's
-    order. Pressures, with areas or on a regular grid, are integrated over the points nearest to
-    each asperity.
+    Rows are assigned to asperities by position, if the file has positions, else by an index, else
+    by the order of the scene. Pressures, with areas or on a regular grid, are integrated over the
+    points nearest to each asperity.
 
     Raises TableError, which lists every mistake, or FileError if the file cannot be read.
     """
@@ -112,7 +112,7 @@ def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
 
 
 def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Shear forces [force] from the column `force` of a file, and statuses if it has them."""
+    """Shear forces [force] from the column `force` of a file, and its statuses, if any."""
     return _read(path, scene, "force", how, np.inf)
 
 
@@ -125,10 +125,12 @@ def judged(
     floor: float = 0.0,
     force: float = 0.0,
 ) -> list[Claim]:
-    """The verdicts on loads, and on shear forces if there are any. Errors name the file.
+    """The verdict on loads and, if shear forces are given, that on the shear forces.
 
     within : largest error allowed, as a fraction of the largest load or shear force
-    force  : [force] the prescribed total of the shear forces
+    force  : [force] the prescribed sum of the shear forces
+
+    Error messages name the file.
     """
     tolerance("--within", within)
     with blamed_on(loads.path):
@@ -218,7 +220,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
 def _negative(
     loads: Array, floor: float, sign: float, name: str, mistake: Callable[[int, str], str]
 ) -> Iterator[str]:
-    """Messages for loads below -floor: one each, or one for the column if no load is positive.
+    """A message for each load below -floor, or one for the column if no load is positive.
 
     name : the column;  mistake : a function that adds the row to a message
     """
@@ -241,7 +243,7 @@ def _negative(
 
 
 def _statuses(table: ReadTable) -> Iterator[tuple[str, NDArray[np.str_], Mapping[str, str]]]:
-    """Header, entries and `CLAIMS` of each column that says which asperities touch."""
+    """For each column that says which asperities touch: its header, entries and `CLAIMS`."""
     for name, known in CLAIMS.items():
         if name in table.columns:
             yield bare(table.called[name]).lower(), np.char.strip(table.columns[name]), known
@@ -260,7 +262,7 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
 
 
 def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
-    """A note on each column of statuses: the unknown words of rows with and without a load."""
+    """A note on each column with unknown words: some of them, in rows with and without a load."""
     for header, entries, known in _statuses(table):
         other = ~np.isin(np.char.lower(entries), (*known, "", "undecided"))
         if other.any():
@@ -270,7 +272,7 @@ def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
 
 
 def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterator[str]:
-    """A note for each column of heights or tip radii that are not those of the scene."""
+    """A note on each column of heights or tip radii that differ from those of the scene."""
     own = {"height": scene.asperities.heights, "tip_radius": scene.asperities.tip_radii}
     for header, cells in table.others.items():
         name = bare(header).lower()
@@ -281,7 +283,7 @@ def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterat
 
 
 def _areas(path: Path, table: ReadTable, count: int) -> Any:
-    """The areas of the nodes, or the area of a pixel of a regular grid.
+    """(m,) the areas of the nodes, or the area of one pixel of a regular grid.
 
     count : number of asperities of the scene
     """
@@ -305,10 +307,10 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
 
 
 def _check_one_size(i: Indices, j: Indices, count: int) -> None:
-    """Raise InputError if more than `count` pixels without neighbours lie on a coarser grid.
+    """Raise InputError if pixels have several sizes.
 
-    In that case pixels have several sizes. Up to `count` pixels may have no neighbours, because
-    each asperity may have a contact that is one pixel large.
+    They do if more than `count` pixels have no neighbours, and these pixels lie on a coarser grid.
+    Up to `count` may be alone, because the contact of each asperity may be one pixel large.
     """
     if len(i) == (i.max() + 1) * (j.max() + 1):
         return  # a full grid
@@ -321,8 +323,8 @@ def _check_one_size(i: Indices, j: Indices, count: int) -> None:
 def _check_whole(i: Indices, j: Indices, loaded: NDArray[np.bool_]) -> None:
     """Raise InputError if a grid lacks points under pressure, as a coarser mesh does.
 
-    A missing point with pressure on both sides can be a gap between two contacts. So only grid
-    lines count that have more than half as many such points as points under pressure.
+    A missing point with pressure on both sides can be a gap between two contacts. So a grid line
+    counts only if it has more than half as many such points as points under pressure.
     """
     if not np.ptp((i + j) % 2):  # a hexagonal or diagonal grid: lines along its diagonals
         i, j = (i + j) // 2, (i - j - (i - j).min()) // 2
@@ -351,7 +353,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
 
 
 def _unread_statuses(table: ReadTable) -> Iterator[str]:
-    """A message for each column of statuses, or of flags of slip, that is not read."""
+    """A message for each unread column that contains statuses, or flags that mean slip or stick."""
     for header, cells in table.others.items() if "status" not in table.columns else ():
         name, said = bare(header)[:60], {str(cell).strip().lower() for cell in cells.tolist()}
         known = {*WORDS, *OF_SHEAR}

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: Default of the largest error of a position in a file, as a fraction of the smallest spacing.
 POSITION_TOLERANCE = 1e-2
 
-#: Number of iterations of the estimate of a shift of all nodes.
+#: Number of iterations that estimate a common shift of all nodes.
 REFINEMENTS = 5
 
 #: If rows are missing, at most this many shifts are tried; each moves the first row to another
@@ -40,22 +40,21 @@ MOST_TRIED = 1000
 TOTAL = 1e-4
 
 #: If at most this part of the loaded nodes is far from all asperities, only the positions of these
-#: nodes may be wrong; otherwise all positions may be.
+#: nodes may be wrong; otherwise all positions may be wrong.
 FEW_FAR = 0.1
 
-#: Largest accepted distance of a loaded node from its asperity, as a fraction of the distance of
-#: this asperity from its nearest neighbour. At 1 a node may be an asperity that the scene lacks.
+#: Largest accepted distance of a loaded node from its nearest asperity, as a fraction of that
+#: asperity's distance from its neighbour. At 1 the node may be an asperity that the scene lacks.
 REACH = 0.9
 
-#: What positions should be, in the message for shifted ones.
+#: The expected positions, in the message for shifted ones.
 ON_THE_AXIS = "expected x, y relative to the sphere's axis"
 
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
-#: Largest accepted median of the distances of loaded nodes from their nearest asperities, each as a
-#: fraction of that asperity's distance from its neighbour. For random points the median is about
-#: 0.4.
+#: Positions of nodes are accepted up to this median of their distances from the nearest asperities,
+#: each as a fraction of that asperity's distance from its neighbour; about 0.4 for random points.
 BY_CHANCE = 0.25
 
 #: Names of columns that can only be indices of asperities.
@@ -67,11 +66,11 @@ class Placing:
     """The assignment of the rows of a table to asperities.
 
     column : the name of the column of loads, pressures or forces
-    tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
+    tolerance : [length] as in `Manner`
     missing_open : True if asperities without a row are open
     summed : True if rows are nodes or pixels, each of which belongs to the nearest asperity
     how    : how rows were assigned, in words
-    mistakes : sentences on what is wrong with the rows
+    mistakes : messages about wrong rows
     """
 
     scene: Scene
@@ -90,7 +89,7 @@ class Placing:
         return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self, values: Array) -> Indices:
-        """(m,) the index of the asperity of each row; messages on errors go to `mistakes`.
+        """(m,) the index of the asperity of each row; messages about wrong rows go to `mistakes`.
 
         values : (m,) the loads or forces of the rows
         """
@@ -105,16 +104,16 @@ class Placing:
             return found
         advice = "" if by else unused(self.table)
         if rows < count and (by or self._indices()):
-            advice = "; --missing-open takes the others for open"
+            advice = "; --missing-open claims that the others are open"
         elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
-            advice += "; --nodes adds up rows at their nearest asperity"
+            advice += "; --nodes sums rows at their nearest asperity"
         expected = f"expected {count}, one per asperity of the scene{advice}"
         where = in_sheet(self.table.style)
         self.mistakes.insert(0, f"rows: found {rows}{where}, {expected}")
         return found
 
     def _nearest_to_each(self, values: Array) -> Indices:
-        """(m,) the asperity nearest to each node or pixel, even if it is far (see `mistakes`)."""
+        """(m,) the asperity nearest to each node or pixel; `mistakes` names nodes that are far."""
         assert self.points is not None
         loaded = values != 0
         distances, owners = self._nearest(self.points)
@@ -144,7 +143,7 @@ class Placing:
     # By an index, or in order
 
     def _numbered_or_in_order(self) -> tuple[Indices, bool]:
-        """The asperity of each row; True if a column gives the indices, False if the order does."""
+        """(m,) the asperity of each row; True if a column gives it, False if the order does."""
         headers = self.table.others
         places = {it[0].lower(): it for it in headers if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
         if len(places) == 2:
@@ -162,7 +161,7 @@ class Placing:
         return np.arange(rows), False
 
     def _indices(self) -> dict[str, Indices]:
-        """Unused columns that may be indices, by header; those named as an index are first."""
+        """Unread columns that may be indices, by header; first those whose header says so."""
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
@@ -182,13 +181,13 @@ class Placing:
         return named | others
 
     def _numbered(self, name: str, index: Indices) -> Indices | None:
-        """(m,) indices of asperities from a column that counts from 0 or 1; None if it does not."""
+        """(m,) indices from 0, from a column that counts from 0 or 1; None for other columns."""
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.missing_open)
         # Distinct increasing numbers may be numbers of nodes, so mistakes in them are ignored.
-        # Numbers are surely indices if they decrease somewhere, or if all are in the range of
-        # indices and some, but less than half of them, are repetitions.
+        # Numbers are surely indices if they decrease somewhere. They also are if all are in the
+        # range of indices, and some of them, but less than half, are repetitions.
         if times.max() == 1:
             sure |= bool(name) and bool((np.diff(index) < 0).any())
         else:
@@ -199,9 +198,10 @@ class Placing:
             wrong = f"{twice} in {where}, expected each asperity once"
         elif least > 0 and most < count:
             more = f"a row 0 if they count from 0, a row {count} if they count from 1"
-            wrong = f"numbers from {least} to {most}, expected columns x and y, or also {more}"
+            wrong = f"numbers from {least} to {most}, expected also {more}; or columns x and y"
         elif most - (first := min(least, 1)) >= count:
-            wrong = f"{most}, expected at most {count - 1 + first}, the last asperity, or x and y"
+            last = f"{count - 1 + first}, the last asperity"
+            wrong = f"{most}, expected at most {last}; or columns x and y"
         else:
             self.how = f"in the order of column {name or '1'}, from {first}"
             return index - first
@@ -232,7 +232,7 @@ class Placing:
                 return
 
     def _several_tables(self) -> str:
-        """A message if a column numbers several tables in one file; else ""."""
+        """A message if the values of a column divide the rows into several tables; else ""."""
         count = len(self.scene)
         for name, cells in self.table.others.items():
             values, times = np.unique(cells, return_counts=True)
@@ -267,20 +267,20 @@ class Placing:
 
     @cached_property
     def _apart(self) -> Array:
-        """(n,) [length] the distance of each asperity from its neighbour, if it has any."""
+        """(n,) [length] the distance of each asperity from its nearest neighbour, if it has one."""
         if len(self.scene) == 1:
             return np.array([np.min(self.scene.sphere_radius)])
         return nearest_distances(self.scene.asperities.positions)
 
     @cached_property
     def _spacing(self) -> float:
-        """[length] the smallest distance of two asperities; the tip radius if there is only one."""
+        """[length] the smallest distance of two asperities, or the tip radius of the only one."""
         alone = len(self.scene) == 1
         return float(self.scene.asperities.tip_radii[0] if alone else self._apart.min())
 
     @cached_property
     def _allowed(self) -> float:
-        """[length] largest accepted distance of a position in the file from its asperity."""
+        """[length] the tolerance, or its default. Raises InputError if it is too large."""
         given, half = self.tolerance, self._spacing / 2
         if given is not None and given > half and len(self.scene) > 1:
             expected = f"at most {half:.3g}, half the smallest distance of two asperities"
@@ -290,7 +290,7 @@ class Placing:
     def _fits(self, points: Array) -> bool:
         """True if each point is at an asperity, and no two points are at the same one.
 
-        Nodes only have to be near asperities, nearer than random points, and not all near the same.
+        Nodes fit if they are nearer to asperities than random points, and not all near the same.
         """
         distances, owners = self._nearest(points)
         if not self.summed:
@@ -299,7 +299,7 @@ class Placing:
         return bool(parts.max() <= REACH and np.median(parts) < BY_CHANCE and np.ptp(owners) > 0)
 
     def _matched(self) -> Indices:
-        """(m,) the asperity at each point; `mistakes` names points at none or at a taken one."""
+        """(m,) the asperity at each point; `mistakes` names points at none, or two at the same."""
         assert self.points is not None
         points, allowed = self.points, self._allowed
         distances, owners = self._nearest(points)
@@ -324,7 +324,7 @@ class Placing:
         return owners
 
     def _misread(self, rows: NDArray[np.bool_]) -> str:
-        """A message that names the columns, signs or units with which the rows fit; else ""."""
+        """A message that names columns, signs or units with which the rows fit; "" if none do."""
         return next((said for said, points in self._readings(rows) if self._fits(points)), "")
 
     def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
@@ -369,11 +369,11 @@ class Placing:
             if self._fits(points[:20] + shift) and self._fits(points + shift):
                 digit = 0.1 * min(self._allowed, float(np.abs(shift).max()))
                 by = _pair(np.round(-shift / digit) * digit)
-                return f"all are shifted by {by}, {ON_THE_AXIS}, to {self._allowed:.3g}"
+                return f"all are shifted by {by}, {ON_THE_AXIS}, to within {self._allowed:.3g}"
         return ""
 
     def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> str:
-        """A message with the approximate shift after which loaded nodes fit, or ""."""
+        """A message with the approximate shift after which loaded nodes fit; "" if none does."""
         assert self.points is not None
         points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
         shift = np.average(points, axis=0, weights=weights)
@@ -396,7 +396,7 @@ class Placing:
 
 
 def unused(table: ReadTable) -> str:
-    """The end of a message, which names unused columns, at most `MOST_UNREAD` of them."""
+    """The end of a message: the names of at most `MOST_UNREAD` unread columns."""
     names = [*filter(None, table.others)]
     more = f" and {len(names) - MOST_UNREAD} more" if len(names) > MOST_UNREAD else ""
     return f"; not used: {', '.join(names[:MOST_UNREAD])}{more}" if names else ""

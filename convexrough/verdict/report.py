@@ -27,7 +27,7 @@ MOST_LISTED = 10
 
 
 def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
-    """The verdicts and a row for each asperity, in the scene's units; `--json` prints this."""
+    """What `--json` prints: the verdicts and a row for each asperity, in the scene's units."""
     summary: dict[str, Any] = {}
     for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
         names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
@@ -86,7 +86,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
-    """Aligned lines about one claim: wrong, undecided and inaccurate asperities, and the total.
+    """Aligned lines about one claim: wrong and undecided statuses, errors, the total, suspects.
 
     others : text printed after the number of rows that a table leaves out
     """
@@ -126,9 +126,9 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
-    """JUnit XML: a test case for each check of each claim; for an error, one case with the error.
+    """JUnit XML with a test case for each check of each claim, or with one case for an error.
 
-    files : names of the files that were checked; they are part of the names in the XML
+    files : names of the files that were checked, for the names of the test suite and its cases
     """
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
     if isinstance(found, ConvexroughError):
@@ -150,7 +150,7 @@ def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
 
 
 def _findings(claim: Claim) -> dict[str, str]:
-    """What is wrong, by the name of each check; "" for checks that are passed."""
+    """By the name of each check: what is wrong, or "" if the check is passed."""
     points = claim.of.asperities.positions
 
     def named(which: Indices) -> str:

@@ -1,8 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-If the certificate of the loads does not prove the whole claim, Newton's method looks for a
-solution, first from these loads, then from its default start. The certificate of that solution
-shows which loads are wrong. `friction.verdict` does the same for shear forces.
+If the certificate of the loads does not prove the whole claim, Newton's method computes a solution,
+first from these loads or, if it fails, from its default start. The certificate of the solution
+shows which loads are wrong. `friction.verdict` compares shear forces with a solution.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: A hint proposes --floor if all loads on asperities proved open are at most this fraction of the
-#: largest load.
+#: A hint proposes --floor if the loads of all asperities that are claimed to touch, but proved
+#: open, are at most this fraction of the largest load.
 NOISE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Claim, Table, Plottable):
-    """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
+    """Comparison of claimed loads with what is proved. Indices refer to the scene's asperities.
 
     scene       : the scene of the loads
     loads       : (n,) [force] the given loads
-    floor       : [force] a load up to this size counts as 0, and its asperity as open
-    within      : largest error allowed, as a fraction of the largest load or, for a prescribed
-        total, of this total
+    floor       : [force] a load up to this size counts as 0: its asperity is claimed to be open
+    within      : largest error allowed: of a load, as a fraction of the largest load; of the sum,
+        as a fraction of a prescribed total
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
-    solution    : the solution, with its certificate, that Newton's method finds from the given
-        loads or, failing that, from its default start; None where it is not needed or not found
+    solution    : the contact that Newton's method finds from the given loads or, if it fails, from
+        its default start; None if it finds none, or if the certificate proves the whole claim
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone, list(verdict.hints()), verdict.nearby()
@@ -98,7 +98,7 @@ class Verdict(Claim, Table, Plottable):
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] error bounds of `certificate`, plus the sizes of loads that count as 0."""
+        """(n,) [force] error bounds of the given loads that follow from `certificate` alone."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         errors = self.certificate.load_errors + ignored
         return frozen(np.where(ignored > 0, np.nextafter(errors, np.inf), errors))
@@ -113,8 +113,8 @@ class Verdict(Claim, Table, Plottable):
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
-                f"of the loads, {len(small):,} on asperities proved open are at most {noise:.2g} "
-                f"({noise / self.largest:.1g} of the largest load): "
+                f"{len(small):,} of the given loads, on asperities proved open, are at most "
+                f"{noise:.2g} ({noise / self.largest:.1g} of the largest load): "
                 f"--floor {rounded_up(noise)} counts them as 0"
             )
         yield from super().hints()
@@ -136,20 +136,18 @@ def verify(
     floor: float = 0.0,
     influence: Kind | None = None,
 ) -> Verdict:
-    """The verdict on loads from any source: their contact set and their errors, as proved.
+    """The verdict on loads from any source: which statuses they imply wrongly, and their errors.
 
     scene : the scene whose asperities carry the loads
     loads : (n,) [force] the loads in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed: of a load, as a fraction of the largest load, and of a
-        prescribed total, as a fraction of this total. With `within=1` hardly more than the contact
-        set is checked
-    floor  : [force] a load of at most this size, positive or negative, counts as 0, and its
-        asperity as open
-    influence : compliance operator; None for the cheapest
+    within : largest error allowed: of a load, as a fraction of the largest load; of the sum, as a
+        fraction of a prescribed total. `within=1` checks little more than which asperities touch
+    floor  : [force] a load from -floor to floor counts as 0: its asperity is claimed to be open
+    influence : compliance operator, as for `press`
 
     The errors are bounded by certificates (docs/theory/certificate.md, "The bound"). Raises
-    InputError for loads of the wrong length, not finite, or negative beyond the floor.
+    InputError if the number of loads is wrong, or if a load is not finite or less than -floor.
 
     >>> claimed = contact.loads.copy()
     >>> claimed[3] = 0.0
@@ -169,7 +167,7 @@ def verify_on(
     within: float = WITHIN,
     floor: float = 0.0,
 ) -> Verdict:
-    """The verdict of `verify`, for a problem that is already assembled."""
+    """The verdict of `verify` for an assembled problem."""
     floor = checks.non_negative("floor", floor)
     within = tolerance("within", within)
     checks.in_order("loads", loads)

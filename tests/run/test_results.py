@@ -118,11 +118,11 @@ def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
     assert (ordinary.err, 'with "closest"' in ordinary.out) == ("", False)
     blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
     outcome = run(scene_text(blunt, "approach = 0.9"), "--force")
-    model = "from 0.2 on, the paraboloid of the model"
-    assert f"1.09 of the sphere's radius from the axis: {model}" in outcome.err
-    assert f"of the tip radius: {model}" in outcome.err
+    model = "above 0.2 the paraboloid of the model"
+    assert f"1.09 of the sphere's radius from the axis; {model}" in outcome.err
+    assert f"of the tip radius; {model}" in outcome.err
     claimed = command("verify", "a.toml", "a-results/asperities.csv")  # the same loads: also told
-    assert f"of the tip radius: {model}" in claimed.err
+    assert f"of the tip radius; {model}" in claimed.err
 
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
@@ -134,7 +134,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
         for within in (0.0102, 0.0045, 0.004, 0.002)
     )
-    rim = "contact reaches the rim of the array, which ends at 0."
+    rim = "contact reaches the rim of the array, which is at 0."
     sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
     for array, base, control, told in (
@@ -142,7 +142,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (wide, (1.0, 2.0), {"approach": 2e-5}, ""),
         (seven, 1e3, {"approach": 5e-5}, rim),
         (one, 1e3, {"approach": 5e-5}, "asperities in contact: 1, fewer than 5"),
-        (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch: th"),
+        (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch; as"),
         (wide, 1.0, {"approach": 5e-5}, ""),
         (wide, np.inf, {"approach": 1e-6}, ""),
         (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and the unit"),

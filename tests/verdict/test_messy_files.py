@@ -362,10 +362,10 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "shifted": (lambda case: case.table(x=PLACES[case.order, 0] + 3e-4), "",
                 "all are shifted by [0.0003, 0]"),
     "loaded nodes only": (lambda case: touching(case, case.table()), "",
-                          "; --missing-open takes the others for open"),
+                          "; --missing-open claims that the others are open"),
     "loaded nodes by id": (
         lambda case: {"id": 1 + np.flatnonzero(case.loads), "load": case.loads[case.loads > 0]},
-        "", "rows: found 7, expected 12", "; --missing-open takes the others for open"),
+        "", "rows: found 7, expected 12", "; --missing-open claims that the others are open"),
     "negative loads": (lambda case: case.table(load=-case.loads[case.order]), "",
                        "no load is positive, expected positive compression: --sign -1"),
     "an index twice": (lambda case: {"index": [0, *range(COUNT - 1)], "load": case.loads}, "",
@@ -501,8 +501,8 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     name = put(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
     with pytest.raises(TableError) as refused:
         read_loads(tmp_path / name, scene, Manner())
-    cause = "all are shifted by [0.001, 0], expected x, y relative to the sphere's axis, to 1e-05"
-    assert str(refused.value) == f"{tmp_path / name}: positions: {cause}"
+    cause = "all are shifted by [0.001, 0], expected x, y relative to the sphere's axis, to within"
+    assert str(refused.value) == f"{tmp_path / name}: positions: {cause} 1e-05"
 
 
 # Units

@@ -213,7 +213,7 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine
     put(tmp_path, {"x": x + offset * 0.0025, "y": y, "load": loads})
     if fine:
         assert np.array_equal(read_loads(path, scene).values, loads)
-        with pytest.raises(cr.InputError, match="to 1e-05"):
+        with pytest.raises(cr.InputError, match="to within 1e-05"):
             read_loads(path, scene, tolerance=1e-5)
     else:
         with pytest.raises(cr.InputError, match=r"all are shifted by \[2.75e-05, 0\], .* 2.5e-05$"):

@@ -122,7 +122,7 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     noisy = {int(i): 1.5e-20 for i in np.flatnonzero(contact.loads == 0)}
     outcome = command("verify", "a.toml", claim(contact, noisy))
     assert outcome.status == 3
-    assert "hint: of the loads, 24 on asperities proved open are at most 1.5e-20" in outcome.err
+    assert "24 of the given loads, on asperities proved open, are at most 1.5e-20" in outcome.err
     assert "--floor 2e-20 counts them as 0" in outcome.err
     assert "and 14 more: --json and --out list all" in outcome.out
     floored = command("verify", "a.toml", claim(contact, noisy), "--floor", "2e-20")
