@@ -55,7 +55,7 @@ def run(output: Output, scene: Path) -> int:
     with folder as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
-        for caution in file.cautions(contact):  # before work that may be long, or fail
+        for caution in file.cautions(contact):  # before computations that may be long, or fail
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
@@ -71,7 +71,7 @@ def run(output: Output, scene: Path) -> int:
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
-    """The pair (K, N) from the text K/N, which asks for share K of N shares, counted from 1."""
+    """The numbers (K, N) in the text K/N; None without a text."""
     if value is None:
         return None
     k, _, n = value.partition("/")
@@ -112,7 +112,7 @@ def sweep(
     the rows computed so far are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):
-        raise click.UsageError("Either SWEEP, or --summary DIR.")
+        raise click.UsageError("Give either SWEEP or --summary DIR.")
     if summary is not None:
         return _say_summary(summary, output)
     if workers is not None and scheduler is not None:

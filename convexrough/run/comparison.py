@@ -43,7 +43,7 @@ def _entry(entry: Entry) -> Summary:
 
 
 def steps(comparison: Comparison) -> list[list[Any]]:
-    """A table of the iterations that solvers logged: headings, then a row for each iteration."""
+    """A table of the logged iterations of solvers: headings, then a row for each iteration."""
     names = ["step", "objective", "residual"]
     rows = [
         [entry.solver, *(step[name] for name in names)]
@@ -67,7 +67,7 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
         "statuses           those proved from the solver's loads; a contact differs if only one of",
         f"                   the two solvers gives it more than {CARRIES:g} of the largest load",
-        "MB                 increase of the memory of the process during the solution",
+        "MB                 memory by which the process grows during the solution",
         "",
         *aligned([HEADING, *rows], left=1),
     ]

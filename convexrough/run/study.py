@@ -37,7 +37,7 @@ from convexrough.scene.material import Material
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
-#: [Pa] smallest and largest accepted modulus: below those of gels, and above that of diamond.
+#: [Pa] smallest and largest accepted modulus: below moduli of gels, above that of diamond.
 SOFTEST, HARDEST = 1e3, 1e13
 MODULI = ("contact_modulus", "youngs_modulus", "hardness")
 
@@ -176,7 +176,7 @@ REQUIRED: dict[str, type[FileTable]] = {
 
 
 class Study(FileTable):
-    """All tables of a scene file except those of further stages, which `_model` adds."""
+    """All tables of a scene file but those of further stages, which `_model` adds."""
 
     sphere: SphereTable
     material: Annotated[
@@ -194,7 +194,7 @@ class Study(FileTable):
 
     @property
     def stages(self) -> dict[str, Stage]:
-        """The stages that the file asks for, by name, in the order of results."""
+        """The stages that the file requests, by name, in the order of results."""
         found = {name: getattr(self, name) for name in STAGES}
         return {name: stage for name, stage in found.items() if stage is not None}
 
@@ -254,7 +254,7 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The checked tables of a parsed file or None; and the messages, in the order of the file."""
+    """The checked tables of a parsed file, or None; and the mistakes, in the order of the file."""
     if "" in contents:
         return None, ['[""]: unknown table, expected a name']
     model = _model(tuple(STAGES.values()))
