@@ -33,7 +33,7 @@ def _different(values: Any) -> bool:
 
 
 def _hashable(value: Any) -> Any:
-    """A stand-in for a value of a file, with equal ones for equal values, such as 1 and 1.0."""
+    """A hashable object for a value of a file; equal for equal values, such as 1 and 1.0."""
     if isinstance(value, (list, tuple)):
         return tuple(map(_hashable, value))
     return value if type(value) in (int, float) else repr(value)
@@ -77,10 +77,10 @@ class Grid(FileTable):
     """The table [sweep]: keys "table.key" of a scene file that vary, and numbers to measure.
 
     measure  : names of numbers
-    seeds    : number of seeds of random heights, tip radii and values, or a list of seeds
-    together : keys with lists of the same length, whose k-th values belong together
-    over     : keys whose values are combined in every way
-    draw     : keys with random values, and their laws
+    seeds    : number of seeds (of random heights, tip radii and values), or a list of seeds
+    together : keys with lists of the same length; scenes use the k-th value of every list
+    over     : keys with lists; scenes use every combination of their values
+    draw     : keys with random values, and the laws of these values
     """
 
     measure: _Names = Field(default_factory=list)
@@ -164,7 +164,7 @@ class Grid(FileTable):
 
 
 def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
-    """The random value of a key for a seed. It is independent of the values of other keys.
+    """The random value of a key for a seed, independent of the values of other keys.
 
     Normal values, and logarithms of lognormal values, are clipped at six standard deviations.
     """
