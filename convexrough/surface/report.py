@@ -28,7 +28,7 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: The unit of each column and statistic with a unit; {} stands for the unit of length.
+#: The units of columns and statistics; {} stands for the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curvature"), "1/{}")
 LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
@@ -36,17 +36,17 @@ LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 #: At most this many crowded pairs of summits are printed.
 MOST_LISTED = 10
 
-#: A contact farther from the middle than this fraction of the map's half width causes a warning.
+#: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
 
-#: Largest relative difference without a warning: of a statistic of the summits from its value for a
-#: Gaussian surface, and of the asperities' load from that of the whole map.
+#: Largest relative difference without a warning: between a statistic of the summits and its value
+#: for a Gaussian surface, and between the loads of the asperities and of the whole map.
 UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """A surface, all summits, those left by pruning, and the result of pressing these.
+    """A surface, its summits, and the results of pressing them.
 
     maxima, summits : all summits, and those left by pruning
     curve   : contacts at several prunings; None if nothing was pressed
@@ -136,7 +136,7 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def _in_unit(name: str, unit: str) -> str:
-    """A column's name, with the column's unit if it has one."""
+    """The name of a column, with its unit if it has one."""
     return f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name
 
 
@@ -194,7 +194,7 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
         scene = scanned.contact.scene
         with_form, form = scene.curvature + curvature, 1.0 / curvature
         both = f"{1.0 / with_form:.6g}" if with_form > 0 else "no hill"
-        said = f"{scene.mean_radius:.6g}; the removed form, {form:.6g}, is not in it: together"
+        said = f"{scene.mean_radius:.6g}, without the removed form ({form:.6g}); with it"
         yield "pressing radius", f"{said} {both}"
 
 
@@ -271,7 +271,7 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
         yield (
             f"slopes along one axis are {min(ratio, 1e6):.3g} times those along the other: the "
-            "moments assume a surface without a preferred direction, and tips are ridges"
+            "formulas by moments do not apply to surfaces with a lay, and tips are ridges"
         )
     for name in ("density", "mean_curvature"):
         counted, expected = getattr(found, name), getattr(said, name)

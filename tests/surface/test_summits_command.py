@@ -240,7 +240,7 @@ def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surf
     assert "--detrend sphere, removes it" in ran.err
     assert "the same approach  asperities  whole map  difference" in ran.out
     said = find(*pressed, "--detrend", "sphere").out
-    form = r"pressing radius +10000; the removed form, 1\d+\.\d+, is not in it: toge"
+    form = r"pressing radius +10000, without the removed form \(1\d+\.\d+\); with it "
     assert re.search(form, said)
     ran = find(*pressed, "--detrend", "sphere", "--json")
     assert "variance" not in ran.err
