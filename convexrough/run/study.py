@@ -203,10 +203,10 @@ class Study(FileTable):
         """Mistakes: unknown tables, missing tables, and keys that need a key of another table."""
         for name, keys_within in keys.items():
             if name == "sweep":
-                yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"
+                yield name, "[sweep]: only `convexrough sweep` computes many scenes"
             elif name not in cls.model_fields:
                 a_table = isinstance(keys_within, dict)
-                what = f"[{name}]: unknown table" if a_table else f"{name}: in no table"
+                what = f"[{name}]: unknown table" if a_table else f"{name}: not in a table"
                 yield name, f"{what}, {nearest(name, cls.model_fields)}"
         if "friction" not in keys:
             found = (STAGES[name].sheared_by(keys[name]) for name in STAGES if name in keys)

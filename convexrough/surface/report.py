@@ -200,7 +200,7 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
     found = scanned.maxima.statistics, scanned.summits.statistics, scanned.surface.moments
-    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "by moments"]]
+    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "from moments"]]
     for name in found[0]._fields:
         named = _in_unit(name, scanned.surface.unit).replace("_", " ")
         table.append([named, *(getattr(each, name) for each in found)])
@@ -271,14 +271,14 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
         yield (
             f"slopes along one axis are {min(ratio, 1e6):.3g} times those along the other: the "
-            "formulas by moments do not apply to surfaces with a lay, and tips are ridges"
+            "statistics from moments assume no preferred direction, and tips are ridges"
         )
     for name in ("density", "mean_curvature"):
         counted, expected = getattr(found, name), getattr(said, name)
         if abs(counted / expected - 1) > UNLIKE:
             yield (
-                f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} of what the "
-                "spectral moments of a Gaussian surface would give"
+                f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} times that of "
+                "a Gaussian surface with the same spectral moments"
             )
     yield from _near_holes(scanned)
     if scanned.curve is None:

@@ -163,8 +163,8 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             if not (path / MANIFEST).exists():
                 if orphans:  # the manifest, which is written before all parts, was removed
                     raise FileError(
-                        f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they "
-                        f"are: restore it or remove {path / PARTS}; {OUT} names another folder"
+                        f"{path}: contains parts of an unknown sweep, without {MANIFEST}: restore "
+                        f"this file or remove {path / PARTS}; {OUT} names another folder"
                     )
                 (path / PARTS).mkdir(exist_ok=True)
                 write_text(path / MANIFEST, to_json(manifest) + "\n")

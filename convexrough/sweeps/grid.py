@@ -91,7 +91,7 @@ class Grid(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: keys that cannot be swept, or are swept twice, and unequal lengths of lists."""
+        """Mistakes: keys that cannot be swept or are swept twice, and lists of unequal length."""
         yield from super().mistakes_between(keys)
         if "measure" not in keys:
             yield "measure", f"missing, expected {_NAMES}"
@@ -104,12 +104,12 @@ class Grid(FileTable):
             elif name == "sweep":
                 yield f"{where}.{key}", "expected a key of a scene"
             elif name in FIXED:
-                yield f"{where}.{key}", f"values of [{name}] name columns, so they cannot vary"
+                yield f"{where}.{key}", f"columns are named after [{name}], which cannot vary"
             elif key == "asperities.seed" and "seeds" in keys:
-                yield f"{where}.{key}", "swept twice, by seeds too"
+                yield f"{where}.{key}", "swept twice, also by seeds"
             for other in first:  # a key, or a table that contains it
                 if f"{key}.".startswith(f"{other}.") or other.startswith(f"{key}."):
-                    yield f"{where}.{key}", f"swept twice, in [sweep.{first[other]}] {other} too"
+                    yield f"{where}.{key}", f"swept twice, also in [sweep.{first[other]}] {other}"
             first[key] = where
         lists = table_in(keys, "together").values()
         if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:
