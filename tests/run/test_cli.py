@@ -169,7 +169,7 @@ def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
     Path("one.toml").write_text(scene_text())
     assert found[1] == read_scene("one.toml").press().load
     assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
-    assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
+    assert "[sweep]: only `convexrough sweep`" in command("compare", "a.toml").err
 
 
 # Bad input
