@@ -164,8 +164,8 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("tip radius", f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
                        f"  (paraboloids over {origin.fit} by {origin.fit} pixels)"),
         ("eccentricity", f"median {np.median(summits.eccentricities):.2f}, largest "
-                         f"{summits.eccentricities.max():.2f}  (elliptic tips would carry up to "
-                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more)"),
+                         f"{summits.eccentricities.max():.2f}  (elliptic tips carry up to "
+                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more than spheres)"),
         ("rms misfit", f"median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"
                        "  (distance of pixels from the fitted sphere)"),
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
@@ -179,7 +179,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
-        table: list[Any] = [["the same approach", "asperities", "whole map", "difference"]]
+        table: list[Any] = [["at one approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
         described += ["", *aligned(table, left=1)]
         change = f"{100 * scanned.whole.resolution:.2g} %"
@@ -230,14 +230,14 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:"
+        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of summits.csv from 0:"
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
             table.append([str(i), str(j), f"{value:.3g}", x[i], y[i]])
         yield from (f"    {line}" for line in aligned(table))
         if (more := len(pairs) - MOST_LISTED) > 0:
-            yield f"    and {more:,} more: --json has all"
+            yield f"    and {more:,} more; --json prints all"
     strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
     if len(strained):
         named = ", ".join(map(str, strained[:MOST_LISTED]))

@@ -238,7 +238,7 @@ def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surf
     ran = find(*pressed)
     assert "of the variance of the heights: " in ran.err
     assert "--detrend sphere, removes it" in ran.err
-    assert "the same approach  asperities  whole map  difference" in ran.out
+    assert "at one approach  asperities  whole map  difference" in ran.out
     said = find(*pressed, "--detrend", "sphere").out
     form = r"pressing radius +10000, without the removed form \(1\d+\.\d+\); with it "
     assert re.search(form, said)
