@@ -29,11 +29,10 @@ from convexrough.errors import FileError, WorkerError, blamed_on
 @click.argument("scene", type=PATH)
 @output_options(*OPTIONS)
 def run(output: Output, scene: Path) -> int:
-    """Compute a scene; write tables, certificate and figures.
+    """Compute a scene; print what is proved; write tables and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
-    with a sphere and friction. If the file has a table [sweep], the command does the same as
-    `convexrough sweep`.
+    with a sphere and friction. A file with a table [sweep] is computed as by `convexrough sweep`.
     """
     from convexrough import checks
     from convexrough.run.results import origin, prove_results, slider_page

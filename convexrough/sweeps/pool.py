@@ -70,7 +70,9 @@ def _together(
                 except _lost() as error:
                     lost.append(batch)
                     if len(lost) > MOST_LOST:
-                        raise WorkerError(f"all workers die soon after start: {error}") from error
+                        raise WorkerError(
+                            f"workers died in more than {MOST_LOST} batches: {error}"
+                        ) from error
                     continue
                 if other := different(versions):
                     raise WorkerError(f"a worker has other versions: {other}")
