@@ -1,4 +1,4 @@
-"""Options that several commands take, what commands print, and their exit statuses."""
+"""Options, printed output and exit statuses of the commands."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ solver_option = click.option(
     "repeated.",
 )  # fmt: skip
 
-#: The options that say where results go and in which form, in the order of the help.
+#: The options for the place and the form of results, in the order of the help.
 OPTIONS = {
     "proof": click.option(
         "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."),
@@ -70,10 +70,7 @@ OPTIONS = {
 
 
 def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """A decorator that adds these `OPTIONS` to a command.
-
-    The command is called with an `Output`, which has their values, as its first argument.
-    """
+    """A decorator that adds these `OPTIONS`; the first argument of the command is an `Output`."""
 
     def add(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)
@@ -90,10 +87,7 @@ def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., 
 
 @dataclass
 class Output:
-    """Where a command writes results, and in which form it prints them.
-
-    Its fields are the values of the `OPTIONS`.
-    """
+    """The values of the `OPTIONS`, with methods that write and print results accordingly."""
 
     proof: bool = False
     html: bool = False
@@ -138,9 +132,9 @@ class Output:
         return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
     def proved(self, work: Callable[[], Proof], folder: Path) -> Proof | None:
-        """The proof, which is also written to the folder; None without --proof.
+        """The proof, also written to `folder`; None without --proof.
 
-        If nothing can be proved, a warning gives the reason, and None is returned.
+        If there is no proof, the result is None, and a warning states the reason.
         """
         if not self.proof:
             return None
@@ -154,10 +148,7 @@ class Output:
         return found
 
     def say_proof(self, proof: Proof | None, folder: Path, status: int) -> int:
-        """Print what is proved, and where proof.json is; return the exit status.
-
-        status : the exit status unless --proof is given and no proof is found
-        """
+        """Print what is proved; return `status`, but NOT_CERTIFIED if --proof finds no proof."""
         if proof is not None:
             click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}", err=self.as_json)
         return NOT_CERTIFIED if self.proof and proof is None else status
@@ -175,9 +166,9 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """If standard error is a terminal, show a status line there while the body of `with` runs.
+    """Show a status line while the body of `with` runs, if standard error is a terminal.
 
-    The line also shows records of the logger `convexrough`.
+    The line also shows the records of the logger `convexrough`.
     """
     if not sys.stderr.isatty():
         yield

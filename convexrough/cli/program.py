@@ -32,7 +32,7 @@ from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError, WorkerError
 from convexrough.version import __version__
 
-#: The environment variable that a shell sets to ask for a script or for completions of a line.
+#: Environment variable by which a shell requests a completion script, or completions of a line.
 COMPLETE = "_CONVEXROUGH_COMPLETE"
 
 
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 say_aside("error", line)
             stopped = isinstance(error, (SolverError, WorkerError))
             return SOLVER_FAILED if stopped else WRONG_INPUT
-        except OSError as error:  # from standard output, as files raise FileError
+        except OSError as error:  # of standard output: errors of files are FileError
             return _unheard(error)
         except Exception:
             if not interrupts:

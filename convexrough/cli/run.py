@@ -29,11 +29,10 @@ from convexrough.errors import FileError, WorkerError, blamed_on
 @click.argument("scene", type=PATH)
 @output_options(*OPTIONS)
 def run(output: Output, scene: Path) -> int:
-    """Compute a scene; write tables, certificate and figures.
+    """Compute a scene; print what is proved; write tables and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
-    with a sphere and friction. If the file has a table [sweep], the command does the same as
-    `convexrough sweep`.
+    with a sphere and friction. A file with a table [sweep] is computed as by `convexrough sweep`.
     """
     from convexrough import checks
     from convexrough.run.results import origin, prove_results, slider_page
@@ -55,7 +54,7 @@ def run(output: Output, scene: Path) -> int:
     with folder as new:
         with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
-        for caution in file.cautions(contact):  # before work that may be long, or fail
+        for caution in file.cautions(contact):  # before computations that may be long, or fail
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
@@ -71,7 +70,7 @@ def run(output: Output, scene: Path) -> int:
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
-    """The pair (K, N) from the text K/N, which asks for share K of N shares, counted from 1."""
+    """The numbers (K, N) in the text K/N; None without a text."""
     if value is None:
         return None
     k, _, n = value.partition("/")
@@ -112,7 +111,7 @@ def sweep(
     the rows computed so far are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):
-        raise click.UsageError("Either SWEEP, or --summary DIR.")
+        raise click.UsageError("Give either SWEEP or --summary DIR.")
     if summary is not None:
         return _say_summary(summary, output)
     if workers is not None and scheduler is not None:

@@ -1,4 +1,4 @@
-"""The commands about solvers (compare, export, gallery, bench), and paper: a published example."""
+"""The commands `compare`, `export`, `gallery` and `bench`, about solvers; and `paper`."""
 
 from __future__ import annotations
 
@@ -102,9 +102,9 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
     from convexrough.run.scene_file import read_scene
 
     file = read_scene(scene)
-    stating = progress(f"stating {len(file.scene):,} asperities")
+    writing = progress(f"writing programs of {len(file.scene):,} asperities")
     folder = output.folder(Path(f"{scene.stem}-programs"), reads=file.inputs)
-    with folder as new, blamed_on(scene), stating:
+    with folder as new, blamed_on(scene), writing:
         new.files, index = write_programs(
             new.path,
             scene.stem,
@@ -141,13 +141,13 @@ def gallery(
 ) -> int:
     """List, export or time hard scenes with 50-digit answers.
 
-    A case is a scene; a family has cases that are hard in the same way. NAMES are names of cases or
+    A case is a scene; the cases of a family are hard in the same way. NAMES are names of cases or
     families; default: all cases. --export writes each case as a quadratic program (.npz for
     qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index; --force replaces
-    an earlier export. --profile prints how often each solver is right, and how fast; with --solver,
-    only Newton's method and the named solvers are timed. Loads are right if all errors are at most
-    0.1 % of the largest load; the contact set is right if exactly the asperities that touch have a
-    load.
+    an earlier export. --profile prints how many solutions of each solver are right, and its times;
+    --solver limits it to Newton's method and the named solvers. Loads are right if all errors are
+    at most 0.1 % of the largest load. The contact set is right if exactly the asperities that touch
+    have a load.
     """
     from convexrough import gallery as wing
     from convexrough.compare import solver_named
@@ -198,8 +198,8 @@ def bench(output: Output, quick: bool, page: Path | None) -> int:
     """Measure time and error of solvers for many scene sizes.
 
     Results go to the folder bench-results unless --out names another. With --page, the command also
-    replaces the text of the page FILE between the markers "bench: begin" and "bench: end", and the
-    figures of the page in the folder "figures" next to FILE.
+    replaces the text of FILE between the markers "bench: begin" and "bench: end", and the figures
+    of FILE, which are in the folder "figures" next to it.
     """
     from convexrough.bench import rows, suite
 

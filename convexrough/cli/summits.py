@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Pressing(NamedTuple):
-    """How to press: as in a scene file, or a sphere; if all are None, nothing is pressed."""
+    """The options that state how to press; if all are None, nothing is pressed."""
 
     scene: Path | None
     radius: float | None
@@ -40,16 +40,16 @@ class Pressing(NamedTuple):
     modulus: float | None
 
     def check(self) -> None:
-        """Raise UsageError for options that exclude each other, or that lack a required one."""
+        """Raise UsageError if options exclude each other, or if a required one is missing."""
         scene, radius, approach, load, modulus = self
         others = any(each is not None for each in self[1:])
         if scene is not None and others:
-            raise click.UsageError("--scene says how to press: omit --radius and similar options.")
+            raise click.UsageError("--scene excludes --radius, --approach, --load and --modulus.")
         if scene is None and others:
             if radius is None or (approach is None) == (load is None):
                 raise click.UsageError("--radius needs exactly one of --approach and --load.")
             if (load is None) != (modulus is None):
-                raise click.UsageError("--load and --modulus go together.")
+                raise click.UsageError("--load needs --modulus, and --modulus needs --load.")
 
     def of(
         self, surface: Surface, prune: float, fit: int
@@ -71,8 +71,7 @@ class Pressing(NamedTuple):
         from convexrough.scene.material import Material
         from convexrough.scene.scene import Scene
 
-        # At a given approach only the loads depend on the modulus. Poisson's ratio affects only
-        # shear.
+        # At a given approach only the loads depend on the modulus. Poisson's ratio is not used.
         stuff = Material(1.0 if self.modulus is None else self.modulus, 0.3)
         base = partial(Scene, self.radius, material=stuff, geometry="closest")
         pressed = partial(press, approach=self.approach, load=self.load)
@@ -97,12 +96,13 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Radius of the sphere, in the unit of the map; not with --scene.")  # fmt: skip
 @click.option("--approach", metavar="D", type=float,
               help="Prescribed approach, in the unit of the map.")  # fmt: skip
-@click.option("--load", metavar="P", type=float, help="Prescribed load.")
-@click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load.")
+@click.option("--load", metavar="P", type=float, help="Prescribed load; needs --modulus.")
+@click.option("--modulus", metavar="E", type=float,
+              help="Contact modulus E*: unit of load per square unit of the map.")  # fmt: skip
 @click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
-              help="Size of a pixel, if the file states none.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Unit of pixel size and heights: µm, mm, ...")
-@click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different.")
+              help="Size of a pixel in --unit, if the file states none.")  # fmt: skip
+@click.option("--unit", metavar="UNIT", help="Unit of pixel and heights: µm, mm, ...")
+@click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if not --unit.")
 @click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
               default="plane", show_default=True,
               help="Form to remove before finding summits.")  # fmt: skip
@@ -126,15 +126,14 @@ def summits(
 ) -> int:
     """Find the summits of a measured surface.
 
-    SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text file with a matrix of
-    heights or three columns: x, y and height. The command can also press a sphere on the middle of
-    the map: give --scene; or --radius and --approach; or --radius, --load and --modulus. It then
-    reports contacts, certificate, crowding (a value above 1 means that contact discs overlap) and
-    model error for several values of --prune, and recommends one of these values. With --whole it
-    also computes, for comparison, the contact of the whole map at the same approach, by boundary
-    elements, one per pixel. In every case the command writes summits.csv, a
-    summary and figures. Results of a.npz go to
-    the folder a-summits unless --out names another.
+    SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text or .xlsx file with a
+    matrix of heights or with columns x, y and height. The command can also press a sphere on the
+    middle of the map: give --scene; or --radius and --approach; or --radius, --load and --modulus.
+    It then reports contacts, certificate, crowding (above 1, contact discs overlap) and model error
+    for several values of --prune, and recommends one of these values. With --whole it also computes
+    the contact of the whole map at the same approach, with one boundary element per pixel, and
+    compares the two. The command always writes summits.csv, a summary and figures, for a.npz to the
+    folder a-summits unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """
@@ -145,10 +144,10 @@ def summits(
     how = Pressing(**{name: options.pop(name) for name in Pressing._fields})
     how.check()
     if whole and how.scene is None and how.radius is None:
-        raise click.UsageError("--whole needs --scene or --radius: how to press.")
+        raise click.UsageError("--whole needs --scene or --radius.")
     folder = output.out or Path(f"{surface.stem}-summits")
     if folder.suffix.lower() in (".csv", ".npz"):
-        raise FileError(f"{folder}: expected the name of a folder, which gets summits.csv")
+        raise FileError(f"{folder}: expected the name of a folder, not of a table")
     reads = [surface, *([how.scene] if how.scene else [])]
     inputs = {str(each): digest(each) for each in reads}
     said: dict[str, Any] = {"inputs": inputs, "versions": versions()}

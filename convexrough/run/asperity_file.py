@@ -22,8 +22,8 @@ RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "forc
 #: Largest number of columns that a message names.
 MOST_NAMED = 5
 
-#: A last row counts as the means or sums of a table if it differs from them by at most this part of
-#: the range (largest minus smallest value) of each column.
+#: A last row counts as the means or sums of the other rows if it differs from these by at most this
+#: fraction of the range of each column.
 ROUNDED = 1e-3
 
 

@@ -43,7 +43,7 @@ def _entry(entry: Entry) -> Summary:
 
 
 def steps(comparison: Comparison) -> list[list[Any]]:
-    """A table of the iterations that solvers logged: headings, then a row for each iteration."""
+    """A table of the logged iterations of solvers: headings, then a row for each iteration."""
     names = ["step", "objective", "residual"]
     rows = [
         [entry.solver, *(step[name] for name in names)]

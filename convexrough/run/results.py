@@ -45,7 +45,7 @@ MOST_CSV_ROWS = 100_000
 #: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
 
-#: A folder that has both is that of a sweep.
+#: A folder with both contains a sweep.
 SWEEP_MANIFEST, SWEEP_PARTS = "manifest.json", "parts"
 
 #: Results may depend on the versions of these packages.
@@ -141,7 +141,7 @@ class Writer:
     def results(
         self, results: Sequence[Result], *, figures: bool, more: Mapping[str, Any] | None = None
     ) -> None:
-        """Write summary.json, including `more`, all tables and, if `figures` is true, figures.
+        """Write summary.json with `more` added, all tables and, if `figures` is true, figures.
 
         All contents are computed before the first file is written.
         """
@@ -173,9 +173,9 @@ def results_folder(
     `folder` exists, the files are moved into it.
 
     force : True to accept a folder with contents; results of another command are refused even then
-    reads : files that the block reads; none of them may be in `folder`
+    reads : files that the block reads; they must not be in `folder`
     formats, dpi : as for `Writer`;  command : the command that writes, an entry of `files.json`
-    said  : entries of `files.json` in addition to the names of the files written
+    said  : further entries of `files.json`
 
     Raises FileError, before the block runs, if `folder` cannot be written or replaced, or if it has
     a damaged `files.json`.
@@ -233,7 +233,7 @@ def remove_earlier(folder: Path) -> None:
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
-    """The contents of `files.json` in the folder; only the command for a sweep; {} without both.
+    """The contents of `files.json` in a folder; {"command": "sweep"} for a sweep; otherwise {}.
 
     Raises FileError if `files.json` is damaged, because then the earlier files are unknown.
     """

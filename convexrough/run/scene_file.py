@@ -41,7 +41,7 @@ MOST_BYTES = 2**25
 #: Columns of a file of asperities, unless the scene file names others.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
 
-#: A dotted key must have fewer parts: the time and memory of tomllib grow with their square.
+#: Largest number of parts of a dotted key: time and memory of tomllib grow with its square.
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
@@ -86,8 +86,8 @@ class Task(Record):
 
         contact : the result of `press()`
 
-        Each result has the methods `summary`, `tables`, `lines`, `figures`, `plot`, `to_dataframe`,
-        which are what the command `run` writes and prints, and the property `certified`.
+        The methods `summary`, `tables`, `lines` and `figures` of a result return what the command
+        `run` writes and prints. Further members are `plot`, `to_dataframe` and `certified`.
 
         Raises InputError and SolverError.
         """
@@ -99,14 +99,14 @@ class SceneFile(Task):
     """The contents of a scene file: the scene, and the stages to compute.
 
     scene, solver : the scene, and the solver of the normal problem
-    approach [length] or load [force] : what is prescribed; the other is None
+    approach [length], load [force] : the prescribed quantity; the other is None
     highest_approach : [length] upper bound on the approach under the prescribed load; the pattern
         has all asperities that can touch up to this approach. None if the pattern is limited in
         another way, or if the asperities are not in a pattern
-    influence : how the compliance matrix is stored; None for the cheapest way
-    stages : the tables of the file that request results, by name; the first table is [normal]
-    path, text : name and text of the file;  seed : seed of its random heights and radii, or None
-    convert : True to convert columns in other units than those of the scene, False to refuse them
+    influence : kind of the compliance operator; None for the default
+    stages : the tables of the file that request results, by name; the first is [normal]
+    path, text : name and text of the file;  seed : seed of random heights and radii, or None
+    convert : True if columns in other units are converted, False if they are an error
     inputs : the SHA-256 of each file that was read, by the path of the file
 
     >>> file = cr.read_scene(new_scene)
@@ -291,7 +291,7 @@ def _lattice(
     """The scene with asperities in a pattern, and `highest_approach` of the task.
 
     The pattern extends to the distance `within` or, without this key, to all asperities that could
-    touch: at the approach or load in [normal], or at the largest load that another stage names.
+    touch at the approach or load in [normal], or at the largest load in another table.
     """
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips

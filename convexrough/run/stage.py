@@ -1,9 +1,9 @@
 """Base classes of stages and of their results.
 
 A stage is a table of the scene file that requests a result. Its class checks the keys, and computes
-the result from a pressed contact; printed lines, tables, figures and the summary are derived from
-it. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
-an entry in `STAGES` there; docs/architecture.md shows an example with 40 lines.
+the result from a pressed contact. Summary, tables, figures and printed lines are derived from the
+result. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
+an entry in `STAGES`; docs/architecture.md has an example of 40 lines.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 Labels = Mapping[str, Sequence[float]]
 
-#: Statuses of asperities, which are also keys for the number of asperities with each status.
+#: Statuses of asperities, which are also names of the number of asperities with each status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
 #: Names of numbers in results and of keys of scene files, by physical dimension; other numbers are
@@ -53,7 +53,7 @@ KIND = {name: kind for kind, names in KINDS.items() for name in names}
 #: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
-#: Of a table of steps at most this many rows are printed: the last ones.
+#: Largest number of printed rows of a table of steps: the last rows are printed.
 MOST_PRINTED = 20
 
 
@@ -103,7 +103,7 @@ class Stage(FileTable):
 
     @classmethod
     def sheared_by(cls, keys: Any) -> str:
-        """What needs the table [friction] if the stage has these keys; "" if nothing does."""
+        """The part of a stage with these keys that needs [friction], for messages; "" if none."""
         return f"[{cls.name}]"
 
     def compute(self, contact: Contact) -> Result:
@@ -115,7 +115,7 @@ class Stage(FileTable):
 
 
 def limit(contact: Contact) -> float:
-    """[force] the friction limit: the coefficient of friction times the total load."""
+    """[force] the friction limit, the coefficient of friction times the total load."""
     return checks.friction(contact.scene.friction) * contact.load
 
 
@@ -190,7 +190,7 @@ class Result(Record):
         return self.known if self.stage.labels else self.known[0]
 
     def doubts(self) -> Iterator[str]:
-        """The reasons why this result is not certified, one line for each."""
+        """The reasons why this result is not certified."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
             many = "status" if unsure == 1 else "statuses"
             yield f"not certified: {unsure} {many} in {self.name} undecided"
@@ -237,10 +237,7 @@ class Result(Record):
         return {}
 
     def lines(self) -> list[str]:
-        """The lines of the printed table and, for some results, a line about a proof.
-
-        That line says whether it is proved that indentations increase with the load.
-        """
+        """The printed lines: a table and, where it matters, what is proved about order."""
         most = MOST_PRINTED if self.steps else len(self.known)
         said = self.printed_table(self.name, self.known, self.headings(), self.title, most)
         proved = ", ".join(sorted(self.orders))

@@ -37,7 +37,7 @@ from convexrough.scene.material import Material
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
-#: [Pa] smallest and largest accepted modulus: below those of gels, and above that of diamond.
+#: [Pa] smallest and largest accepted modulus: below moduli of gels, above that of diamond.
 SOFTEST, HARDEST = 1e3, 1e13
 MODULI = ("contact_modulus", "youngs_modulus", "hardness")
 
@@ -176,7 +176,7 @@ REQUIRED: dict[str, type[FileTable]] = {
 
 
 class Study(FileTable):
-    """All tables of a scene file except those of further stages, which `_model` adds."""
+    """All tables of a scene file but those of further stages, which `_model` adds."""
 
     sphere: SphereTable
     material: Annotated[
@@ -194,7 +194,7 @@ class Study(FileTable):
 
     @property
     def stages(self) -> dict[str, Stage]:
-        """The stages that the file asks for, by name, in the order of results."""
+        """The stages that the file requests, by name, in the order of results."""
         found = {name: getattr(self, name) for name in STAGES}
         return {name: stage for name, stage in found.items() if stage is not None}
 
@@ -203,10 +203,10 @@ class Study(FileTable):
         """Mistakes: unknown tables, missing tables, and keys that need a key of another table."""
         for name, keys_within in keys.items():
             if name == "sweep":
-                yield name, "[sweep]: many scenes, which only `convexrough sweep` computes"
+                yield name, "[sweep]: only `convexrough sweep` computes many scenes"
             elif name not in cls.model_fields:
                 a_table = isinstance(keys_within, dict)
-                what = f"[{name}]: unknown table" if a_table else f"{name}: in no table"
+                what = f"[{name}]: unknown table" if a_table else f"{name}: not in a table"
                 yield name, f"{what}, {nearest(name, cls.model_fields)}"
         if "friction" not in keys:
             found = (STAGES[name].sheared_by(keys[name]) for name in STAGES if name in keys)
@@ -254,7 +254,7 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The checked tables of a parsed file or None; and the messages, in the order of the file."""
+    """The checked tables of a parsed file, or None; and the mistakes, in the order of the file."""
     if "" in contents:
         return None, ['[""]: unknown table, expected a name']
     model = _model(tuple(STAGES.values()))

@@ -38,7 +38,7 @@ Mistake = tuple[str, str]
 
 
 def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
-    """A validator that also requires `holds`; its messages say "expected", and then the phrase."""
+    """A validator that also requires `holds`; messages end with "expected" and the phrase."""
 
     def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
         try:
@@ -52,7 +52,7 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
     return WrapValidator(check)
 
 
-#: The type of a value in the file, "(list)" or "(number)"; messages omit such tags in brackets.
+#: The type of a value in the file, "(list)" or "(number)"; messages omit tags in brackets.
 NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
 
 _SIZED = expected(SIZED, is_sized)
@@ -95,12 +95,12 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table of a file. Infinite numbers, text for numbers and unknown keys are mistakes."""
+    """A table of a file. Infinite numbers, texts in place of numbers, unknown keys are mistakes."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
     alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
-    needs: ClassVar[Mapping[str, str]] = {}  # for a key, the key that must be given with it
+    needs: ClassVar[Mapping[str, str]] = {}  # for each key, one required with it
     elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # name, keys unused with it
 
     @model_validator(mode="wrap")
@@ -123,7 +123,7 @@ class FileTable(BaseModel):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes in the set of given keys, whatever their values: unknown or missing ones."""
+        """Mistakes in the set of given keys: unknown, missing or excluded keys."""
         stage, others = cls.elsewhere
         for key in keys:
             if key in cls.model_fields:

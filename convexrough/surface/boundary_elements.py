@@ -28,10 +28,8 @@ from convexrough.influence.convolution import SiteBox
 from convexrough.record import Along, Table
 from convexrough.surface.surface import Surface
 
-#: Largest number of steps of conjugate gradients, and accepted error of gaps, divided by the
-#: largest overlap.
+#: Largest number of steps of conjugate gradients, and accepted error of gaps / largest overlap.
 STEPS, ACCURACY = 2000, 1e-4
-
 
 #: The operator from pressures on pixels to displacements [length] at their centres.
 HalfSpace = Callable[[Array], Array]
@@ -40,10 +38,10 @@ HalfSpace = Callable[[Array], Array]
 def half_space(
     shape: tuple[int, int], pixel: tuple[float, float], contact_modulus: float
 ) -> HalfSpace:
-    """The operator from pressures to the sum of the displacements of both bodies.
+    """The operator from pressures to the sum of the normal displacements of both bodies.
 
-    A pixel of unit pressure displaces a point by (1 / (pi E*)) times the integral of 1/r over the
-    pixel, where r is the distance from this point. Love (1929) gives this integral in closed form.
+    Unit pressure on a pixel displaces a point by (1 / (pi E*)) times the integral of 1/r over the
+    pixel, with the distance r from this point. Love (1929) gives this integral in closed form.
     """
 
     def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
@@ -64,9 +62,9 @@ def touch(
     """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
     This is the method of Polonsky and Keer (Wear 231, 1999) at a given approach. Each step sets
-    negative pressures to 0, and pixels on which the bodies overlap are added to the touching ones.
-    After an addition the search directions restart. The method ends if |g| <= accuracy * max h on
-    pixels with p > 0, and g >= -accuracy * max h on pixels with p = 0 < h.
+    negative pressures to 0, and adds pixels with negative gap to the touching ones. After such an
+    addition the search directions restart. The method ends if |g| <= accuracy * max h on pixels
+    with p > 0, and g >= -accuracy * max h on pixels with p = 0 < h.
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
@@ -100,15 +98,15 @@ def touch(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Whole(Table):
-    """The contact of a whole map, by boundary elements, and of asperities at the same approach.
+    """Contacts at the same approach: of a whole map by boundary elements, and of asperities.
 
     contact   : contact of the asperities
     pressures : (ny, nx) [force/length^2] pressures on the pixels
     loads     : (n,) [force] total load on the pixels nearest to each asperity
     load, area : [force], [length^2] total load and contact area of the map
     pieces    : number of connected regions of loaded pixels
-    resolution : relative change of the load if pixels are twice as wide, which indicates the error
-        due to the pixel size
+    resolution : relative change of the load for pixels twice as wide, a measure of the error due
+        to the pixel size
 
     An example is under `press_whole`.
     """
@@ -124,7 +122,7 @@ class Whole(Table):
     resolution: float
 
     def compared(self) -> list[tuple[str, float, float]]:
-        """Rows of a quantity, its value for the asperities, and its value for the whole map."""
+        """For each quantity its name, its value for the asperities, and for the whole map."""
         model = self.contact
         area = float((np.pi * model.contact_radii**2).sum())
         touching = int(np.count_nonzero(model.loads))
@@ -145,7 +143,8 @@ class Whole(Table):
 def press_whole(surface: Surface, contact: Contact) -> Whole:
     """The contact of a whole map by boundary elements, one per pixel.
 
-    contact : contact of the map's summits. Its approach is used, and its sphere, centred on the map
+    contact : contact of the summits of the map. Its approach is prescribed, and its sphere is
+        pressed on the middle of the map
 
     Raises InputError if the asperities are not `Summits` of this map, if no pixel touches, or if
     the contact reaches the edge of the map.
@@ -171,7 +170,7 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])
     if any(edge.any() for edge in edges):
         found = "contact at the edge of the map"
-        expected = "a larger map, or a smaller approach or load; all else works without --whole"
+        expected = "a larger map, a smaller approach or load, or no --whole"
         raise InputError("map", found=found, expected=expected)
     row, column = np.nonzero(touching)
     x, y = _places(surface, 1)

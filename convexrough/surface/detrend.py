@@ -14,12 +14,11 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and relative size of a step after which
-#: no further one is made.
+#: Largest number of Gauss-Newton steps to the best sphere, and relative size of the last step.
 STEPS, ENOUGH = 50, 1e-12
 
-#: The terms of a form cannot be told apart on the measured pixels if the least eigenvalue of their
-#: correlation matrix is below this.
+#: The measured pixels do not determine a form if the least eigenvalue of the correlation matrix of
+#: its terms is below this.
 ALIKE = 1e-10
 
 
@@ -29,8 +28,8 @@ class Removed:
 
     kind      : "plane", "sphere" or "paraboloid" (of a cylinder or an ellipsoid)
     height, slopes : [length] height, and slopes along x and y, at the middle of the map
-    curvature : [1/length] curvature of a sphere, or mean curvature of a paraboloid, positive for a
-        hill; 0 for a plane
+    curvature : [1/length] curvature of a sphere, or mean curvature of a paraboloid; positive for a
+        hill, 0 for a plane
     curvatures : [1/length] curvatures of a paraboloid along its two axes, the larger first; zeros
         for other forms
     """
@@ -66,8 +65,8 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     """The form of this kind that fits best by least squares, and its heights (ny, nx).
 
     The form is fitted to the pixels that are not holes (nan). Its heights are nan in the holes.
-    docs/theory/surfaces.md, "Removing the form", describes the method. The code divides lengths by
-    about half the longer side of the map.
+    docs/theory/surfaces.md, "Removing the form", derives the method. In the code, lengths are
+    divided by about half the longer side of the map.
 
     Raises InputError if no sphere fits, or if the heights do not determine the form.
     """
@@ -101,8 +100,8 @@ def _sphere(
 ) -> tuple[tuple[float, tuple[float, float], float], Array]:
     """The best sphere: its height, slopes and curvature in the middle, and its heights.
 
-    The method is Gauss-Newton steps for the equation z = q + k z^2 / 2, where
-    q = a + b x + c y + k (x^2 + y^2) / 2.
+    The parameters of z = q + k z^2 / 2, with q = a + b x + c y + k (x^2 + y^2) / 2, are found by
+    Gauss-Newton steps.
     """
     z, shape, (_, x, y) = np.zeros_like(wanted), np.zeros(4), terms
     for _ in range(STEPS):

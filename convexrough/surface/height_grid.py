@@ -17,11 +17,11 @@ OFF_GRID = 0.05
 class HeightGrid(NamedTuple):
     """The heights in a file, and the pixel and units that the file states.
 
-    heights : nan where the file states no height; marks such as -9999 are unchanged
+    heights : nan where the file states no height; marks of holes such as -9999 are unchanged
     pixel : size of a pixel along x and y; None if not stated
     unit, height_unit : units of the pixel and of the heights; "" if not stated
-    unclear : the first comment that states a length or a unit of length, but not in words that
-        `read` knows; "" if there is none
+    unclear : the first comment with a length or a unit of length that `read` does not understand;
+        "" if there is none
     sheet : the name of the sheet of a workbook, in quotes; else ""
     """
 
@@ -42,12 +42,12 @@ def refuse_other(
 
 
 def placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """The result of `on_grid`; x and y belong to columns and rows, or to the single heights."""
+    """The result of `on_grid`; x and y are those of columns and rows, or of each height."""
     vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
     shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
     if heights.shape != shape or not (vectors or y.shape == shape):
         found, expected = (" by ".join(map(str, it)) for it in (heights.shape, shape))
-        expected += ", as y and x are long" if vectors or x.shape == y.shape else ", y as well"
+        expected += ", as y and x require" if vectors or x.shape == y.shape else ", for y, too"
         expected += "; transpose it" if heights.T.shape == shape else ""
         raise InputError("heights", found=found, expected=expected)
     return on_grid(x, y, heights)
@@ -76,7 +76,7 @@ def on_grid(x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
 
 
 def steps(name: str, values: Array) -> tuple[Indices, float]:
-    """The index, from 0, of each coordinate's grid line, and the distance between grid lines."""
+    """The index, from 0, of the grid line of each coordinate, and the distance of grid lines."""
     levels = np.unique(values)
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:
@@ -85,9 +85,8 @@ def steps(name: str, values: Array) -> tuple[Indices, float]:
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     span = float(levels[-1] - levels[0])
     digit = _last_digit(levels)
-    # Lines of the grid can be missing. If coordinates are rounded, they lie off the lines by less
-    # than one last digit: by their own rounding, half a digit, and by that of the first and last
-    # line.
+    # Lines of the grid can be missing. Rounded coordinates differ from the lines by less than one
+    # unit of the last digit: half a unit from their own rounding, and half from that of the ends.
     for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
         step = span / count
         lines = (values - levels[0]) / step

@@ -36,8 +36,8 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position, and maxima of prominence 0 are left out, so that
-    a plateau has one maximum.
+    Pixels of equal height are ordered by position. Maxima of prominence 0 are omitted, so that a
+    plateau has one maximum.
     """
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)
@@ -65,8 +65,8 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    The passes are edges of the spanning tree that joins the hills over the highest crossings
-    (Kruskal's algorithm).
+    The passes are edges of the spanning tree of hills that Kruskal's algorithm builds from the
+    highest crossing down.
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
@@ -78,7 +78,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
     passes = np.zeros(count, dtype=np.intp)
-    leader = list(range(count))  # for each hill, a taller one of its joined group, or itself
+    leader = list(range(count))  # for each hill, itself or a taller hill of its group
 
     def tallest(hill: int) -> int:
         while leader[hill] != hill:
@@ -98,9 +98,9 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """For each pair of neighbouring pixels in different hills: their hills, and a rank.
+    """For pairs of neighbouring pixels in different hills: both hills, and the lower rank.
 
-    Of the numbers of the two hills, the smaller is first. The rank is that of the lower pixel.
+    The hill with the smaller number is first.
     """
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]

@@ -1,4 +1,4 @@
-"""Holes of a map, filled by a harmonic function, and pixels that look like errors."""
+"""Holes of a map, filled by a harmonic function, and pixels with implausible heights."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 #: Entries in a map of hole numbers: for a pixel that has a height, and outside of the map.
 KNOWN, OUTSIDE = -1, -2
 
-#: Least difference of a spike's height from the median, divided by the standard deviation that the
-#: quartiles of the heights suggest.
+#: Least difference of the height of a spike from the median, divided by the standard deviation that
+#: is estimated from the quartiles.
 OUTLYING = 6.0
-
 
 #: Approximate number of pixels in the sample in which `repeated` counts heights.
 SAMPLE = 2**17
@@ -27,9 +26,8 @@ def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels that have at most one similar neighbour.
 
     A pixel is outlying if its height differs from the median by more than OUTLYING standard
-    deviations. One of the eight neighbours is similar if the heights of neighbour and pixel differ
-    by less than half of the difference between pixel and median. Holes (nan) are neither outlying
-    nor similar.
+    deviations. One of its eight neighbours is similar if the two heights differ by less than half
+    of the difference between pixel and median. Holes (nan) are neither outlying nor similar.
     """
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
@@ -43,11 +41,11 @@ def spikes(heights: Array) -> Indices:
 
 
 def clipped(heights: Array) -> int:
-    """The number of pixels with the largest height if these are surprisingly many, else 0.
+    """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    They are surprisingly many if there are at least ten, and more than there are pixels just below.
-    A pixel is just below if its height is less than the largest one by at most 1 % of the range of
-    heights. If there is no such pixel, those with the second largest height count instead.
+    They are surprisingly many if they are at least ten, and more than the pixels just below. These
+    are lower than the largest height by at most 1 % of the range of heights; if there are none,
+    they are the pixels with the second largest height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -57,11 +55,10 @@ def clipped(heights: Array) -> int:
 
 
 def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height if it is surprising, else 0.
+    """The number of pixels with the most frequent height if they are surprisingly many, else 0.
 
-    The number is surprising if the height is at least 20 times as frequent in a sample as any other
-    height, and occurs on at least 20 pixels of the sample. The largest height does not count:
-    `clipped` treats it.
+    They are surprisingly many if, in a sample, they are at least 20, and 20 times as many as the
+    pixels of any other height. The largest height does not count: `clipped` treats it.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)
@@ -73,10 +70,9 @@ def repeated(heights: Array) -> int:
 
 
 def copied(heights: Array) -> float:
-    """The share of rows that equal the row before, or of columns that equal the column before.
+    """The fraction of rows that equal the row before, or the same of columns if that is larger.
 
-    The result is the larger of the two. Rows and columns in which all heights are equal do not
-    count.
+    Rows and columns in which all heights are equal do not count.
     """
     return max(
         float(((lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)).mean())
@@ -89,7 +85,7 @@ def copied(heights: Array) -> float:
 def filled(heights: Array) -> Array:
     """The map with filled holes (nan): each is the mean of the pixels that share a side with it.
 
-    So no filled pixel becomes a summit. At least one pixel of the map must not be a hole.
+    So no filled pixel becomes a summit. At least one pixel must have a height.
     """
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:

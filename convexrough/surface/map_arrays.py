@@ -20,16 +20,13 @@ from convexrough.tabular.arrays import named_arrays
 HEIGHTS = ("heights", "height", "z")
 
 #: STATED: arrays of an .npz or .mat file that state the pixel and the units. SCALES: parts of names
-#: of arrays that probably change the meaning of the heights. An array with such a name is an error,
-#: even if it is a text or a vector.
+#: of other arrays that probably change the meaning of the heights; such arrays are errors.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
 )
 
-
-#: A pixel stated in a file of arrays may differ from the steps of x and y, which may be rounded, by
-#: this fraction.
+#: Largest relative difference of a stated pixel from the steps of x and y, which may be rounded.
 ROUNDED = 1e-3
 
 
@@ -66,7 +63,7 @@ def arrays_map(path: Path) -> HeightGrid:
 
 
 def _may_change(values: NDArray[Any], heights: NDArray[Any]) -> bool:
-    """True for numbers that could change the meaning of heights: a factor, a mask, coordinates."""
+    """True for numbers that may change the meaning of heights: a factor, a mask, coordinates."""
     alike = values.size in (1, heights.size, *heights.shape)
     return values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
 
@@ -119,7 +116,7 @@ def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> Hei
             topography = reader.topography(**given)
     except ReadFileError as error:
         reason = str(error).partition("\n")[0] or type(error).__name__
-        if reason.startswith("tried"):  # all of its formats, and lists an error for each
+        if reason.startswith("tried"):  # a list with an error for each of its formats
             reason = "it is in none of its formats; export the map as text, for example"
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     if topography.dim != 2:

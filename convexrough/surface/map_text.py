@@ -32,18 +32,16 @@ _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 #: Words that announce a scale.
 _SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
 
-#: A table of at most this many columns is not a map if two of them are coordinates of a grid.
+#: A table with at most this many columns is not a matrix if two of them are coordinates of a grid.
 MOST_COLUMNS = 6
 
 
 def text_map(path: Path) -> HeightGrid:
     """The map in a text file.
 
-    A file with three columns or with names of columns is read as x, y and height, any other as a
-    matrix.
-
-    Raises FileError if the file is not text, and InputError with row and column if it contains no
-    map.
+    A file with three columns or with names of columns is read as x, y and height, any other file as
+    a matrix. Raises FileError if the file is not text; InputError, with row and column, if it
+    contains no map.
     """
     known = ("x", "y", "height", *COLUMNS["height"].also)
     table = read_text_table(path, known, _COMMENT, is_map=True)
@@ -98,7 +96,7 @@ def _refuse_gaps(rows: Sequence[int]) -> None:
 
 
 def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
-    """The error for a row or column of coordinates or counts (`line`) in place of heights."""
+    """The error for a row or column `line` of coordinates or counts in place of heights."""
     said = ", ".join(f"{each:g}" for each in line[:3])
     expected = "heights alone: leave coordinates and numbers of rows and columns out, with pandas "
     expected += "by header=False, index=False"
@@ -136,8 +134,8 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes.
 
-    Other columns are an error, because they could be a mask or a factor of the heights. Exceptions
-    are those of `_is_label`.
+    Other columns are an error unless `_is_label` is true, because they could be a mask or a factor
+    of the heights.
     """
     names, number = cells.header.cells if cells.header else [], cells.style.number
     if names and all(number(name.replace(",", ".")) is not None for name in names):

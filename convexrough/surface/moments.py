@@ -12,16 +12,16 @@ from convexrough.record import Record
 
 @dataclass(frozen=True, repr=False)
 class Moments(Record):
-    """Moments of the profiles of a surface, and summits of a Gaussian surface with these moments.
+    """Moments of the profiles of a surface, and statistics of summits that follow from them.
 
     m0 : [length^2] variance of the heights
-    m2 : variance of the slope of profiles: the mean for profiles along x and along y
-    m4 : [1/length^2] variance of the second derivative of profiles: the same mean
+    m2 : mean square slope of profiles, averaged over profiles along x and along y
+    m4 : [1/length^2] mean square second derivative of profiles, averaged likewise
     slope_ratio : rms slope along y divided by rms slope along x; 1 if the surface has no preferred
         direction
 
-    The formulas (Nayak 1971, McCool 1987) hold for all maxima (summits before any pruning) of an
-    isotropic Gaussian surface that its pixels resolve.
+    The formulas (Nayak 1971, McCool 1987) hold for all maxima, without pruning, of an isotropic
+    Gaussian surface that its pixels resolve.
 
     >>> moments = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256).moments
     >>> print(f"{moments.bandwidth:.3g} {moments.m2:.4f}")

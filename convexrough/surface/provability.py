@@ -1,10 +1,9 @@
 """How the proof and the model error of a contact depend on the pruning of its summits.
 
-Pruning removes hills of small prominence. The prominence is the height of a maximum above the
-highest pass to a taller maximum. With weak pruning many summits are close to others. If the contact
-discs of two summits overlap, the two are really one contact, which the model of point forces does
-not describe. Crowded summits can also make the energy nonconvex, and then the solution cannot be
-proved.
+Pruning removes hills of small prominence, which is the height of a maximum above the highest pass
+to a taller maximum. With weak pruning many summits are close to others. Two summits with
+overlapping contact discs are one contact, which the model of point forces does not describe. The
+energy of crowded summits can also be nonconvex, and then the solution cannot be proved.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from convexrough.surface.summits import Summits
 #: Default prunings, as fractions of the height Sz of the map.
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: OVERLAP: crowding above which contact discs overlap. TOO_FAR: largest trusted model error.
+#: Crowding above which contact discs overlap, and largest trusted model error.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
 #: A function that presses a sphere on asperities.
@@ -40,10 +39,10 @@ Press = Callable[[Asperities], Contact]
 class Provability(Table, Plottable):
     """Contacts of the summits left by m prunings, the weakest pruning first. Arrays are (m,).
 
-    prune, heights : least prominence of a hill that is not removed, as a fraction of the height Sz
-        of the map and as a [length]
+    prune, heights : least prominence of the hills that are left, as a fraction of the height Sz of
+        the map and as a [length]
     summits, contacts, undecided : numbers of summits, of summits that are proved to touch, and of
-        undecided summits; without a proof, those with a load count as touching
+        undecided summits; without a proof, summits with a load count as touching
     scope       : scope of the certificate; "failed" if no solution was found
     crowding, model_error : as in `Contact`; nan if no solution was found
     approaches, loads : [length] approach and [force] load of each contact
@@ -78,16 +77,16 @@ class Provability(Table, Plottable):
 
     @property
     def trusted_from(self) -> float:
-        """The smallest pruning that is trusted with all stronger ones; nan if there is none."""
+        """The smallest pruning that is trusted together with all stronger ones; nan if none is."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
 
 
 def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEVELS) -> Provability:
-    """The contact of the remaining summits at each pruning, with its scope and model error.
+    """The contacts of the summits that are left at each pruning.
 
-    summits : summits found with a pruning of at most the smallest level, such as 0
+    summits : summits found with a pruning of at most the smallest one in `levels`, such as 0
     press   : function that returns the Contact of asperities
     levels  : prunings, as fractions of Sz; the curve ends where no summit is left
 
@@ -112,7 +111,7 @@ def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEV
 
 
 def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
-    """(m, 2) the pairs of asperities with a crowding above a value, and (m,) their crowdings.
+    """(m, 2) pairs of asperities with a crowding above a value, and (m,) their crowdings.
 
     The crowding of a pair is (a_i + a_j) / r_ij, with contact radii a and the distance r. The most
     crowded pairs are first.
@@ -141,9 +140,8 @@ def model_errors(contact: Contact) -> Array:
 
     The Hertz pressure of a neighbour at the distance r_ij, with the contact radius a_j and the load
     P_j, displaces the surface more than a point force P_j does. The difference is
-    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The sum over neighbours is divided by the
-    asperity's approach D0 + d_i, where D0 is the approach of the contact and d_i an entry of the
-    scene's `offsets`.
+    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The model error is the sum over neighbours divided
+    by D0 + d_i, with the approach D0 and the entry d_i of `Scene.offsets`.
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

@@ -1,8 +1,4 @@
-"""`read`: a surface from a file, with all lengths in one unit.
-
-A map is a matrix of heights, or a list of x, y and height. Text, files of arrays (.npy, .npz, .mat)
-and files of instruments can contain one.
-"""
+"""`read`: a surface from a file, with all lengths in one unit."""
 
 from __future__ import annotations
 
@@ -30,12 +26,12 @@ TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 #: Rms slopes outside this range suggest that heights and pixels are in different units.
 SLOPES = (1e-5, 10.0)
 
-#: Three kinds of numbers may mark holes: those in MARKS, those of absolute value at least HUGE, and
-#: the largest and the smallest number. Such a number marks holes if it differs from the median of
-#: the other heights by more than FAR times their range.
+#: Numbers in MARKS, numbers of absolute value at least HUGE, and the extreme numbers of a map may
+#: mark holes. Such a number does so if it differs from the median of the other heights by more than
+#: FAR times the range of these.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
-#: Two pixel sizes count as equal up to this relative difference.
+#: Pixel sizes count as equal up to this relative difference.
 SAME = 1e-6
 
 
@@ -52,14 +48,12 @@ def read(
 
     pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
     unit   : unit of the pixel; None if the file states it or if it is unknown
-    height_unit : unit of the heights; by default that of the pixel. It is an error if `unit` or
-        `height_unit` differs from what the file states. Heights in another unit than the pixel are
-        converted to the unit of the pixel
-    detrend : the form whose best fit is subtracted: "plane", "sphere" or "paraboloid"; None to
-        subtract nothing
+    height_unit : unit of the heights, which are converted to that of the pixel; default: the same.
+        It is an error if `unit` or `height_unit` differs from what the file states
+    detrend : the form that is fitted and subtracted: "plane", "sphere", "paraboloid" or None
     fill   : True to fill holes with a harmonic function, after the form is fitted to the other
-        pixels; False to refuse holes. Holes are nan, masked values, BAD in text, and marks far from
-        all heights, such as -9999 or 1e38
+        pixels; with False, holes are an error. Holes are nan, masked values, BAD in text, and marks
+        far from all heights, such as -9999 or 1e38
 
     An .npz or .mat file contains `heights`. It may also contain `unit`, `height_unit`, `pixel`, and
     coordinates x and y: either x of each column and y of each row, or x and y of each height. Other
@@ -68,8 +62,8 @@ def read(
     list of x, y and height on a grid. Formats of instruments need the package SurfaceTopography
     (the extra `surface`).
 
-    Raises FileError if the file cannot be read, or needs SurfaceTopography, which is not installed;
-    InputError if the file contains no usable map.
+    Raises FileError if the file cannot be read, or if SurfaceTopography is needed but not
+    installed; InputError if the file contains no usable map.
 
     >>> np.savez(folder / "scan.npz", heights=np.random.default_rng(1).normal(size=(64, 64)))
     >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
@@ -120,14 +114,14 @@ def _pixel(
         raise InputError("pixel", found="none", expected=expected)
     said = checked_pixel(known)
     there = said if found is None else checked_pixel(found)
-    refuse_other(said, there, SAME, "as the file says, or none given")
+    refuse_other(said, there, SAME, "as the file states, or none given")
     return there
 
 
 def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
     """The heights with nan in holes, and a map of the holes (None if there are no holes).
 
-    Raises InputError for holes unless `fill` is true, and if all pixels are holes.
+    Raises InputError if all pixels are holes; for any holes if `fill` is false.
     """
     if heights.size == 0:
         return heights, None  # `Surface` refuses it

@@ -28,7 +28,7 @@ from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
-#: The unit of each column and statistic with a unit; {} stands for the unit of length.
+#: The units of columns and statistics; {} stands for the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curvature"), "1/{}")
 LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
@@ -36,17 +36,17 @@ LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 #: At most this many crowded pairs of summits are printed.
 MOST_LISTED = 10
 
-#: A contact farther from the middle than this fraction of the map's half width causes a warning.
+#: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
 
-#: Largest relative difference without a warning: of a statistic of the summits from its value for a
-#: Gaussian surface, and of the asperities' load from that of the whole map.
+#: Largest relative difference without a warning: between a statistic of the summits and its value
+#: for a Gaussian surface, and between the loads of the asperities and of the whole map.
 UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """A surface, all summits, those left by pruning, and the result of pressing these.
+    """A surface, its summits, and the results of pressing them.
 
     maxima, summits : all summits, and those left by pruning
     curve   : contacts at several prunings; None if nothing was pressed
@@ -136,7 +136,7 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def _in_unit(name: str, unit: str) -> str:
-    """A column's name, with the column's unit if it has one."""
+    """The name of a column, with its unit if it has one."""
     return f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name
 
 
@@ -164,8 +164,8 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("tip radius", f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
                        f"  (paraboloids over {origin.fit} by {origin.fit} pixels)"),
         ("eccentricity", f"median {np.median(summits.eccentricities):.2f}, largest "
-                         f"{summits.eccentricities.max():.2f}  (elliptic tips would carry up to "
-                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more)"),
+                         f"{summits.eccentricities.max():.2f}  (elliptic tips carry up to "
+                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more than spheres)"),
         ("rms misfit", f"median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"
                        "  (distance of pixels from the fitted sphere)"),
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
@@ -179,7 +179,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
-        table: list[Any] = [["the same approach", "asperities", "whole map", "difference"]]
+        table: list[Any] = [["at one approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
         described += ["", *aligned(table, left=1)]
         change = f"{100 * scanned.whole.resolution:.2g} %"
@@ -194,13 +194,13 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
         scene = scanned.contact.scene
         with_form, form = scene.curvature + curvature, 1.0 / curvature
         both = f"{1.0 / with_form:.6g}" if with_form > 0 else "no hill"
-        said = f"{scene.mean_radius:.6g}; the removed form, {form:.6g}, is not in it: together"
+        said = f"{scene.mean_radius:.6g}, without the removed form ({form:.6g}); with it"
         yield "pressing radius", f"{said} {both}"
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
     found = scanned.maxima.statistics, scanned.summits.statistics, scanned.surface.moments
-    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "by moments"]]
+    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "from moments"]]
     for name in found[0]._fields:
         named = _in_unit(name, scanned.surface.unit).replace("_", " ")
         table.append([named, *(getattr(each, name) for each in found)])
@@ -230,14 +230,14 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:"
+        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of summits.csv from 0:"
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
             table.append([str(i), str(j), f"{value:.3g}", x[i], y[i]])
         yield from (f"    {line}" for line in aligned(table))
         if (more := len(pairs) - MOST_LISTED) > 0:
-            yield f"    and {more:,} more: --json has all"
+            yield f"    and {more:,} more; --json prints all"
     strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
     if len(strained):
         named = ", ".join(map(str, strained[:MOST_LISTED]))
@@ -271,14 +271,14 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
         yield (
             f"slopes along one axis are {min(ratio, 1e6):.3g} times those along the other: the "
-            "moments assume a surface without a preferred direction, and tips are ridges"
+            "statistics from moments assume no preferred direction, and tips are ridges"
         )
     for name in ("density", "mean_curvature"):
         counted, expected = getattr(found, name), getattr(said, name)
         if abs(counted / expected - 1) > UNLIKE:
             yield (
-                f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} of what the "
-                "spectral moments of a Gaussian surface would give"
+                f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} times that of "
+                "a Gaussian surface with the same spectral moments"
             )
     yield from _near_holes(scanned)
     if scanned.curve is None:

@@ -11,7 +11,7 @@ from convexrough.scene.asperities import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
-#: Default of the shortest wavelength, in pixels; at this wavelength pixels resolve tips.
+#: Default of the shortest wavelength, in pixels. Pixels of this size resolve tips.
 RESOLVED = 8.0
 
 
@@ -26,7 +26,7 @@ def self_affine(
     cutoff: float | None = None,
     unit: str = "",
 ) -> Surface:
-    """A square periodic map with a self-affine spectrum.
+    """A square periodic map of random heights with a self-affine spectrum.
 
     hurst     : Hurst exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst)) with the wave
         number q
@@ -37,8 +37,8 @@ def self_affine(
     cutoff    : [length] shortest wavelength; default 8 pixels
     unit      : unit of length, as in `Surface`
 
-    Maps that differ only in `pixels` and `pixel` show the same surface at different resolutions, if
-    they agree in the size pixels * pixel and a given `cutoff`.
+    With the same `cutoff`, the same size pixels * pixel and different `pixels`, maps show the same
+    surface at different resolutions.
 
     >>> surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256)
     >>> surface.heights.shape
@@ -64,7 +64,7 @@ def self_affine_moments(
     pixel: float = 1.0,
     cutoff: float | None = None,
 ) -> Moments:
-    """The exact moments of `self_affine`, with the same arguments.
+    """The exact moments of the maps of `self_affine`, with the same arguments.
 
     >>> exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=256)
     >>> print(f"{exact.m2:.4f}")
@@ -86,8 +86,8 @@ def _waves(
 ) -> tuple[Indices, Array]:
     """The waves of a map, one for each pair of opposite wave vectors.
 
-    The result is (n, 2) the numbers of wavelengths across the map, along x and y, and (n,) the
-    variances [length^2]. The order of the waves does not depend on the number of pixels.
+    The result is (n, 2) the numbers of wavelengths in the map along x and y, and (n,) the variances
+    [length^2]. The order of the waves does not depend on the number of pixels.
     """
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)

@@ -1,4 +1,4 @@
-"""Summits of a map as asperities: paraboloids fitted about maxima, with data on map and fits."""
+"""Summits of a map as asperities: paraboloids fitted about maxima, and data on the search."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ from convexrough.surface.moments import Moments
 
 @dataclass(frozen=True, repr=False)
 class Origin(Record):
-    """The map that contains the summits, and the settings and counts of the search.
+    """The map of some summits, and the settings and counts of the search for them.
 
     source, pixel, unit, removed, filled : as in `Surface`
     shape      : (ny, nx) numbers of pixels
     level      : [length] mean height of the map;  max_height : [length] Sz of the map
-    checksum   : CRC-32 of the heights, which tells maps apart
+    checksum   : CRC-32 of the heights, to distinguish maps
     moments    : spectral moments of the map
-    prune      : least prominence of a hill, as a fraction of Sz
+    prune      : least prominence of the hills that are left, as a fraction of Sz
     fit        : number of pixels along a side of the square to which each paraboloid is fitted
     maxima     : number of pixels higher than their eight neighbours
-    pruned     : number of these maxima whose hills were merged into taller ones. After
-        `Summits.pruned`, maxima that were left out before for other reasons still count there
-    at_edge    : number left out because they are too near to the edge of the map
-    without_top : number left out because their paraboloid has no top in its square
+    pruned     : number of these maxima whose hills were merged into taller ones
+    at_edge    : number of maxima omitted because they are too near to the edge of the map
+    without_top : number of maxima omitted because their paraboloid has no top in its square
+
+    `Summits.pruned` updates `pruned`, but neither `at_edge` nor `without_top`.
 
     >>> cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits().origin.maxima
     328
@@ -59,7 +60,7 @@ class Origin(Record):
 
     @property
     def threshold(self) -> float:
-        """[length] the least prominence of a hill that is not merged into a taller one."""
+        """[length] the least prominence of the hills that are left."""
         return self.prune * self.max_height
 
     @property
@@ -81,17 +82,17 @@ class Statistics(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Summits(Table, Asperities, Plottable):
-    """Asperities that are the summits of a map, in descending order of the heights of their maxima.
+    """The summits of a map as asperities, in descending order of the heights of their maxima.
 
     positions, heights : [length] (n, 2) positions and (n,) heights of tops of fitted paraboloids
     tip_radii   : (n,) [length] 1 / sqrt(k1 k2), with the principal curvatures k1 and k2 of the
         paraboloid
-    prominences : (n,) [length] height of the maximum above the highest saddle over which a
-        taller maximum can be reached; for the tallest one, above the lowest pixel
+    prominences : (n,) [length] height of the maximum above the highest pass to a taller maximum;
+        for the tallest maximum, above the lowest pixel
     largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2
     deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
     pixels      : (n, 2) row and column of the maximum
-    origin      : the map, and the numbers of maxima that were left out
+    origin      : the map, and the numbers of omitted maxima
 
     >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits()
     >>> scene = cr.Scene(1e4, summits, cr.Material(1.0, 0.3))
@@ -150,7 +151,7 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def statistics(self) -> Statistics:
-        """Statistics of the summits, which can be compared with those of `origin.moments`."""
+        """Statistics of the summits, to be compared with those of `origin.moments`."""
         return Statistics(
             density=len(self) / self.origin.area,
             mean_curvature=float(np.mean(self.largest_curvatures + self.smallest_curvatures) / 2),
@@ -190,10 +191,10 @@ class Summits(Table, Asperities, Plottable):
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about those n of the given maxima for which `whole` is True.
+    """Paraboloids fitted about maxima; all arrays but `whole` are about the n with `whole` True.
 
     whole      : for each of the given maxima, True if its paraboloid curves downwards in every
-        direction and has its top within the fitted pixels; all other fields are about these n only
+        direction and has its top within the fitted pixels
     offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first

@@ -1,4 +1,4 @@
-"""`Surface`: heights over a grid of pixels, and the forms removed from them."""
+"""`Surface`: heights over a grid of pixels, and the forms that were removed from them."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from convexrough.tabular.units import known_unit
 #: Largest ratio of the sides of a pixel; longer pixels do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: A form causes a warning if it explains more than the fraction MOST of the variance of heights.
-#: For this purpose it is fitted to at most FITTED pixels along a side.
+#: A form that explains more than the fraction MOST of the variance of heights causes a warning. For
+#: this check it is fitted to at most FITTED pixels along a side.
 MOST, FITTED = 0.5, 256
 
 #: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
 ROUND = 0.1
 
-#: Smallest and largest rms slopes that cause no warning. Lapped steel has about 1e-2, polished
-#: wafers have 1e-3 to 1e-4.
+#: Smallest and largest rms slopes without a warning. Lapped steel has about 1e-2, polished wafers
+#: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
-#: Largest share of rows equal to the row before that causes no warning. At 1 the map is a profile.
+#: Fraction of rows equal to the row before that causes a warning. At 1 the map is a profile.
 MANY_COPIED = 0.25
 
 #: Differences of heights below this part of the largest height are rounding errors.
@@ -48,18 +48,18 @@ ROUNDING = 64 * np.finfo(float).eps
 class Surface(Record, Plottable):
     """Heights over a grid of pixels; the middle of the grid is the origin.
 
-    heights : (ny, nx) [length] x grows with the column, y with the row; positive is taller
+    heights : (ny, nx) [length] heights, positive upwards; x grows with the column, y with the row
     pixel   : (dx, dy) [length], or one number for squares
     unit    : unit of all lengths, "" if unknown
     removed : forms subtracted from the heights, in this order
     filled_pixels : (ny, nx) True for pixels that were holes; None if there were none
-    clipped : number of pixels at the largest height if the map seems to be cut off there, else 0;
-        by default determined from `heights`
+    clipped : number of pixels at the largest height if the map seems to be cut off there, else 0
     repeated : number of pixels with the most frequent height if they are surprisingly many and this
-        is not the largest height, else 0; by default determined from `heights`
-    copied  : share of rows that equal the row before, or that of columns if this is larger; by
-        default determined from `heights`
+        is not the largest height, else 0
+    copied  : fraction of rows that equal the row before, or the same of columns if that is larger
     source  : the file, or a description
+
+    By default `clipped`, `repeated` and `copied` are determined from `heights`.
 
     Raises InputError for maps that are constant or have holes, for pixels with one side more than
     ten times the other, and for a unit that is neither "" nor a unit of length such as "mm" or
@@ -136,12 +136,12 @@ class Surface(Record, Plottable):
 
     @property
     def max_height(self) -> float:
-        """[length] Sz of ISO 25178-2: from the lowest pixel to the highest."""
+        """[length] Sz of ISO 25178-2: height of the highest pixel above the lowest."""
         return float(np.ptp(self.heights))
 
     @property
     def rms_height(self) -> float:
-        """[length] Sq of ISO 25178-2, about the mean."""
+        """[length] Sq of ISO 25178-2: root mean square of the heights, measured from the mean."""
         return float(np.std(self.heights))
 
     @property
@@ -151,7 +151,7 @@ class Surface(Record, Plottable):
 
     @cached_property
     def moments(self) -> Moments:
-        """Spectral moments, and the summits that a Gaussian surface with them would have."""
+        """Spectral moments, and statistics of summits that follow from them."""
         return moments_of(self.heights, self.pixel)
 
     @cached_property
@@ -163,9 +163,9 @@ class Surface(Record, Plottable):
     def warnings(self) -> tuple[str, ...]:
         """Warnings: of a form that explains most of the variance, and of pixels that look wrong.
 
-        Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: pixels,
-        or pairs of neighbouring pixels, whose heights differ much from the median height of the map
-        and from those of all other neighbours.
+        Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: single
+        pixels or pairs of neighbours whose heights differ much from the median and from the heights
+        around them.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
@@ -180,7 +180,7 @@ class Surface(Record, Plottable):
         for kind in TRENDS if min(few.shape) >= 3 else ():
             try:
                 trend, there = fitted(few, pixel, kind)
-            except InputError:  # no sphere spans the map, or too few pixels are measured
+            except InputError:  # no sphere covers the map, or too few pixels are measured
                 continue
             if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
                 continue  # a sphere, which is simpler, was tried already
@@ -228,8 +228,8 @@ class Surface(Record, Plottable):
 
         The form is fitted to measured pixels. Pixels that were holes are filled again.
 
-        Raises InputError if the heights are nothing but this form, up to rounding, or if the
-        measured pixels do not determine the form.
+        Raises InputError if only rounding errors are left of the heights, or if the measured pixels
+        do not determine the form.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
@@ -269,16 +269,15 @@ class Surface(Record, Plottable):
         return zlib.crc32(np.ascontiguousarray(self.heights).tobytes())
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
-        """The summits of the map as asperities, in descending order of the highest pixel of their
-        hills.
+        """The summits of the map as asperities, in descending order of the heights of their maxima.
 
-        prune : hills with a prominence below this fraction of `max_height` are merged into taller
-            ones (Wolf pruning, ISO 25178-2)
-        fit   : odd number of pixels across the square about each maximum to which a paraboloid is
-            fitted
+        prune : hills with a prominence below this fraction of `max_height` are merged into others
+            (Wolf pruning, ISO 25178-2)
+        fit   : odd number of pixels along a side of the square, about each maximum, to which a
+            paraboloid is fitted
 
-        Hills are left out if this square does not lie in the map, or if their paraboloid has no top
-        in the square; `origin` has the numbers of both.
+        Maxima are omitted if their square does not lie in the map, or if their paraboloid has no
+        top in the square; `origin` has the number of each.
 
         Raises InputError for maps smaller than the square, or if no summit is left.
 

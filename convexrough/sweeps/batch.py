@@ -36,10 +36,9 @@ Row = tuple[str, str, list[float]]
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of a sweep over a grid of values for keys of the scene file at `path`.
+    """The scenes of a sweep file at `path`, with its contents without [sweep] as `tables`.
 
-    `tables` are the contents of this file without [sweep]. Paths in them are relative to its
-    folder.
+    Paths in the tables are relative to the folder of the file.
     """
 
     grid: Grid
@@ -59,13 +58,13 @@ class Tables:
             values = [point[key] for point, _ in points]
             if all(isinstance(it, (int, float)) for it in self.grid.axes.get(key, ())):
                 found[key] = np.array(values, dtype=np.float64)
-            else:  # text of lists
+            else:  # a list as text
                 found[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
         seeds = [known if seed is None else seed for _, seed in points]
         return found | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
-        """A source that contains the scenes with these numbers, for a worker."""
+        """A source with at least the scenes with these numbers, for a worker."""
         return self
 
     def opened(self) -> Callable[[int], Task]:
@@ -146,9 +145,9 @@ class Batch:
 def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     """The columns of a batch, and the versions of the packages that computed them.
 
-    The values of a scene do not depend on the other scenes of the batch. But the last bits of error
-    bounds may depend on them, because the rounding of matrix products depends on the number of
-    rows. The row of a failed scene contains the message of its error.
+    The values of a scene do not depend on the other scenes of the batch, except for the last bits
+    of error bounds: the rounding of matrix products depends on the number of rows. The row of a
+    failed scene contains the message of its error.
     """
     with one_thread():
         ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
@@ -164,7 +163,7 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
 
 
 def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
-    """The row of a scene; `known` holds its numbers if they were measured with those of others."""
+    """The row of a scene; `known` are its numbers if it was measured together with others."""
     try:
         wanted = {column.stage for column in columns}
         found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)

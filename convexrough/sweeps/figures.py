@@ -17,11 +17,11 @@ from convexrough.sweeps.batch import Columns
 #: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Combinations of other swept keys have bands of their own if there are at most this many;
-#: otherwise all rows share one pair of bands.
+#: Largest number of combinations of other swept keys that have bands of their own. If there are
+#: more, all rows share one pair of bands.
 MOST_BANDS = 4
 
-#: Number of bins for random keys, which have many values.
+#: Number of bins of x, if x has many values.
 BINS = 20
 
 #: Colour, line and marker of each band; all differ also in grey.
@@ -33,9 +33,9 @@ def draw_quantiles(
 ) -> Axes:
     """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail.
 
-    columns : the columns `measured` and `over`, `status`, and the `others`
-    others  : other swept keys that are not random; each combination of their values has bands of
-        its own if there are at most four; otherwise the legend names them and their number
+    columns : the columns `measured`, `over`, `status` and those of `others`
+    others  : other swept keys that are not random. Up to four combinations of their values have
+        bands of their own; otherwise the legend states the keys and the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
     good = columns["status"] != "failed"
@@ -85,7 +85,7 @@ def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, st
 
 
 def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
-    """The values of x, and all y at each; if x has many values, the medians of bins instead."""
+    """The values of x, and all y at each value; for many values, the medians of x in bins."""
     different, back = np.unique(x, return_inverse=True)
     if len(different) <= max(BINS, len(y) // 4):
         return different, [y[back == i] for i in range(len(different))]

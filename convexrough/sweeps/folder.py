@@ -1,8 +1,8 @@
-"""The folder of a sweep: a manifest and parts, which are replaced only together.
+"""The folder of a sweep: a manifest and parts.
 
 The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
 named by its first scene. All parts except the last have the same number of rows, which the manifest
-states. So the contents of a part do not depend on the process that computes it.
+states. Manifest and parts are replaced only together.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from convexrough.sweeps.batch import Columns, different
 
 MANIFEST, PARTS = SWEEP_MANIFEST, SWEEP_PARTS
 
-#: What a user can do, in messages: an argument in Python, and the option of the command in
-#: brackets.
+#: Advice in messages: an argument in Python, and the option of the command in brackets.
 RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
 
 
@@ -61,7 +60,7 @@ class Folder:
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, by default all.
 
-        Raises FileError if the part is damaged, or if its scenes are not those that its name says.
+        Raises FileError if the part is damaged, or if it contains other scenes than its name says.
         """
         pyarrow, parquet = arrow()
         path = self.file(part.start)
@@ -87,7 +86,7 @@ class Folder:
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """The parts of `wanted` that are still to be computed, and a message on what was found.
+        """The parts of `wanted` that are not yet computed, and a message on what was found.
 
         Damaged parts and unfinished files of these parts are removed. Raises FileError if some of
         `wanted` exist and `resume` is false.
@@ -164,8 +163,8 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             if not (path / MANIFEST).exists():
                 if orphans:  # the manifest, which is written before all parts, was removed
                     raise FileError(
-                        f"{path}: holds parts, but no {MANIFEST}, which says of which sweep they "
-                        f"are: restore it or remove {path / PARTS}; {OUT} names another folder"
+                        f"{path}: contains parts of an unknown sweep, without {MANIFEST}: restore "
+                        f"this file or remove {path / PARTS}; {OUT} names another folder"
                     )
                 (path / PARTS).mkdir(exist_ok=True)
                 write_text(path / MANIFEST, to_json(manifest) + "\n")

@@ -33,7 +33,7 @@ def _different(values: Any) -> bool:
 
 
 def _hashable(value: Any) -> Any:
-    """A stand-in for a value of a file, with equal ones for equal values, such as 1 and 1.0."""
+    """A hashable object for a value of a file; equal for equal values, such as 1 and 1.0."""
     if isinstance(value, (list, tuple)):
         return tuple(map(_hashable, value))
     return value if type(value) in (int, float) else repr(value)
@@ -77,10 +77,10 @@ class Grid(FileTable):
     """The table [sweep]: keys "table.key" of a scene file that vary, and numbers to measure.
 
     measure  : names of numbers
-    seeds    : number of seeds of random heights, tip radii and values, or a list of seeds
-    together : keys with lists of the same length, whose k-th values belong together
-    over     : keys whose values are combined in every way
-    draw     : keys with random values, and their laws
+    seeds    : number of seeds (of random heights, tip radii and values), or a list of seeds
+    together : keys with lists of the same length; scenes use the k-th value of every list
+    over     : keys with lists; scenes use every combination of their values
+    draw     : keys with random values, and the laws of these values
     """
 
     measure: _Names = Field(default_factory=list)
@@ -91,7 +91,7 @@ class Grid(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: keys that cannot be swept, or are swept twice, and unequal lengths of lists."""
+        """Mistakes: keys that cannot be swept or are swept twice, and lists of unequal length."""
         yield from super().mistakes_between(keys)
         if "measure" not in keys:
             yield "measure", f"missing, expected {_NAMES}"
@@ -104,12 +104,12 @@ class Grid(FileTable):
             elif name == "sweep":
                 yield f"{where}.{key}", "expected a key of a scene"
             elif name in FIXED:
-                yield f"{where}.{key}", f"values of [{name}] name columns, so they cannot vary"
+                yield f"{where}.{key}", f"columns are named after [{name}], which cannot vary"
             elif key == "asperities.seed" and "seeds" in keys:
-                yield f"{where}.{key}", "swept twice, by seeds too"
+                yield f"{where}.{key}", "swept twice, also by seeds"
             for other in first:  # a key, or a table that contains it
                 if f"{key}.".startswith(f"{other}.") or other.startswith(f"{key}."):
-                    yield f"{where}.{key}", f"swept twice, in [sweep.{first[other]}] {other} too"
+                    yield f"{where}.{key}", f"swept twice, also in [sweep.{first[other]}] {other}"
             first[key] = where
         lists = table_in(keys, "together").values()
         if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:
@@ -164,7 +164,7 @@ class Grid(FileTable):
 
 
 def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
-    """The random value of a key for a seed. It is independent of the values of other keys.
+    """The random value of a key for a seed, independent of the values of other keys.
 
     Normal values, and logarithms of lognormal values, are clipped at six standard deviations.
     """

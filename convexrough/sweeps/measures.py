@@ -1,13 +1,12 @@
 """The numbers that a sweep can measure.
 
-A number has the name that it has in the summary of a run, or the last part of this name.
-`cycle.loss` is the loss of each cycle. `loss` means the same if no earlier stage (table of results,
-such as `shear`) has a `loss`. A column is named after the number and its row: `loss_0.37` is the
-loss of the cycle between +-0.37 f P, where f P is the friction limit; `history.loss_2` is the loss
-at the third force of a history.
+The name of a number is its name in the summary of a run, such as `cycle.loss`, or the last part of
+this name. `loss` means `cycle.loss` if no earlier stage (table of results, such as `shear`) has a
+`loss`. A column is named after the number and its row: `loss_0.37` is the loss of the cycle between
++-0.37 f P, where f P is the friction limit; `history.loss_2` is the loss at the third force.
 
-Where possible, the contacts and cycles of a batch are computed together, with a row of common
-arrays for each scene. This gives only the numbers in `NORMAL` and `CYCLE`.
+If only numbers in `NORMAL` and `CYCLE` are measured, the contacts and cycles of a batch are
+computed together, in common arrays with a row for each scene.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ Stages = Mapping[str, Stage]
 #: Numbers in a summary, by their name and the label of their row.
 Numbers = dict[tuple[str, str], float]
 
-#: The number ONSET stands for these QUANTILES of the shear forces, divided by f P, at which loaded
-#: asperities start to slide.
+#: ONSET has a column for each of these QUANTILES of the shear forces, divided by f P, at which
+#: loaded asperities start to slide.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
 #: Errors that mean that one scene failed; other scenes are still computed.
@@ -58,7 +57,7 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The measured numbers of a scene, with doubts about them.
+    """The measured numbers of a scene, with warnings.
 
     doubts   : reasons why the numbers are not certified, or ""
     cautions : reasons why the model may fail, or ""
@@ -70,7 +69,7 @@ class Measured(NamedTuple):
 
 
 def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measured:
-    """The numbers of the wanted stages, and of the stage "normal"."""
+    """The numbers of the stages in `wanted`, and of the stage "normal"."""
     found: Numbers = {}
     doubts: list[str] = []
     cautions = [*cautions_of(contact)]
@@ -104,7 +103,7 @@ def _numbers(
 
 
 def row_label(ends: Sequence[float]) -> str:
-    """The label of a row: a force, or both ends of a cycle, or the maximum of a symmetric cycle."""
+    """The label of a row: a force, the maximum of a symmetric cycle, or both ends of a cycle."""
     *first, last = ends
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
@@ -140,7 +139,7 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
 
 
 def unit(name: str, units: UnitNames) -> str:
-    """The unit of a number of a summary or of a key of a file; "" if unknown."""
+    """The unit of a number in a summary, or of a key of a file; "" if unknown."""
     return "" if name.startswith("gradient.") else unit_of(name.rpartition(".")[2], units)
 
 
@@ -152,8 +151,8 @@ def _count(status: str) -> Callable[[Found], Array]:
     return lambda found: (found["status"] == status).sum(axis=1)
 
 
-#: Numbers of summaries, computed from arrays of `Contacts` and `Cycles`, and from "amplitudes" (of
-#: force), "moved" (displacement amplitudes, nan if not proved), "scales" (the scale W0 of
+#: Numbers of summaries, as functions of the arrays of `Contacts` and `Cycles` and four others:
+#: "amplitudes" (of force), "moved" (displacement amplitudes, nan if not proved), "scales" (W0 of
 #: `Cycle.loss_normalised`) and "smooth" (losses of smooth spheres / W0).
 NORMAL: dict[str, Callable[[Found], Array]] = {
     **{name: _count(name) for name in ("contact", "open", "undecided")},
@@ -180,7 +179,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 
 
 def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> dict[int, Measured]:
-    """The measured numbers of the scenes that are proved together, by the number of the scene."""
+    """The measured numbers of scenes, by the number of the scene; only where all is proved."""
     if not asked or not {column.number for column in columns} <= KNOWN:
         return {}
     wanted = {column.stage for column in columns}
@@ -201,7 +200,7 @@ def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> d
                 mine = [numbers[place] for place in rows.places.tolist()]
                 known = _known(rows, [asked[number].scene for number in mine], cycle)
                 found |= {mine[k]: each for k, each in known.items()}
-        except FAILURES:  # one scene failed, so that `compute` measures each alone
+        except FAILURES:  # of one scene; `compute` then measures each scene alone
             continue
     return found
 
@@ -209,7 +208,7 @@ def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> d
 def _known(
     rows: PressedRows, scenes: Sequence[Scene], cycle: CycleStage | None
 ) -> dict[int, Measured]:
-    """The numbers of the rows in which everything is proved, by the number of the row."""
+    """The numbers of those rows in which everything is proved, by the number of the row."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
     values = {(f"normal.{name}", ""): number(contacts) for name, number in NORMAL.items()}

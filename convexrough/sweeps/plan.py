@@ -30,7 +30,7 @@ from convexrough.version import __version__
 #: LEAST_BATCHES batches or more, if there are enough scenes.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
-#: At most this many scenes are computed in order to find out which numbers can be measured.
+#: At most this many scenes are tried to find out which numbers can be measured.
 TRIED = 5
 
 
@@ -54,8 +54,7 @@ def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = Non
 
     measure : names of numbers to measure in place of those in the file
 
-    Raises FileError if the file cannot be read or is not TOML; SceneFileError, which lists every
-    mistake; and as `plan_of`.
+    Raises FileError if the file cannot be read or is not TOML, and the errors of `plan_of`.
     """
     path = Path(path)
     text = read_text(path)
@@ -99,7 +98,7 @@ def plan_of(
 
 
 def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a mistake if there are seeds but nothing is random: the seeds would change nothing."""
+    """Yield a mistake if there are seeds, but nothing is random."""
     table = table_in(contents, "sweep")
     given = {*table_in(contents, "asperities")}
     given |= {key.removeprefix("asperities.") for _, key in swept(table)}
@@ -188,7 +187,7 @@ def _planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan for the scenes of `source`. The first solved scene shows which numbers exist.
+    """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version
@@ -235,7 +234,7 @@ def _planned(
 
 
 def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables that state loads of their own, although [normal] is swept."""
+    """The measured tables with loads of their own that are not swept, although [normal] is."""
     if not {"normal.load", "normal.approach"} & {*swept}:
         return []
     own = [name for name, stage in stages.items() if name in used and stage.highest_load]

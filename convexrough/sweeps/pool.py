@@ -27,19 +27,19 @@ from convexrough.errors import InputError, WorkerError, needed
 from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.threads import cores
 
-#: Largest number of batches submitted at a time: to a given executor, and for each local process.
+#: Largest number of batches submitted at a time: to a given executor; for each local process.
 AT_ONCE, EACH = 1000, 2
 
-#: The sweep ends if more than this number of batches are lost, that is, if their workers died.
+#: The sweep ends if more batches than this are lost. A batch is lost if its worker dies.
 MOST_LOST = 64
 
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """Yield the rows of batches, in order of completion.
 
-    A batch is lost if its worker dies. Lost batches are computed again after all other batches, one
-    by one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a
-    worker has other versions of packages, or if the executor is broken or cancels a batch.
+    A batch is lost if its worker dies. Lost batches are computed again after all others, one by
+    one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a worker
+    has other versions of packages, or if the executor is broken or cancels a batch.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -70,7 +70,9 @@ def _together(
                 except _lost() as error:
                     lost.append(batch)
                     if len(lost) > MOST_LOST:
-                        raise WorkerError(f"all workers die soon after start: {error}") from error
+                        raise WorkerError(
+                            f"workers died in more than {MOST_LOST} batches: {error}"
+                        ) from error
                     continue
                 if other := different(versions):
                     raise WorkerError(f"a worker has other versions: {other}")
@@ -90,7 +92,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 
 class Processes(Executor):
-    """An executor with processes on this machine. If a process dies, new ones replace all."""
+    """An executor with processes on this machine. If one dies, new processes replace all."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()

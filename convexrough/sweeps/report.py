@@ -24,7 +24,7 @@ AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, **did: Any) -> Summary:
-    """What `--json` prints: the state of the table, and `did`, what `run` did."""
+    """What `--json` prints: the state of the table, and `did`, the second result of `run`."""
     said = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
@@ -68,10 +68,10 @@ def failures(table: SweepTable) -> list[str]:
 
 
 def cautions(table: SweepTable) -> list[str]:
-    """Warnings about stages with constant loads of their own, and about messages of scenes."""
+    """Warnings about stages with loads of their own, and about messages of certified scenes."""
     own = [
         f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
-        f"{name}.reference, a factor on them, with it in [sweep.together]"
+        f"their factor {name}.reference, together with that load in [sweep.together]"
         for name in table.manifest.get("own_loads", [])  # manifests of earlier versions lack it
     ]
     said = _messages(table, "certified")
@@ -103,7 +103,7 @@ def figures_left_out(table: SweepTable) -> list[str]:
 
 
 def progress_kept(folder: Path, plan: Plan) -> str:
-    """A message: how many rows of an interrupted sweep a folder holds, and how to continue."""
+    """A message: how many rows of an interrupted sweep are kept, and how to continue."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"
     rows = len(open_sweep(folder))

@@ -23,7 +23,7 @@ from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes, read_sweep
 from convexrough.sweeps.pool import Processes, computed
 from convexrough.sweeps.table import SweepTable
 
-#: What `sweep` computes: a sweep file, the tables of a sweep file, or scenes.
+#: The first argument of `sweep`: a sweep file, the tables of a sweep file, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
 #: Largest number of scenes that one call computes; for more, each call computes a share.
@@ -45,7 +45,7 @@ def sweep(
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
 ) -> SweepTable:
-    """A table with a row for each of many scenes, and a column for each measured number.
+    """A table with a row for each of many scenes and a column for each measured number.
 
     docs/how-to/sweep.md describes sweep files.
 
@@ -60,15 +60,15 @@ def sweep(
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: the number of cores that this process may use
     resume   : continue an interrupted sweep in the folder
-    overwrite : remove the results of an earlier sweep in the folder first
-    part     : (k, n): compute only share k of n shares of the scenes, where k is from 1 to n
+    overwrite : first remove the results of an earlier sweep in the folder
+    part     : (k, n): compute only the k-th of n shares of the scenes, with k from 1 to n
 
     The table is the same, bit for bit, for any executor, any order of computation and any number of
     interruptions. In the row of a failed scene, `message` states the reason.
 
-    Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
-    workers died twice while computing the same scenes, if workers died too often, if the executor
-    is broken, or if a worker has other versions of packages than this process.
+    Raises FileError and InputError for wrong input, before the sweep begins; WorkerError if workers
+    died twice while computing the same scenes, if workers died too often, if the executor is
+    broken, or if a worker has other versions of packages than this process.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
@@ -113,9 +113,8 @@ def run(
 ) -> tuple[SweepTable, dict[str, Any]]:
     """Compute the missing rows of the table of a plan; arguments as for `sweep`.
 
-    Returns the table, and a dictionary with three entries: `found`, a message about rows that
-    existed already; `computed`, the number of scenes that this call computed; and `seconds`, the
-    time that the call took.
+    Returns the table, and a dictionary: `found` is a message about rows that existed already,
+    `computed` the number of scenes that this call computed, and `seconds` its time.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)

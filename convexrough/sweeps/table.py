@@ -31,7 +31,7 @@ CELL = 24
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
-    """The table of a sweep in a folder, complete or not. Rows are read only when needed.
+    """The table of a complete or incomplete sweep in a folder. Rows are read when needed.
 
     Raises FileError if the folder contains no sweep.
 
@@ -172,11 +172,11 @@ class SweepTable(Record):
     def plot(
         self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
     ) -> Axes:
-        """Axes with bands of quantiles of a measured number against a swept key.
+        """Axes with the median and bands of quantiles of a measured number against a swept key.
 
         measured, over : names of columns; default: the first measured number and the first swept
-            key. If the values of the other swept keys that are not random have at most four
-            combinations, each combination has bands of its own
+            key. Up to four combinations of the other swept keys that are not random have bands of
+            their own; more combinations share one pair of bands
         axes : where to draw; default: new axes
 
         Raises InputError if nothing is swept, if there are no rows, and for unknown names.
@@ -201,13 +201,12 @@ class SweepTable(Record):
     ) -> Columns:
         """Quantiles over seeds, as columns by name.
 
-        There is a row for each computed grid point and each measured number.
-
         measured : names of measured numbers, by default all;  at : quantiles, from 0 to 1
 
-        The columns are those of `points`, `quantity` (the name of the number), `scenes` (number of
-        computed scenes), `failed` (number of failed scenes), and the quantiles of the values that
-        are not nan (nan if there are none).
+        There is a row for each computed grid point and each measured number. The columns are those
+        of `points`, `quantity` (the name of the number), `scenes` (number of computed scenes),
+        `failed` (number of failed scenes), and quantiles of the values that are not nan (nan if
+        there are none).
 
         Raises InputError for unknown names, and for quantiles that are not from 0 to 1.
         """
@@ -260,11 +259,11 @@ class SweepTable(Record):
 
 
 def _quantiles(values: Array, at: Sequence[float]) -> Array:
-    """Quantiles as by `np.quantile`, but also of values of which some are infinite."""
+    """Quantiles as by `np.quantile`; some of the values may be infinite."""
     with np.errstate(invalid="ignore"):
         inner = np.quantile(values, at)
         low, high = (np.quantile(values, at, method=end) for end in ("lower", "higher"))
-        outer = np.where(low == high, low, low + high)  # of which one is infinite or both
+        outer = np.where(low == high, low, low + high)  # one or both are infinite
     return np.where(np.isfinite(inner), inner, outer)
 
 

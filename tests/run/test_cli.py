@@ -150,7 +150,7 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     printed = run(text).out
     assert re.search(r"^ *0\.5 .* 6 +31 +0$", printed, re.M)
     assert "indentations increase with the load: proved" in printed
-    assert printed.count("path of 12 chords; the ellipse loses more, in our tests by at m") == 1
+    assert printed.count("those of 12 chords; the loss along the ellipse is larger, in our") == 1
 
 
 SWEEP = """
@@ -169,7 +169,7 @@ def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
     Path("one.toml").write_text(scene_text())
     assert found[1] == read_scene("one.toml").press().load
     assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
-    assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
+    assert "[sweep]: only `convexrough sweep`" in command("compare", "a.toml").err
 
 
 # Bad input

@@ -72,7 +72,7 @@ def test_nothing_is_proved_where_order_fails(
     assert summary["steady"]["undecided"] > 0
     assert summary["shakedown"]["proved"] is False
     assert summary["shakedown"]["upper"] is None
-    assert "not proved: any bounds on the limit of [shakedown]" in outcome.err
+    assert "not proved: bounds on the limit of [shakedown]" in outcome.err
     total = repr(summary["shear"][0]["force"])
     claimed = ("verify", "a.toml", "out/asperities.csv", "--shear", "out/shear.csv")
     said = command(*claimed, "--shear-force", total)

@@ -62,9 +62,9 @@ def test_arrays(tmp_path: Path) -> None:
             raw(several, sides | {name: entry})
     with pytest.raises(cr.InputError, match="arrays: found only x, expected x and y, or neither"):
         raw(several, sides | {"x": X[0]})
-    with pytest.raises(cr.InputError, match="found 7 by 9, expected 7 by 9, y as well"):
+    with pytest.raises(cr.InputError, match="found 7 by 9, expected 7 by 9, for y, too"):
         raw(several, sides | {"x": X, "y": Y[:, 0]})
-    with pytest.raises(cr.InputError, match="expected 1 by 9, as y and x are long"):
+    with pytest.raises(cr.InputError, match="expected 1 by 9, as y and x require"):
         raw(several, sides | {"x": X[0], "y": [0.0]})
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
         raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
@@ -127,7 +127,7 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
     surface = raw(tmp_path / "a.mat", arrays)
     assert_allclose(surface.pixel, (2, 3))
     assert_array_equal(surface.heights, HEIGHTS)
-    with pytest.raises(cr.InputError, match="as y and x are long; transpose it"):
+    with pytest.raises(cr.InputError, match="as y and x require; transpose it"):
         raw(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
 
 

@@ -208,8 +208,8 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
         (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
         (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
         (("scan.npz", "--load", "1"), "--radius needs exactly one of"),
-        (("scan.npz", "--radius", "1", "--load", "1"), "--load and --modulus go together"),
-        (("scan.npz", "--scene", "scene.toml", "--radius", "1"), "--scene says how to press"),
+        (("scan.npz", "--radius", "1", "--load", "1"), "--load needs --modulus"),
+        (("scan.npz", "--scene", "scene.toml", "--radius", "1"), "--scene excludes --radius"),
         (("scan.npz", "--scene", "missing.toml"), "missing.toml: cannot be read"),
         (("scan.npz", "--radius", "-1", "--approach", "1"), "sphere_radius: found -1.0"),
         (("scan.npz", "--detrend", "cone"), "'cone' is not one of"),
@@ -238,9 +238,9 @@ def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surf
     ran = find(*pressed)
     assert "of the variance of the heights: " in ran.err
     assert "--detrend sphere, removes it" in ran.err
-    assert "the same approach  asperities  whole map  difference" in ran.out
+    assert "at one approach  asperities  whole map  difference" in ran.out
     said = find(*pressed, "--detrend", "sphere").out
-    form = r"pressing radius +10000; the removed form, 1\d+\.\d+, is not in it: toge"
+    form = r"pressing radius +10000, without the removed form \(1\d+\.\d+\); with it "
     assert re.search(form, said)
     ran = find(*pressed, "--detrend", "sphere", "--json")
     assert "variance" not in ran.err

@@ -97,17 +97,17 @@ WRONG = [
     (sweeping(over={"sphere.radius": [1, 1.0]}), "values, none of them twice"),
     (
         sweeping(over={"material.sphere.poisson_ratio": [0.2]}, together={"material.sphere": [1]}),
-        "over.material.sphere.poisson_ratio: swept twice, in [sweep.together] material.sphere too",
+        "over.material.sphere.poisson_ratio: swept twice, also in [sweep.together] material.sphere",
     ),
     (
         sweeping(over={"normal.load": [1e-7]}, together={"normal.load": [2e-7]}),
-        "over.normal.load: swept twice, in [sweep.together] normal.load too",
+        "over.normal.load: swept twice, also in [sweep.together] normal.load",
     ),
     (
         sweeping(seeds=3, over={"asperities.seed": [1], "asperities.height_std": [1e-7]}),
-        "swept twice, by seeds too",
+        "swept twice, also by seeds",
     ),
-    (sweeping(over={"cycle.maximum_fraction": [[0.1]]}), "values of [cycle] name columns"),
+    (sweeping(over={"cycle.maximum_fraction": [[0.1]]}), "columns are named after [cycle]"),
     (
         sweeping(together={"normal.load": [1e-7, 2e-7], "sphere.radius": [1.0]}),
         "together: found [1, 2] values, expected as many for every key",

@@ -38,7 +38,7 @@ Chosen = Annotated[
 
 
 class ShearStage(Stage):
-    """Shear forces after loading from rest, as fractions of the friction limit f P, from 0 to 1."""
+    """Shear forces on first loading, as fractions of the friction limit f P, from 0 to 1."""
 
     name = "shear"
     numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),
@@ -82,9 +82,9 @@ class ShearResult(Result):
 class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
-    minimum_fraction : the smallest force for each largest one; default: minus the largest force
-    loop_points : approximate number of points of a loop; default: fewer for more asperities, and
-        where order fails
+    minimum_fraction : the smallest force of each cycle; default: minus the largest force
+    loop_points : approximate number of points of a loop; the default is smaller for many
+        asperities, and where order fails
     loop_asperities : indices of asperities whose loops are computed, or "all"; default: one
         asperity at each of at most 12 distances from the axis
     """

@@ -1,4 +1,4 @@
-"""[gradient]: the derivatives of one result with respect to the whole scene."""
+"""[gradient]: the derivatives of one result with respect to all parameters of the scene."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from convexrough.run.stage import Columns, Result, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
 
-#: Results whose gradient a scene file may ask for, and their symbols.
+#: Results whose gradient a scene file may request, and their symbols.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: Names of the parameters of asperities, for all asperities and for one asperity.
+#: Names of the parameters of asperities: plural, and singular.
 EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 
 #: Parameters that are one number for the whole scene.
@@ -91,7 +91,7 @@ class GradientResult(Result):
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """One row: derivatives by the shared parameters, and the largest by those of asperities."""
+        """One row: derivatives by the scalars, and the largest by parameters of asperities."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]

@@ -104,9 +104,9 @@ def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of` and two others.
 
     geometry        : where asperities meet the sphere: "summit" or "closest"
-    closest_change  : largest relative change, by the geometry "closest", of a load that is at least
-        a tenth of the largest load; None if the geometry is "closest" already, if nothing touches,
-        or if the change is not known
+    closest_change  : largest relative change of loads of at least a tenth of the largest load if
+        the geometry becomes "closest"; None if it is "closest" already, if nothing touches, or if
+        the change is not known
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
@@ -128,7 +128,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     width = len(str(normal["asperities"]))
     relative = _ratio(proof["load_error"], normal["largest_load"])
     crowding = normal.get("crowding", 0.0)
-    model = f" (of a model that does not hold: crowding {crowding:.3g})" if crowding > 1 else ""
+    model = f" (but the model does not apply: crowding {crowding:.3g})" if crowding > 1 else ""
 
     def known(name: str) -> str:
         most = "at most " if math.isfinite(proof[name]) else ""
@@ -144,7 +144,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
         ("convexity number", f"{proof['convexity_number']:.4g}  (below 1 the energy is convex)"),
         ("load error", f"{known('load_error')}{relative}"),
         ("gap error", known("gap_error")),
-        ("duality gap", f"{known('duality_gap')}  (excess of the energy over {least})"),
+        ("duality gap", f"{known('duality_gap')}  (energy minus {least})"),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
@@ -166,7 +166,7 @@ def _neglected(normal: Summary) -> str:
     if not (beta := normal["mismatch"]):
         return ""
     return (
-        f"Dundurs' beta = {beta:.3g}, neglected: pressing would shear the surfaces by some "
+        f"Dundurs' beta = {beta:.3g}, neglected: it causes shear tractions of about "
         f"{abs(100 * beta):.2g} % of the pressure"
     )
 

@@ -41,7 +41,7 @@ from convexrough.run.values import (
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
-#: With n chords, the largest relative error of a loss found in tests is this number / n^2.
+#: The largest relative error of a loss found in tests with n chords is this number / n^2.
 CHORDS_ERROR = 12
 
 
@@ -104,8 +104,8 @@ class _Points(Stage):
         if self.ellipse is None:
             return []
         n = self.ellipse.chords
-        more = f"the ellipse loses more, in our tests by at most {CHORDS_ERROR / n**2:.1g} of it"
-        return [f"losses and errors are those of a path of {n} chords; {more}"]
+        more = f"larger, in our tests by a fraction of at most {CHORDS_ERROR / n**2:.1g}"
+        return [f"losses and errors are those of {n} chords; the loss along the ellipse is {more}"]
 
 
 class PathStage(_Points):
@@ -158,8 +158,8 @@ class PathResult(Steps):
 class SteadyStage(_Points):
     """The table [steady]: a closed path of normal load and shear force that is repeated.
 
-    phases, factors : the losses are also computed at these phases [rad] of the ellipse, with its
-        amplitudes multiplied by these factors; with None as `phases`, they are not
+    phases, factors : phases [rad] of the ellipse, and factors of its amplitudes, for which losses
+        are computed, too; None for none
     """
 
     name = "steady"
@@ -171,7 +171,7 @@ class SteadyStage(_Points):
 
     @property
     def highest_load(self) -> float:
-        """[force] the largest load of the path, including the path with the largest factor."""
+        """[force] the largest load of the path, with the largest factor."""
         if self.ellipse is None:
             return super().highest_load
         amplitude = max(1.0, *self.factors) * abs(self.ellipse.load_amplitude)

@@ -18,7 +18,7 @@ Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
 
 
 class ShakedownStage(Stage):
-    """Mean load and shear force, and the amplitudes that are scaled, in multiples of `reference`.
+    """Mean load and shear force, and amplitudes that are scaled, all divided by `reference`.
 
     kind : "exact" (default), "elastic", or "vector": then forces are pairs [x, y]
     """
@@ -47,7 +47,7 @@ class ShakedownStage(Stage):
 
     @property
     def highest_load(self) -> float:
-        """[force] the largest load where the factor on the amplitudes is 1."""
+        """[force] the largest load of the path with the factor 1."""
         return self.reference * (self.load + max([0.0, *(self.load_amplitudes or [])]))
 
     def compute(self, contact: Contact) -> ShakedownResult:
@@ -99,7 +99,7 @@ class ShakedownResult(Result):
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
         if not self.found[0].proved:
-            yield "not proved: any bounds on the limit of [shakedown]"
+            yield "not proved: bounds on the limit of [shakedown]"
 
     def lines(self) -> list[str]:
         _, *table = super().lines()
