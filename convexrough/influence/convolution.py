@@ -99,7 +99,7 @@ class SiteBox:
 
         return self.kernels(values, dtype)[0]
 
-    def pulls(self, over_cube: Callable[[Array], Array], dtype: Any = np.float64) -> list[Kernel]:
+    def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
         """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two occupied sites.
 
         over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
@@ -111,7 +111,7 @@ class SiteBox:
             x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
             return [weights * x, weights * y]
 
-        return self.kernels(values, dtype, odd=True)
+        return self.kernels(values, np.float64, odd=True)
 
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
         """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
@@ -212,13 +212,16 @@ class SiteBox:
         return field
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field with a kernel; see `through_waves`."""
+        """The convolution of a field (rows, columns) with a kernel.
+
+        A field of the shape (rows, stride) is overwritten by the result, which saves memory.
+        """
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             waves[0] *= spectrum[:, each]
             return waves
 
-        return through_waves([field], self.padded, self.workers, multiply)[0]
+        return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.

@@ -246,12 +246,12 @@ class LatticeInfluence:
             field = box.convolve(box.laid_out(loads, places), 1j * pull.spectrum)
             return np.asarray(field.ravel()[places])
 
-        each = [sums(pull) for pull in self._pulls(box, np.float64)]
+        each = [sums(pull) for pull in self._pulls(box)]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
-    def _pulls(self, box: SiteBox, dtype: Any) -> list[Kernel]:
+    def _pulls(self, box: SiteBox) -> list[Kernel]:
         """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached(("pulls", dtype), lambda: box.pulls(cubed, dtype))
+        return self._cached("pulls", lambda: box.pulls(cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -313,13 +313,11 @@ class LatticeInfluence:
 
         slices : number of parts of 10 to 18 bits into which loads and kernel are divided
             (docs/theory/operators-lattice.md, "Slices"); None for 3, or for 4 on more than `MANY`
-            sites, as friction needs. If a number is given, deviations of
-            points from their sites are treated in single precision
+            sites, as friction needs
         """
-        dtype = np.float64 if slices is None else np.float32
         slices = slices or SLICES + int(self.sites > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
-        off_sites = self._off_sites(np.asarray(loads.high), box, places, dtype)
+        off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
         return sliced.sums(loads, places) + off_sites
 
@@ -344,23 +342,21 @@ class LatticeInfluence:
         norm = self._kernel.norm * unit / self.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array, box: SiteBox, places: Indices, dtype: Any) -> Ball:
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
         """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
         The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
         """
-        away: Any = off_sites if dtype == np.float64 else off_sites_in_single
-        x, y, unknown = self.layout.cached(away)
+        layout = self.layout
+        x, y, unknown = layout.cached(off_sites) if len(self) <= MOST_KEPT else off_sites(layout)
         shrunk = [float(factor) / self.spacing for factor in self.lattice.shrink]
         x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
-        most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-6)
-        unknown *= max(shrunk)
+        most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-9)
+        unknown = max(shrunk) * unknown + 8 * ROUNDOFF * most
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
-        roundoff, tiny = float(np.finfo(dtype).epsneg), float(np.finfo(dtype).tiny)
-        unknown += 8 * (roundoff * most + tiny)
-        shares, pulls = (loads / top).astype(dtype, copy=False), self._pulls(box, dtype)
+        shares, pulls = loads / top, self._pulls(box)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
@@ -369,7 +365,7 @@ class LatticeInfluence:
 
         given = (box.laid_out(weight * shares, places) for weight in (1.0, x, y))
         fields = through_waves(given, box.padded, box.workers, pull)
-        change = fields.pop().ravel()[places].astype(np.float64)
+        change = fields.pop().ravel()[places]
         size = float(np.abs(change).max())
         for each in (y, x):
             part = each * fields.pop().ravel()[places]
@@ -378,9 +374,9 @@ class LatticeInfluence:
         # The square of the kernel's norm bounds the row sums of 1 / r^2, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
-        error = 2.0 * box.bound(norm, operations=10) * most * (float(np.linalg.norm(loads)) / top)
+        error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
-        error += 4 * roundoff * size
+        error += 4 * ROUNDOFF * size
         unit = top / self.spacing
         return Ball.around(change * unit, 1.01 * error * unit)
 
@@ -423,12 +419,6 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     most = float(np.abs(sites).max(initial=0))
     largest = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
     return away[0], away[1], 96 * ROUNDOFF**2 * largest
-
-
-def off_sites_in_single(layout: Layout) -> tuple[NDArray[Any], NDArray[Any], float]:
-    """The same in single precision; the error bound does not include this rounding."""
-    x, y, unknown = off_sites(layout)
-    return x.astype(np.float32), y.astype(np.float32), unknown
 
 
 def _least_symbol(lattice: Lattice) -> float:
