@@ -55,10 +55,10 @@ def _mean_field(problem: NormalProblem) -> Array:
     numbers, areas = np.bincount(ring, minlength=count), np.pi * np.diff(limits)
     share = numbers / np.maximum(np.bincount(ring[some], minlength=count), 1)
 
-    def between(w: Array) -> Array:
-        """(n,) values at the asperities, interpolated between the middles of the rings."""
-        first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
-        return np.asarray(w[first] + (places - 0.5 - first) * np.diff(w)[first])
+    def between(w: Array, x: Array) -> Array:
+        """Values at the places x, interpolated between the middles of the rings."""
+        first = np.clip((x - 0.5).astype(np.intp), 0, count - 2)
+        return np.asarray(w[first] + (x - 0.5 - first) * np.diff(w)[first])
 
     def sums(values: Array) -> Array:
         """(count,) sums over the rings, estimated from the sample."""
@@ -78,7 +78,7 @@ def _mean_field(problem: NormalProblem) -> Array:
         touching = np.sqrt(smooth_reach(problem)), problem.scene.mean_radius
         w = hertz.surface_displacement(middle, *touching) / problem.units.length
     for _ in range(30):
-        indentation = approach + offsets - between(w)[some]
+        indentation = approach + offsets - between(w, places[some])
         loads = hertz.load(indentation, coefficients)
         slopes = 1.5 * loads / np.where(loads > 0, indentation, 1.0)
         P, c = sums(loads), sums(slopes)
@@ -96,7 +96,7 @@ def _mean_field(problem: NormalProblem) -> Array:
             w = w + step
         if np.abs(step).max() <= 1e-6 * abs(approach):
             break
-    return np.asarray(approach + problem.offsets - between(w))
+    return np.asarray(approach + problem.offsets - between(w, places))
 
 
 def _disc(distance: Array, radius: Array) -> Array:
