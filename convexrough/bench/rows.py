@@ -193,13 +193,14 @@ def machine_line(bench: Bench) -> str:
     """A line about the machine and its load."""
     on = bench.machine
     versions = ", ".join(f"{name} {number}" for name, number in on["versions"].items())
-    load = on["load_average"] or 0.0
-    busy = "; other work was running, so times are high" if load > 0.3 else ""
+    load = on["load_average"]
+    known = "unknown" if load is None else f"{load:.1f}"
+    busy = "; other work was running, so times are high" if (load or 0.0) > 0.3 else ""
     return (
         f"{'Quick' if bench.quick else 'Full'} run of {bench.seconds / 60:.1f} min, {on['date']}, "
         f"on {on['cores']} cores ({on['processor']}, {on['memory'] / 2**30:.0f} GiB, "
         f"{on['system']}): convexrough {__version__}, Python {on['python']}, {versions}. Threads "
-        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {load:.1f}"
+        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {known}"
         f"{busy}."
     )
 
