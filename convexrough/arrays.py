@@ -31,9 +31,9 @@ def largest(values: NDArray[Any]) -> Any:
     return values.max(axis=-1, initial=0.0, keepdims=values.ndim > 1)
 
 
-def even(value: float, length: int) -> Array:
-    """A read-only array (length,) of equal values, which stores only one number."""
-    return np.ndarray((length,), np.float64, np.float64(value), strides=(0,))
+def even(value: float, *shape: int) -> Array:
+    """A read-only array of equal values, which stores only one number."""
+    return np.ndarray(shape, np.float64, np.float64(value), strides=(0,) * len(shape))
 
 
 def evenly(function: Callable[[Array], Array], values: Array) -> Array:

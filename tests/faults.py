@@ -78,7 +78,8 @@ def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, 
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         prepare(folder)
-        before = _earlier(folder, force, finished)
+        earlier = finished["old" if name.startswith("run") else name]
+        before = _earlier(folder, earlier) if force else {}
         status, said = _tried(folder, arguments, fault, rng, durations[name])
         found = contents(folder / "out")
         refused = status == 2 and name in ("verify", "new")  # what is there already is not theirs
@@ -103,11 +104,9 @@ def prepare(folder: Path) -> None:
     (folder / "out").mkdir()
 
 
-def _earlier(folder: Path, force: bool, finished: dict[str, dict[str, bytes]]) -> dict[str, bytes]:
-    """Results of an earlier run, and something of the user's; where nothing is forced none."""
-    if not force:
-        return {}
-    for name, data in finished["old"].items():
+def _earlier(folder: Path, earlier: dict[str, bytes]) -> dict[str, bytes]:
+    """Results of an earlier run of the same command, and a file of the user."""
+    for name, data in earlier.items():
         (folder / "out" / name).write_bytes(data)
     (folder / "out" / "notes.txt").write_text("mine")
     return contents(folder / "out")

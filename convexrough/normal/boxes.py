@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, even
 from convexrough.convex.definite import largest, proved_margin, proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
@@ -131,7 +131,7 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
     """
     corner = np.maximum(problem.bounds(highest), loads)
     h, none = problem.compliance(corner), np.zeros(corner.shape, dtype=bool)
-    number, nowhere = convexity_number(problem.shells, h), np.broadcast_to(np.inf, corner.shape)
+    number, nowhere = convexity_number(problem.shells, h), even(np.inf, *corner.shape)
     return Box("global", problem.shells, corner, h, number, nowhere, none)
 
 

@@ -185,7 +185,9 @@ def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np
     defect /= np.where(size > 0, size, 1.0)
     step = problem.correct(slopes, defect, enough, todo)
     step *= size
-    k = np.broadcast_to(problem.coefficients, step.shape)
+    k = problem.coefficients
+    if k.shape != step.shape:  # of a stack
+        k = np.broadcast_to(k, step.shape)
     gap = state.gap.value
 
     def following(some: slice) -> Pair:
