@@ -96,7 +96,8 @@ class Table(Record):
     (np.int64(37), ('asperity',))
     """
 
-    #: A data frame has the arrays of the first key.
+    #: The names of arrays for each tuple of dimensions. The first dimension of the first key gives
+    #: the rows of a data frame.
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:

@@ -26,7 +26,8 @@ UP = 1.0 + 2.0**-40
 #: Upper bound on the underflow error of one operation on pairs.
 TINY = 2.0**-1000
 
-#: Numbers known exactly, which become balls of radius 0. Only a Fraction is rounded.
+#: Numbers known exactly. They become balls of radius 0, except that a Fraction is rounded to a
+#: pair, and the radius covers the rounding.
 Exact: TypeAlias = "float | int | Fraction | Array | Pair"
 
 #: Elementwise function of midpoints and radii that returns a midpoint and a radius.
@@ -226,7 +227,7 @@ def joined(balls: Sequence[Ball]) -> Ball:
 
 
 def as_ball(value: Ball | Exact) -> Ball:
-    """Balls unchanged; exact numbers as balls of radius 0."""
+    """Balls unchanged; exact numbers as by `Ball.exact`."""
     return value if isinstance(value, Ball) else Ball.exact(value)
 
 
@@ -275,14 +276,14 @@ def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """The product; |x y - X Y| <= (|X| + dx) dy + dx |Y| for x, y within dx, dy of X, Y."""
+    """The product; |X Y - x y| <= (|x| + dx) dy + dx |y| for X, Y within dx, dy of x, y."""
     product = x * y
     radius = np.fmax((np.abs(x.high) + dx) * dy, 0.0) + np.fmax(dx * np.abs(y.high), 0.0)
     return product, (radius * UP + _lost(product)) * UP
 
 
 def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """The quotient; x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y for x, y within dx, dy of X, Y."""
+    """The quotient; X/Y - x/y = ((X - x) - (x/y) (Y - y)) / Y for X, Y within dx, dy of x, y."""
     quotient = x / y
     least = np.abs(y.high) * (2.0 - UP) - dy
     radius = (dx + np.fmax(np.abs(quotient.high) * UP * dy, 0.0) + TINY) / least

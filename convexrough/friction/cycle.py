@@ -1,8 +1,9 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
 The path is a closed curve of the load P and the shear force Q; f is the coefficient of friction,
-and T = Q / f. docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from
-the second cycle on the memory curve is constant at loads below L* and periodic above.
+and T = Q / f. The memory curve stores the friction state as a function of the load.
+docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from the second
+cycle on the part of the curve below L* no longer changes, and the part above repeats in each cycle.
 docs/theory/losses.md derives the loss.
 """
 
@@ -82,9 +83,10 @@ class Cycle(Table, Plottable):
     displacement_error : [length] proved bound on the error of the displacement amplitude
     order            : what is proved about order between the lowest and the highest load at which
         normal solutions are used (docs/theory/states.md, "Order"). "proved": losses and statuses
-        are proved; "proved for one step": statuses hold for one general step per segment, and no
-        loss is proved; "fails": nothing is proved, and general steps give the results if the normal
-        solution at the highest P is proved
+        are proved; "proved for one step": statuses hold for the solution with one general step
+        (docs/theory/without-order.md) per straight segment of the path, and no loss is proved;
+        "fails": nothing is proved, and general steps give the results if the normal solution at the
+        highest P is proved
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding

@@ -22,8 +22,9 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: The largest traction is sought at the contact radii a(s_k) and at about this number of other
-#: distances r. At constant load it lies at one of the a(s_k); else its error is about 0.1 %.
+#: The largest traction in a contact disc is sought at these distances from its centre: the contact
+#: radii of the asperity at the vertices of the memory curve, and about this number of others. At
+#: constant load it lies at one of the a(s_k); else its error is about 0.1 %.
 DISTANCES = 64
 
 
@@ -43,8 +44,8 @@ class Fretting(Table, Plottable):
         bounds on their errors. If the load varies, their sum is less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |shear force of the asperity / area of its
         contact disc| at the points of the path
-    largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
-        the error is about 0.1 % where the load varies
+    largest_tractions : [force / length^2] the largest absolute shear traction on the contact disc,
+        over the points of the path; the error is about 0.1 % where the load varies
 
     If general steps give the results of the cycle (see `Cycle.order`), `loss_errors` is infinite,
     and all other arrays except the status are nan.
@@ -134,7 +135,7 @@ def rim_gap(x: Array) -> Array:
 
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
-    """The columns of fretting.csv, with a row for each asperity that touches in each cycle."""
+    """The columns of fretting.csv; for each cycle there is a row for each asperity that touches."""
     names = ("status", "losses", "loss_errors", "slip_amplitudes", "gross_slip_amplitudes",
              "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()

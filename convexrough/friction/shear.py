@@ -39,14 +39,16 @@ class ShearCertificate(Table):
     scope  : as in `Certificate`, for the pressed contact; "none" if nothing is proved
     order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
         "Order"). "proved": statuses and bounds hold for the true state. "proved for one step": they
-        hold for the result of one general step from rest to Q, which is the true state unless the
-        deflection of some asperity decreased on the way. "fails": nothing is proved
+        hold for the solution of one general step (docs/theory/without-order.md) from rest to Q.
+        This is the true state unless the tangential deflection of some asperity, due to its own
+        force, decreased on the way. "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
     slip_errors, stick_radius_errors : [length] bounds on the errors of slips and stick radii
-    force_error : [force] bound on the error of the shear force; 0 if it is prescribed
-    displacement_error : [length] bound on the error of the displacement; 0 if it is prescribed
+    force_error : [force] bound on the error of the shear force; 0 if it is prescribed and below f P
+    displacement_error : [length] bound on the error of the displacement; 0 if it is prescribed,
+        unless the contact slides as a whole or `order` is "fails" (then infinite)
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
     >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
@@ -166,7 +168,8 @@ def shear(
 ) -> ShearState:
     """The friction state of a pressed contact after monotonic shear at constant load P.
 
-    It is the difference of two normal solutions, (1) of docs/theory/states.md.
+    With order it is the difference of two normal solutions, (1) of docs/theory/states.md. If
+    `order` is "fails" and the normal solution is proved, it comes from general steps.
 
     Prescribe one of the two:
 
@@ -174,8 +177,9 @@ def shear(
     displacement : [length] relative tangential displacement of distant points
 
     If |Q| differs from the friction limit f P by at most 16 * 2^-53 f P, it counts as f P: gross
-    sliding. A displacement this close to that at which gross sliding starts also counts as gross
-    sliding. Then the result contains f P and the displacement at which gross sliding starts.
+    sliding. A displacement that differs as little, relatively, from that at the onset of gross
+    sliding also counts as gross sliding. Then the result contains f P and the displacement at which
+    gross sliding starts.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
     that at which gross sliding starts; SolverError if a normal problem is not solved.

@@ -59,9 +59,9 @@ FILLED = 0.2
 #: the asperities, are not cached.
 MOST_KEPT = 2**21
 
-#: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), a lower bound on the
-#: eigenvalues of A in units of scale / spacing, is -2 log 2 for a row of points, and at most that
-#: for every lattice. The constant affects speed only.
+#: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), times scale / spacing,
+#: bounds the eigenvalues of A from below. It is -2 log 2 for a row of points, and at most this
+#: number for every lattice. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -262,9 +262,9 @@ class LatticeInfluence:
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
 
-        Pairs are searched by the difference (i, j) of their sites: first all differences with
-        max(|i|, |j|) = 1, then all with 2, and so on, until no farther pair can exceed the largest
-        ratio found. On a reduced basis these differences have lengths of at least 0.8, 1.6, ...
+        Pairs are searched by the difference (p, q) of their sites: first all with max(|p|, |q|) =
+        1, then all with 2, and so on, until no farther pair can exceed the largest ratio found. On
+        a reduced basis these differences have lengths of at least 0.8, 1.6, ... times the spacing.
         """
         if not self._filled:
             return crowding(self.points, radii)
@@ -312,8 +312,8 @@ class LatticeInfluence:
         """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
 
         slices : number of parts of 10 to 18 bits into which loads and kernel are divided
-            (docs/theory/operators-lattice.md, "Slices"); None for 3, or for 4 on more than `MANY`
-            sites, as friction needs
+            (docs/theory/operators-lattice.md, "Slices"). By default it is 3, or 4 if the box has
+            more than `MANY` sites; friction needs as many
         """
         slices = slices or SLICES + int(self.sites > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))

@@ -39,7 +39,7 @@ from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
 #: Number of rows of a stored matrix up to which a product to thirty digits takes less time than the
-#: press.
+#: rest of `press`.
 ALL_SHARP = 700
 
 #: If no load changes by more than this part of the largest load, A P is updated by a product of A
@@ -258,7 +258,8 @@ class NormalProblem:
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
         if highest == np.inf:
-            top = float(hertz.indentation(load, coefficients.max()))  # of one under the whole load
+            # the indentation of one asperity under the whole load
+            top = float(hertz.indentation(load, coefficients.max()))
         units = Units.of(top, _middle(coefficients))
         return cls(
             scene=scene,

@@ -2,8 +2,9 @@
 
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
-D = D0 + d of `NormalProblem`. For many asperities the iteration first includes only those near the
-contact, and adds others until all asperities that it leaves out are found to be open.
+D = D0 + d of `NormalProblem`. F is called the defect. For many asperities the iteration first
+includes only those near the contact, and adds others until all asperities that it leaves out are
+found to be open.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Pressing:
         return correct(
             self.problem.influence,
             self.problem.shells,
-            np.sqrt(state.at.slopes),  # W
+            np.sqrt(state.at.slopes),  # the diagonal of W in (1) of docs/theory/newton.md
             state.defect,
             balanced=self.problem.by_load,
             tolerance=left,
@@ -117,8 +118,9 @@ class Newton:
         the symbols of docs/theory/newton.md;  0 for the accuracy of float64
     max_iterations : largest number of steps; SolverError is raised if they are not enough
 
-    Let the left side be the residual. Once it is below 1e-12 (|D0| + max_i |d_i|), the method also
-    stops if it is small compared with the rounding errors of A P, or if a step does not halve it.
+    The left side of the inequality for `tolerance` is the residual. Once it is below 1e-12 (|D0| +
+    max_i |d_i|), the method also stops if it is small compared with the rounding errors of A P, or
+    if a step does not halve it.
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Newton(tolerance=1e-6))
     >>> contact.iterations, contact.certificate.holds
@@ -232,5 +234,5 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
         few = len(problem) <= ALL_ITERATED
         return on_hertz_pressure(problem) if few else mean_field_indentation(problem)
     if problem.load is not None:
-        loads = loads / loads.max() * problem.load  # also if they are too small for a sum
+        loads = loads / loads.max() * problem.load  # so that sums of tiny loads do not underflow
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
