@@ -73,11 +73,12 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) integrals of -dB/dL over pieces at constant load, which are differences of B."""
     moments = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
-    place, found = {each: k for k, each in enumerate(dict.fromkeys(moments))}, list[Ball]()
+    slipped = [each for each in dict.fromkeys(moments) if each[0] != each[1]]  # B(P, P) = 0
+    place, found = {each: k for k, each in enumerate(slipped)}, list[Ball]()
     for some in _some([*place], 1 + len(levels.candidates)):
         slip, slide = _at_moments(levels, some)
         found.append((slip + slide).sum())
-    lost = joined([*found, Ball.exact(np.zeros(0))])[[place[each] for each in moments]]
+    lost = joined([*found, Ball.exact(np.zeros(1))])[[place.get(each, -1) for each in moments]]
     return lost[1::2] - lost[0::2]
 
 
