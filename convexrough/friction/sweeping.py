@@ -24,10 +24,10 @@ this neighbour than to i, and the neighbour's shell does not reach i.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
+T = TypeVar("T")
 Moments = Callable[[NDArray[np.complex128]], list[Array]]
 
 
@@ -129,7 +130,18 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: NDArray[Any]) -> Arr
     """make(*rows), computed in parts of about NUMBERS numbers; each row needs `cost` numbers."""
     some = max(1, NUMBERS // cost)
     parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
-    return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
+    return np.concatenate(_each(lambda k: make(*(each[k : k + some] for each in rows)), parts))
+
+
+def _each(make: Callable[[Any], T], parts: Sequence[Any]) -> list[T]:
+    """[make(part) for part in parts], computed in several threads."""
+    found: dict[int, T] = {}
+
+    def compute(k: int) -> None:
+        found[k] = make(parts[k])
+
+    threads.each(compute, range(len(parts)), min(threads.cores(), len(parts)))
+    return [found[k] for k in range(len(parts))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +191,8 @@ class _Swept:
     def neighbours(self, which: Indices, count: int) -> Indices:
         """(m, count) the nearest asperities on the support to each asperity, without itself."""
         count = min(count, len(self.support) - 1)
-        _, found = self._tree.query(self._plane(self.places[which]), count + 1)
+        workers = threads.worthwhile(len(which) * count)
+        _, found = self._tree.query(self._plane(self.places[which]), count + 1, workers=workers)
         nearest = self.support[found]
         itself = np.argsort(nearest == which[:, None], axis=1, kind="stable")
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
@@ -319,17 +332,20 @@ class _Swept:
         starts = np.arange(len(which) + 1) * near.shape[1]
         shape = len(which), len(charged)
         charges = csr_array((weights.ravel(), columns.ravel(), starts), shape=shape)
-        most, worst = np.zeros(len(which)), near[:, 0].copy()
         nowhere = np.full(len(self.places), np.inf)
         parts = 1 + (len(charged) + len(which)) * len(self.support) // NUMBERS
-        for seen in np.array_split(self.support, parts):
+
+        def among(seen: Indices) -> tuple[Array, Indices]:
             swept = charges @ (1.0 / self._apart(charged, seen, self.shells))
             swept *= self._apart(which, seen, nowhere)
             least = swept.argmin(axis=1)
-            q = 1.0 / swept[rows, least]
-            worst = np.where(q > most, seen[least], worst)
-            most = np.maximum(most, q)
-        return most, worst
+            return 1.0 / swept[rows, least], seen[least]
+
+        q, worst = map(
+            np.array, zip(*_each(among, np.array_split(self.support, parts)), strict=True)
+        )
+        largest = q.argmax(axis=0)
+        return q[largest, rows], worst[largest, rows]
 
     def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
         """(m, k) distances of asperities; from an asperity to itself, its entry in `themselves`."""
