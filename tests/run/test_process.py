@@ -50,6 +50,21 @@ def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["plain,--proof"], "")
 
 
+def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
+    """Python ignores errors of `__del__`, so this interrupt would be lost."""
+    code = (
+        "import signal, sys, convexrough.cli.program as program\n"
+        "class Freed:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "def status(arguments):\n"
+        "    import time; Freed(); time.sleep(10)\n"
+        "program._status = status\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(program.main([]))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (130, "convexrough: interrupted\n")
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("delay", [0.02, 0.1, 0.3, 0.6, 1.0])
 def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
