@@ -14,6 +14,7 @@ from convexrough.progress import LOGGER
 from convexrough.record import rows_of
 from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
+from convexrough.surface.detrend import Removed, principal
 from convexrough.surface.provability import (
     LEVELS,
     TOO_FAR,
@@ -38,6 +39,10 @@ MOST_LISTED = 10
 
 #: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
+
+#: Above this ratio of the twist of a form to the geometric mean of its curvatures along x and y,
+#: these do not describe it.
+TURNED = 0.05
 
 #: Largest relative difference without a warning: between a statistic of the summits and its value
 #: for a Gaussian surface, and between the loads of the asperities and of the whole map.
@@ -96,7 +101,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
-            "removed": [asdict(each) | {"radius": each.radius} for each in surface.removed],
+            "removed": [_form(each) for each in surface.removed],
             **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
@@ -117,12 +122,18 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
         pairs, values = crowded(scanned.contact)
         summary["crowded"] = rows_of({"summits": pairs, "crowding": values})
         summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
+    if (form := with_form(scanned)) is not None:
+        summary["with_form"] = {"radii": form[0], "angle": form[1]}
     if scanned.whole is not None:
         summary["whole"] = {
             name: {"asperities": model, "whole": whole}
             for name, model, whole in scanned.whole.compared()
         } | {"resolution": scanned.whole.resolution}
     return summary
+
+
+def _form(removed: Removed) -> dict[str, Any]:
+    return asdict(removed) | {"curvature": removed.curvature, "radius": removed.radius}
 
 
 def _named(found: object, *names: str) -> dict[str, Any]:
@@ -187,15 +198,42 @@ def describe_surface(scanned: Scanned) -> list[str]:
     return described
 
 
+def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
+    """The radii of one body whose shape is that of the pressing body plus the removed forms.
+
+    The number is the angle [degrees] from x to the axis of the first radius. It is 0 if the radii
+    are those along x and y. None if nothing was pressed or no curved form was removed.
+    """
+    forms = [each.tensor for each in scanned.surface.removed if any(each.curvatures)]
+    if scanned.contact is None or not forms:
+        return None
+    body = np.divide(1.0, along(scanned.contact.scene.sphere_radius))
+    both = np.diag(body) + sum(forms)
+    along_x, along_y = both.diagonal().tolist()
+    curvatures, angle = (along_x, along_y), 0.0
+    if abs(both[0, 1]) > TURNED * abs(along_x * along_y) ** 0.5:
+        curvatures, angle = principal(both)
+    first, second = (1.0 / each if each else float("inf") for each in curvatures)
+    return (first, second), angle
+
+
 def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
-    """The line on the radius of the pressing sphere, if a curved form was removed from the map."""
-    curvature = sum(each.curvature for each in scanned.surface.removed)
-    if scanned.contact is not None and curvature:
-        scene = scanned.contact.scene
-        with_form, form = scene.curvature + curvature, 1.0 / curvature
-        both = f"{1.0 / with_form:.6g}" if with_form > 0 else "no hill"
-        said = f"{scene.mean_radius:.6g}, without the removed form ({form:.6g}); with it"
-        yield "pressing radius", f"{said} {both}"
+    """The line on the radius of the pressing body, if a curved form was removed from the map."""
+    if scanned.contact is None or (found := with_form(scanned)) is None:
+        return
+    radii, angle = found
+    said = f"{_radii(along(scanned.contact.scene.sphere_radius))}, without the removed form; with "
+    said += f"it {_radii(radii)}" if max(radii) > 0 else "it no hill"
+    if angle and max(radii) > 0:
+        said += f", the first {angle:.3g}° from x: turn x and y of the summits by {-angle:.3g}°"
+    if min(radii) < 0 < max(radii):
+        said += "; [sphere] accepts no negative radius, but inf for a flat direction"
+    yield "pressing radius", said
+
+
+def _radii(radii: tuple[float, float]) -> str:
+    first, second = (f"{each:.6g}" for each in radii)
+    return first if first == second else f"[{first}, {second}]"
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:

@@ -79,6 +79,7 @@ def test_a_paraboloid_of_a_turned_cylinder() -> None:
     surface = cr.surface.Surface(0.1 * X - across**2 / 500 + NOISE, PIXEL, "mm")
     (removed,) = surface.detrend("paraboloid").removed
     assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
+    assert_allclose(removed.angle, np.degrees(np.arctan2(0.6, 0.8)), atol=0.5)
     assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
     metres = surface.detrend("paraboloid").to_unit("m")
     assert_allclose(metres.removed[0].curvatures, np.multiply(1e3, removed.curvatures))
