@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
@@ -75,7 +74,7 @@ class Removed:
         return f"sphere of radius {self.radius:.6g}, {tilt} in the middle"
 
 
-def principal(tensor: ArrayLike) -> tuple[tuple[float, float], float]:
+def principal(tensor: Array) -> tuple[tuple[float, float], float]:
     """The `curvatures` and the `angle` of a form with this `tensor`."""
     (second, first), axes = np.linalg.eigh(tensor)
     angle = math.degrees(math.atan2(axes[1, 1], axes[0, 1]))

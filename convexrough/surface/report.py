@@ -10,6 +10,7 @@ import numpy as np
 
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
+from convexrough.plausibility import FEW
 from convexrough.progress import LOGGER
 from convexrough.record import rows_of
 from convexrough.scene.base import along
@@ -18,6 +19,7 @@ from convexrough.surface.detrend import Removed, principal
 from convexrough.surface.provability import (
     LEVELS,
     TOO_FAR,
+    TOO_FEW,
     Press,
     Provability,
     crowded,
@@ -185,8 +187,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     described = labelled(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
-        more = ", but see the warnings" if any(warnings_about(scanned)) else ""
-        described += ["", *_describe_curve(scanned.curve, surface.unit, more)]
+        described += ["", *_describe_curve(scanned.curve, surface.unit)]
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
@@ -245,7 +246,7 @@ def _describe_statistics(scanned: Scanned) -> list[str]:
     return aligned(table, left=1, digits=4)
 
 
-def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
+def _describe_curve(curve: Provability, unit: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
               "model error", "assumptions"]]  # fmt: skip
@@ -254,21 +255,23 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
             f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
-            ("met" if row["trusted"] else "not met") if row["contacts"] else "-",
+            (row["doubt"] or "met") if row["contacts"] else "-",
         ])  # fmt: skip
     first = curve.trusted_from
-    said = (
-        "no pruning is strong enough" if np.isnan(first) else f"at least {100 * first:.3g} %{more}"
-    )
+    met = "met at no pruning" if np.isnan(first) else f"met from a pruning of {100 * first:.3g} %"
+    said = [
+        ("assumptions", f"{met}: statuses proved, discs apart, at least {FEW} contacts"),
+        ("load", "falls with the pruning at one approach; --whole compares it with the whole map"),
+    ]
     if not curve.contacts.any():
-        said = "none, because nothing touches"
-    return [*aligned(table), "", *labelled([("advised pruning", said)])]
+        said = [("assumptions", "not tested, because nothing touches")]
+    return [*aligned(table), "", *labelled(said)]
 
 
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of summits.csv from 0:"
+        yield f"{'overlapping':<18}pairs: {len(pairs):,}, by row of summits.csv from 0:"
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
@@ -293,11 +296,11 @@ def _near_holes(scanned: Scanned) -> Iterator[str]:
     invented = near[tuple(scanned.summits.pixels.T)]
     if not (count := np.count_nonzero(invented)):
         return
-    said = f"{count:,} summits are fitted to filled pixels, whose heights are not measured"
+    said = f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
     if scanned.contact is not None and scanned.contact.loads.any():
         loads = scanned.contact.loads[invented]
-        said += f": {np.count_nonzero(loads):,} of them touch, with "
-        said += f"{loads.sum() / scanned.contact.loads.sum():.1%} of the load"
+        part = loads.sum() / scanned.contact.loads.sum()
+        said += f"; touching: {np.count_nonzero(loads):,}, with {part:.1%} of the load"
     yield said
 
 
@@ -323,9 +326,12 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         return
     chosen = summits.origin.prune
     first = scanned.curve.trusted_from
-    if not first <= chosen:
-        more = "no pruning is" if np.isnan(first) else f"--prune {first:g} is"
-        yield f"the asperity model cannot be trusted at a pruning of {chosen:g}; {more} enough"
+    (doubt,) = scanned.curve.doubts[scanned.curve.prune == chosen]
+    if doubt not in ("", TOO_FEW):  # the contact warns of too few contacts
+        more = "no pruning meets all assumptions with enough contacts"
+        if not np.isnan(first):
+            more = f"--prune {first:g} meets all assumptions, but pruning lowers the load"
+        yield f"the asperity model does not apply at a pruning of {chosen:g}: {doubt}; {more}"
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
         return
