@@ -46,7 +46,9 @@ class Pressing(NamedTuple):
         if scene is not None and others:
             raise click.UsageError("--scene excludes --radius, --approach, --load and --modulus.")
         if scene is None and others:
-            if radius is None or (approach is None) == (load is None):
+            if radius is None:
+                raise click.UsageError("--approach, --load and --modulus need --radius.")
+            if (approach is None) == (load is None):
                 raise click.UsageError("--radius needs exactly one of --approach and --load.")
             if (load is None) != (modulus is None):
                 raise click.UsageError("--load needs --modulus, and --modulus needs --load.")

@@ -29,7 +29,14 @@ from convexrough.tabular.roles import (
     shortened,
     units_in,
 )
-from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
+from convexrough.tabular.text import (
+    HOLES,
+    PERHAPS_GROUPED,
+    SAMPLE,
+    Style,
+    TextTable,
+    read_text_table,
+)
 from convexrough.tabular.units import bare, unit
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
@@ -253,8 +260,10 @@ def _text_source(table: TextTable) -> _Source:
             whole.append(row)
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    if style.separator == "," and doubled and pointless:
-        found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
+    first = (cell for row in table.rows[:SAMPLE] for cell in row.cells)
+    split = header is None and any(re.fullmatch(r"0\d+", cell) for cell in first)  # as 0,042 is
+    if style.separator == "," and pointless and (doubled or split):
+        found = f"rows: found up to {max(counts)} parts between commas, expected numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
         header,

@@ -175,8 +175,8 @@ def read_text_table(
     known : names of columns, in lower case; the line with most of them is the header
     required : names of columns; the sheet of a workbook that has most of them is read. Among sheets
         with equally many, it is the first that has a column of `known`, or else the first
-    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines of text
-        above the numbers that are not a header are comments
+    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines
+        of text above the numbers that are not a header are comments
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []

@@ -41,8 +41,8 @@ def test_what_trust_needs() -> None:
     good = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
                 crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0)  # fmt: skip
     fine = {}, {"scope": "local"}
-    wrong = ({"contacts": 4}, {"scope": "none"}, {"undecided": 1}, {"crowding": 1.001}, {"model_error": 0.0501},
-             {"crowding": np.nan})  # fmt: skip
+    wrong = ({"contacts": 4}, {"scope": "none"}, {"undecided": 1}, {"crowding": 1.001},
+             {"model_error": 0.0501}, {"crowding": np.nan})  # fmt: skip
     for change in (*fine, *wrong):
         trusted = change in fine
         curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})

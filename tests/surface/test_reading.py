@@ -212,6 +212,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
     ("Made by hand\nX step: 2.0\n\n@", ONE, "comments: found X step: 2.0, expected "),
     ("0.5 1.5 no 2.5\n@", ONE, "columns: found 0.5, 1.5, no, 2.5, expected a column"),
+    ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
     (
         "% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n",
         {},

@@ -208,7 +208,7 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
         (("holes.npy", "--pixel", "1"), "found 3 holes (nan) in 1,200 pixels"),
         (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
         (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
-        (("scan.npz", "--load", "1"), "--radius needs exactly one of"),
+        (("scan.npz", "--load", "1"), "--approach, --load and --modulus need --radius"),
         (("scan.npz", "--radius", "1", "--load", "1"), "--load needs --modulus"),
         (("scan.npz", "--scene", "scene.toml", "--radius", "1"), "--scene excludes --radius"),
         (("scan.npz", "--scene", "missing.toml"), "missing.toml: cannot be read"),

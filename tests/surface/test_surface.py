@@ -167,6 +167,9 @@ def test_spikes_and_drop_outs_are_named() -> None:
     missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
     told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
     assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
+    few = np.round(made, 5)
+    few.flat[::500] = 0.0
+    assert cr.surface.Surface(few, 1.0).repeated == 33
     assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
     for enlarged in (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3]):
         (said,) = cr.surface.Surface(enlarged, 10.0).detrend("plane").warnings
