@@ -32,9 +32,6 @@ LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 
 #: Crowding above which contact discs overlap, and largest trusted model error.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
-#: The doubt about a pruning that leaves too few contacts for a rough surface.
-TOO_FEW = f"fewer than {FEW} contacts"
-
 #: A function that presses a sphere on asperities.
 Press = Callable[[Asperities], Contact]
 
@@ -81,14 +78,13 @@ class Provability(Table, Plottable):
             "status not proved": proved,
             "discs overlap": self.crowding <= OVERLAP,
             f"model error above {TOO_FAR:.0%}": self.model_error <= TOO_FAR,
-            TOO_FEW: self.contacts >= FEW,
+            f"fewer than {FEW} contacts": self.contacts >= FEW,
         }
         return frozen(np.select([~met for met in assumed.values()], [*assumed], ""))
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(m,) True if all statuses are proved, no discs overlap, model errors are <= 5 %, and at
-        least 5 asperities touch."""
+        """(m,) True if statuses are proved, no discs overlap, errors are <= 5 %, and 5 touch."""
         return frozen(self.doubts == "")
 
     @property

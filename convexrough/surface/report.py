@@ -15,11 +15,10 @@ from convexrough.progress import LOGGER
 from convexrough.record import rows_of
 from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
-from convexrough.surface.detrend import Removed, principal
+from convexrough.surface.detrend import principal
 from convexrough.surface.provability import (
     LEVELS,
     TOO_FAR,
-    TOO_FEW,
     Press,
     Provability,
     crowded,
@@ -103,7 +102,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
-            "removed": [_form(each) for each in surface.removed],
+            "removed": [asdict(it) | _named(it, "curvature", "radius") for it in surface.removed],
             **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
@@ -132,10 +131,6 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             for name, model, whole in scanned.whole.compared()
         } | {"resolution": scanned.whole.resolution}
     return summary
-
-
-def _form(removed: Removed) -> dict[str, Any]:
-    return asdict(removed) | {"curvature": removed.curvature, "radius": removed.radius}
 
 
 def _named(found: object, *names: str) -> dict[str, Any]:
@@ -208,11 +203,9 @@ def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
     forms = [each.tensor for each in scanned.surface.removed if any(each.curvatures)]
     if scanned.contact is None or not forms:
         return None
-    body = np.divide(1.0, along(scanned.contact.scene.sphere_radius))
-    both = np.diag(body) + sum(forms)
-    along_x, along_y = both.diagonal().tolist()
-    curvatures, angle = (along_x, along_y), 0.0
-    if abs(both[0, 1]) > TURNED * abs(along_x * along_y) ** 0.5:
+    both = np.diag(np.divide(1.0, along(scanned.contact.scene.sphere_radius))) + sum(forms)
+    curvatures, angle = both.diagonal().tolist(), 0.0
+    if abs(both[0, 1]) > TURNED * abs(np.prod(curvatures)) ** 0.5:
         curvatures, angle = principal(both)
     first, second = (1.0 / each if each else float("inf") for each in curvatures)
     return (first, second), angle
@@ -327,11 +320,10 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     chosen = summits.origin.prune
     first = scanned.curve.trusted_from
     (doubt,) = scanned.curve.doubts[scanned.curve.prune == chosen]
-    if doubt not in ("", TOO_FEW):  # the contact warns of too few contacts
-        more = "no pruning meets all assumptions with enough contacts"
-        if not np.isnan(first):
-            more = f"--prune {first:g} meets all assumptions, but pruning lowers the load"
-        yield f"the asperity model does not apply at a pruning of {chosen:g}: {doubt}; {more}"
+    if doubt:
+        more = f"--prune {first:g} meets all, but pruning lowers the load"
+        more = "no pruning meets all" if np.isnan(first) else more
+        yield f"assumptions of the model not met at a pruning of {chosen:g}: {doubt}; {more}"
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
         return

@@ -29,14 +29,7 @@ from convexrough.tabular.roles import (
     shortened,
     units_in,
 )
-from convexrough.tabular.text import (
-    HOLES,
-    PERHAPS_GROUPED,
-    SAMPLE,
-    Style,
-    TextTable,
-    read_text_table,
-)
+from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
 from convexrough.tabular.units import bare, unit
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
@@ -260,9 +253,13 @@ def _text_source(table: TextTable) -> _Source:
             whole.append(row)
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    first = (cell for row in table.rows[:SAMPLE] for cell in row.cells)
-    split = header is None and any(re.fullmatch(r"0\d+", cell) for cell in first)  # as 0,042 is
-    if style.separator == "," and pointless and (doubled or split):
+    if (
+        style.separator == ","
+        and pointless
+        and (
+            doubled or (header is None and any(re.search(r",0\d", row.text) for row in table.rows))
+        )
+    ):
         found = f"rows: found up to {max(counts)} parts between commas, expected numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(

@@ -180,7 +180,7 @@ def read_text_table(
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
-    title, separator, sheet = "", "", ""
+    titles, separator, sheet = list[tuple[int, str]](), "", ""
     units: list[str] = []
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
@@ -198,7 +198,7 @@ def read_text_table(
             if not units and _are_units(cells := _APART.split(said)):
                 units = cells
             else:
-                title = title if lines else said
+                titles.append((number, said))
         elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
             text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
             comments += behind if not lines else ()
@@ -213,8 +213,8 @@ def read_text_table(
     rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
         raise FileError(f"{path}: empty")
-    above, (header, rows) = rows, _headed(rows, title, style, known, is_map)
-    top = header.number if header else rows[0].number
+    above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
+    top = header.number if header and header.number else rows[0].number
     comments += [row.text for row in above if row.number < top]
     if header:
         below = rows[0].cells if rows else []
@@ -230,9 +230,13 @@ def read_text_table(
 
 
 def _headed(
-    rows: list[TextRow], title: str, style: Style, known: Sequence[str], is_map: bool
+    rows: list[TextRow],
+    titles: Sequence[tuple[int, str]],
+    style: Style,
+    known: Sequence[str],
+    is_map: bool,
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header or None, and the rows below."""
+    """The header, from the rows or the last of the numbered titles, or None; and the rows below."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -240,6 +244,7 @@ def _headed(
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     width = len(rows[first].cells) if first < len(rows) else 0
     if first == 0:
+        title = next((said for number, said in titles[::-1] if number < rows[0].number), "")
         for named in (_header(title, style), _APART.split(title.strip())):
             count = wanted(named) + sum(name.lower() in PLACES for name in named)
             if len(named) == width and (count >= 2 or 2 * count >= width):
@@ -252,7 +257,7 @@ def _headed(
     if is_map and 0 < width != len(headers[place]) and wanted(headers[place]) < 2:
         numbers = [[style.number(cell) is not None for cell in row.cells] for row in rows[:first]]
         if all(2 * sum(found) < len(found) for found in numbers):  # else a damaged row
-            return None, rows[first:]
+            return _headed(rows[first:], titles, style, known, is_map)
     line, names, rows = rows[place], headers[place], rows[place + 1 :]
     if style.separator == " " and rows:
         first = first - place - 1 if width else 0

@@ -327,6 +327,8 @@ def test_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:
         surface = raw(tmp_path / "map.xyz", title + "\n".join(lines), fill=True)
         assert np.argwhere(surface.filled_pixels).tolist() == [[0, 5]]
         assert_array_equal(surface.heights[1:], HEIGHTS[1:])
+    turned = raw(tmp_path / "map.xyz", "Sample A\n# y x z\n" + "\n".join(lines), fill=True)
+    assert_array_equal(turned.heights.T, surface.heights)
 
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -142,7 +142,7 @@ def test_not_certified_is_exit_status_three(find: Any) -> None:
     assert outcome.status == 3
     assert Path("scan-summits/summits.csv").exists()
     assert " none " in outcome.out
-    assert "does not apply at a pruning of 0: status not proved; no pruning" in outcome.err
+    assert "not met at a pruning of 0: status not proved; no pruning meets all" in outcome.err
 
 
 @pytest.mark.usefixtures("surface")
