@@ -1,4 +1,4 @@
-"""`summits`: find the summits of a measured surface, and recommend a pruning threshold."""
+"""`summits`: find the summits of a measured surface, and press them at several prunings."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ class Pressing(NamedTuple):
         if scene is not None and others:
             raise click.UsageError("--scene excludes --radius, --approach, --load and --modulus.")
         if scene is None and others:
-            if radius is None or (approach is None) == (load is None):
+            if radius is None:
+                raise click.UsageError("--approach, --load and --modulus need --radius.")
+            if (approach is None) == (load is None):
                 raise click.UsageError("--radius needs exactly one of --approach and --load.")
             if (load is None) != (modulus is None):
                 raise click.UsageError("--load needs --modulus, and --modulus needs --load.")
@@ -130,7 +132,8 @@ def summits(
     matrix of heights or with columns x, y and height. The command can also press a sphere on the
     middle of the map: give --scene; or --radius and --approach; or --radius, --load and --modulus.
     It then reports contacts, certificate, crowding (above 1, contact discs overlap) and model error
-    for several values of --prune, and recommends one of these values. With --whole it also computes
+    for several values of --prune, and from which value on the assumptions of the asperity model are
+    met. Stronger pruning lowers the load at a given approach. With --whole it also computes
     the contact of the whole map at the same approach, with one boundary element per pixel, and
     compares the two. The command always writes summits.csv, a summary and figures, for a.npz to the
     folder a-summits unless --out names another.

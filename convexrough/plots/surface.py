@@ -120,7 +120,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
     """The figure of contacts, crowding and model error against pruning.
 
-    Prunings below the advised one are shaded.
+    Prunings below the smallest at which the assumptions of the asperity model are met are shaded.
 
     chosen : the pruning that a dotted line marks;  unit : of the map's lengths, "" if unknown
 
@@ -129,7 +129,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     ...     return cr.press(cr.Scene(1e4, some, cr.Material(1.0, 0.3)), load=10.0)
     >>> curve = cr.surface.provability(summits, press, levels=[0.0, 0.1, 0.3])
     >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
-    advised pruning: at least 0 %   ($Sz$ = 2.85)
+    assumptions met from 0 %   ($Sz$ = 2.85)
     """
     figure, (upper, middle, lower) = panels(SINGLE, 5.0, 3, 1)
     draw_provability(upper, curve)
@@ -150,10 +150,10 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     for axes in (upper, middle, lower):
         axes.axvspan(0.0, until, color="0.92", lw=0.0, zorder=0)
         axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
-    advised = "none is enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
+    met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    style.title(upper, f"advised pruning: {advised}{size}")
+    style.title(upper, f"assumptions met {met}{size}")
     return figure
 
 

@@ -28,17 +28,29 @@ class Removed:
 
     kind      : "plane", "sphere" or "paraboloid" (of a cylinder or an ellipsoid)
     height, slopes : [length] height, and slopes along x and y, at the middle of the map
-    curvature : [1/length] curvature of a sphere, or mean curvature of a paraboloid; positive for a
-        hill, 0 for a plane
-    curvatures : [1/length] curvatures of a paraboloid along its two axes, the larger first; zeros
-        for other forms
+    curvatures : [1/length] principal curvatures, the larger first; positive for a hill. They are
+        equal for a sphere, and 0 for a plane
+    angle     : [degrees] direction of the axis of the first curvature, from x towards y
     """
 
     kind: Trend
     height: float
     slopes: tuple[float, float]
-    curvature: float = 0.0
     curvatures: tuple[float, float] = (0.0, 0.0)
+    angle: float = 0.0
+
+    @property
+    def curvature(self) -> float:
+        """[1/length] mean of `curvatures`."""
+        return sum(self.curvatures) / 2
+
+    @property
+    def tensor(self) -> Array:
+        """(2, 2) [1/length] the curvatures along x and y, and beside the diagonal the twist."""
+        first, second = self.curvatures
+        turned = math.radians(self.angle)
+        axis = np.array([math.cos(turned), math.sin(turned)])
+        return (first - second) * np.outer(axis, axis) + second * np.eye(2)
 
     @property
     def radius(self) -> float:
@@ -48,8 +60,8 @@ class Removed:
     def scaled(self, scale: float) -> Removed:
         """The same form with all lengths multiplied by `scale`."""
         first, second = self.curvatures
-        return Removed(self.kind, self.height * scale, self.slopes, self.curvature / scale,
-                       (first / scale, second / scale))  # fmt: skip
+        return Removed(self.kind, self.height * scale, self.slopes,
+                       (first / scale, second / scale), self.angle)  # fmt: skip
 
     def __repr__(self) -> str:
         tilt = f"slopes {self.slopes[0]:.3g} and {self.slopes[1]:.3g}"
@@ -57,8 +69,16 @@ class Removed:
             return f"plane, {tilt}"
         if self.kind == "paraboloid":
             first, second = (1.0 / each if each else float("inf") for each in self.curvatures)
-            return f"paraboloid of radii {first:.6g} and {second:.6g}, {tilt} in the middle"
+            radii = f"radii {first:.6g} and {second:.6g}, the first {self.angle:.3g}° from x"
+            return f"paraboloid of {radii}, {tilt} in the middle"
         return f"sphere of radius {self.radius:.6g}, {tilt} in the middle"
+
+
+def principal(tensor: Array) -> tuple[tuple[float, float], float]:
+    """The `curvatures` and the `angle` of a form with this `tensor`."""
+    (second, first), axes = np.linalg.eigh(tensor)
+    angle = math.degrees(math.atan2(axes[1, 1], axes[0, 1]))
+    return (float(first), float(second)), (angle + 90.0) % 180.0 - 90.0
 
 
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
@@ -81,15 +101,14 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     terms = [np.ones_like(wanted), x, y]
     if kind == "sphere":
         (a, slopes, curvature), z = _sphere(terms, wanted)
-        removed = Removed(kind, level + size * a, slopes, curvature / size)
+        removed = Removed(kind, level + size * a, slopes, (curvature / size,) * 2)
     else:
         terms += [x * x / 2, x * y, y * y / 2] if kind == "paraboloid" else []
         found = _least_squares(terms, wanted)
         z = np.asarray(sum(k * term for k, term in zip(found, terms, strict=True)))
         a, b, c, kx, kxy, ky = np.append(found, np.zeros(6 - len(found))).tolist()
-        first, second = ((0.0 - np.linalg.eigvalsh([[kx, kxy], [kxy, ky]])) / size).tolist()
-        mean = (first + second) / 2
-        removed = Removed(kind, level + size * a, (b, c), mean, (first, second))
+        bent = principal(0.0 - np.array([[kx, kxy], [kxy, ky]]) / size)
+        removed = Removed(kind, level + size * a, (b, c), *bent)
     there = np.full(heights.shape, np.nan)
     there[known] = level + size * z
     return removed, there

@@ -57,14 +57,14 @@ def clipped(heights: Array) -> int:
 def repeated(heights: Array) -> int:
     """The number of pixels with the most frequent height if they are surprisingly many, else 0.
 
-    They are surprisingly many if, in a sample, they are at least 20, and 20 times as many as the
+    They are surprisingly many if, in a sample, they are at least 20, and 5 times as many as the
     pixels of any other height. The largest height does not count: `clipped` treats it.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)
     most = int(np.argmax(counts))
     others = np.delete(counts, most).max(initial=1)
-    if counts[most] < 20 * others or values[most] == heights.max():
+    if counts[most] < max(20, 5 * others) or values[most] == heights.max():
         return 0
     return int(np.count_nonzero(heights == values[most]))
 

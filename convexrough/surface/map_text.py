@@ -30,7 +30,7 @@ _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 #: Words that announce a scale.
-_SCALE = re.compile(r"pixel|scale|factor|resolution|spacing|\bd[xyz]\b", re.I)
+_SCALE = re.compile(r"pixel|scale|factor|multipl|resolution|spacing|step|\bd[xyz]\b", re.I)
 
 #: A table with at most this many columns is not a matrix if two of them are coordinates of a grid.
 MOST_COLUMNS = 6
@@ -144,10 +144,6 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     first = [number(name) for name in names] if width > 3 else []
     if len(first) > 3 and None not in first[1:]:
         raise _not_heights("row 1", [each for each in first if each is not None])
-    if cells.header and len(names) < 3 < width:
-        expected = "a comment, which begins with #; the unit of heights as # Value units: nm"
-        found = repr(cells.header.text[:60])
-        raise InputError(f"row {cells.header.number}: text", found=found, expected=expected)
     table = read_table(path, required=("x", "y", "height"), unnamed=(["x", "y", "height"],),
                        holes=("height",), how=Reading(alike=False), table=cells)  # fmt: skip
     if others := [name for name, cells in table.others.items() if not _is_label(name, cells)]:

@@ -19,6 +19,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
+from convexrough.plausibility import FEW
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
@@ -54,7 +55,7 @@ class Provability(Table, Plottable):
     _along: ClassVar[Along] = {
         ("level",): (
             "prune", "heights", "summits", "contacts", "undecided", "scope", "crowding",
-            "model_error", "approaches", "loads", "trusted",
+            "model_error", "approaches", "loads", "trusted", "doubts",
         ),
     }  # fmt: skip
 
@@ -70,17 +71,31 @@ class Provability(Table, Plottable):
     loads: Array
 
     @property
-    def trusted(self) -> NDArray[np.bool_]:
-        """(m,) True if all statuses are proved, no discs overlap, and model errors are <= 5 %."""
+    def doubts(self) -> NDArray[np.str_]:
+        """(m,) the first assumption of the asperity model that is not met; "" if all are met."""
         proved = np.isin(self.scope, ("global", "local")) & (self.undecided == 0)
-        return frozen(proved & (self.crowding <= OVERLAP) & (self.model_error <= TOO_FAR))
+        assumed = {
+            "status not proved": proved,
+            "discs overlap": self.crowding <= OVERLAP,
+            f"model error above {TOO_FAR:.0%}": self.model_error <= TOO_FAR,
+            f"fewer than {FEW} contacts": self.contacts >= FEW,
+        }
+        return frozen(np.select([~met for met in assumed.values()], [*assumed], ""))
+
+    @property
+    def trusted(self) -> NDArray[np.bool_]:
+        """(m,) True if statuses are proved, no discs overlap, errors are <= 5 %, and 5 touch."""
+        return frozen(self.doubts == "")
 
     @property
     def trusted_from(self) -> float:
-        """The smallest pruning that is trusted together with all stronger ones; nan if none is."""
-        doubted = np.flatnonzero(~self.trusted)
+        """The smallest pruning that is trusted together with all stronger ones, apart from those
+        that leave fewer than 5 contacts; nan if there is none."""
+        enough = np.flatnonzero(self.contacts >= FEW)
+        last = int(enough[-1]) + 1 if len(enough) else 0
+        doubted = np.flatnonzero(~self.trusted[:last])
         first = int(doubted[-1]) + 1 if len(doubted) else 0
-        return float(self.prune[first]) if first < len(self.prune) else float("nan")
+        return float(self.prune[first]) if first < last else float("nan")
 
 
 def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEVELS) -> Provability:
@@ -95,8 +110,8 @@ def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEV
     >>> def press(asperities):
     ...     return cr.press(cr.Scene(1e4, asperities, material), load=10.0)
     >>> curve = cr.surface.provability(summits, press)
-    >>> print(curve.trusted_from, curve.trusted.all())
-    0.0 True
+    >>> print(curve.trusted_from, curve.doubts[-1])
+    0.0 fewer than 5 contacts
     """
     checks.instance("summits", summits, Summits)
     rows = []

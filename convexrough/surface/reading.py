@@ -72,7 +72,8 @@ def read(
     with blamed_on(path, unless_known=True):
         grid = _grid(Path(path), pixel)
         if grid.unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
-            expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm", or all three options'
+            expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '
+            expected += '"x [µm] y [µm] z [nm]" above columns, or all three options'
             expected += " --pixel, --unit, --height-unit, if the file is right without this line"
             raise InputError("comments", found=grid.unclear.strip(), expected=expected)
         length = one_unit("unit", unit, grid.unit)

@@ -10,10 +10,12 @@ import numpy as np
 
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
+from convexrough.plausibility import FEW
 from convexrough.progress import LOGGER
 from convexrough.record import rows_of
 from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
+from convexrough.surface.detrend import principal
 from convexrough.surface.provability import (
     LEVELS,
     TOO_FAR,
@@ -38,6 +40,10 @@ MOST_LISTED = 10
 
 #: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
+
+#: Above this ratio of the twist of a form to the geometric mean of its curvatures along x and y,
+#: these do not describe it.
+TURNED = 0.05
 
 #: Largest relative difference without a warning: between a statistic of the summits and its value
 #: for a Gaussian surface, and between the loads of the asperities and of the whole map.
@@ -96,7 +102,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
-            "removed": [asdict(each) | {"radius": each.radius} for each in surface.removed],
+            "removed": [asdict(it) | _named(it, "curvature", "radius") for it in surface.removed],
             **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
@@ -117,6 +123,8 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
         pairs, values = crowded(scanned.contact)
         summary["crowded"] = rows_of({"summits": pairs, "crowding": values})
         summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
+    if (form := with_form(scanned)) is not None:
+        summary["with_form"] = {"radii": form[0], "angle": form[1]}
     if scanned.whole is not None:
         summary["whole"] = {
             name: {"asperities": model, "whole": whole}
@@ -174,8 +182,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     described = labelled(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
-        more = ", but see the warnings" if any(warnings_about(scanned)) else ""
-        described += ["", *_describe_curve(scanned.curve, surface.unit, more)]
+        described += ["", *_describe_curve(scanned.curve, surface.unit)]
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
@@ -187,15 +194,40 @@ def describe_surface(scanned: Scanned) -> list[str]:
     return described
 
 
+def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
+    """The radii of one body whose shape is that of the pressing body plus the removed forms.
+
+    The number is the angle [degrees] from x to the axis of the first radius. It is 0 if the radii
+    are those along x and y. None if nothing was pressed or no curved form was removed.
+    """
+    forms = [each.tensor for each in scanned.surface.removed if any(each.curvatures)]
+    if scanned.contact is None or not forms:
+        return None
+    both = np.diag(np.divide(1.0, along(scanned.contact.scene.sphere_radius))) + sum(forms)
+    curvatures, angle = both.diagonal().tolist(), 0.0
+    if abs(both[0, 1]) > TURNED * abs(np.prod(curvatures)) ** 0.5:
+        curvatures, angle = principal(both)
+    first, second = (1.0 / each if each else float("inf") for each in curvatures)
+    return (first, second), angle
+
+
 def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
-    """The line on the radius of the pressing sphere, if a curved form was removed from the map."""
-    curvature = sum(each.curvature for each in scanned.surface.removed)
-    if scanned.contact is not None and curvature:
-        scene = scanned.contact.scene
-        with_form, form = scene.curvature + curvature, 1.0 / curvature
-        both = f"{1.0 / with_form:.6g}" if with_form > 0 else "no hill"
-        said = f"{scene.mean_radius:.6g}, without the removed form ({form:.6g}); with it"
-        yield "pressing radius", f"{said} {both}"
+    """The line on the radius of the pressing body, if a curved form was removed from the map."""
+    if scanned.contact is None or (found := with_form(scanned)) is None:
+        return
+    radii, angle = found
+    said = f"{_radii(along(scanned.contact.scene.sphere_radius))}, without the removed form; with "
+    said += f"it {_radii(radii)}" if max(radii) > 0 else "it no hill"
+    if angle and max(radii) > 0:
+        said += f", the first {angle:.3g}° from x: turn x and y of the summits by {-angle:.3g}°"
+    if min(radii) < 0 < max(radii):
+        said += "; [sphere] accepts no negative radius, but inf for a flat direction"
+    yield "pressing radius", said
+
+
+def _radii(radii: tuple[float, float]) -> str:
+    first, second = (f"{each:.6g}" for each in radii)
+    return first if first == second else f"[{first}, {second}]"
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
@@ -207,7 +239,7 @@ def _describe_statistics(scanned: Scanned) -> list[str]:
     return aligned(table, left=1, digits=4)
 
 
-def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
+def _describe_curve(curve: Provability, unit: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
               "model error", "assumptions"]]  # fmt: skip
@@ -216,21 +248,23 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
             f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
-            ("met" if row["trusted"] else "not met") if row["contacts"] else "-",
+            (row["doubt"] or "met") if row["contacts"] else "-",
         ])  # fmt: skip
     first = curve.trusted_from
-    said = (
-        "no pruning is strong enough" if np.isnan(first) else f"at least {100 * first:.3g} %{more}"
-    )
+    met = "met at no pruning" if np.isnan(first) else f"met from a pruning of {100 * first:.3g} %"
+    said = [
+        ("assumptions", f"{met}: statuses proved, discs apart, at least {FEW} contacts"),
+        ("load", "falls with the pruning at one approach; --whole compares it with the whole map"),
+    ]
     if not curve.contacts.any():
-        said = "none, because nothing touches"
-    return [*aligned(table), "", *labelled([("advised pruning", said)])]
+        said = [("assumptions", "not tested, because nothing touches")]
+    return [*aligned(table), "", *labelled(said)]
 
 
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}{len(pairs):,} pairs, by row of summits.csv from 0:"
+        yield f"{'overlapping':<18}pairs: {len(pairs):,}, by row of summits.csv from 0:"
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
@@ -255,11 +289,11 @@ def _near_holes(scanned: Scanned) -> Iterator[str]:
     invented = near[tuple(scanned.summits.pixels.T)]
     if not (count := np.count_nonzero(invented)):
         return
-    said = f"{count:,} summits are fitted to filled pixels, whose heights are not measured"
+    said = f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
     if scanned.contact is not None and scanned.contact.loads.any():
         loads = scanned.contact.loads[invented]
-        said += f": {np.count_nonzero(loads):,} of them touch, with "
-        said += f"{loads.sum() / scanned.contact.loads.sum():.1%} of the load"
+        part = loads.sum() / scanned.contact.loads.sum()
+        said += f"; touching: {np.count_nonzero(loads):,}, with {part:.1%} of the load"
     yield said
 
 
@@ -285,9 +319,11 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         return
     chosen = summits.origin.prune
     first = scanned.curve.trusted_from
-    if not first <= chosen:
-        more = "no pruning is" if np.isnan(first) else f"--prune {first:g} is"
-        yield f"the asperity model cannot be trusted at a pruning of {chosen:g}; {more} enough"
+    (doubt,) = scanned.curve.doubts[scanned.curve.prune == chosen]
+    if doubt:
+        more = f"--prune {first:g} meets all, but pruning lowers the load"
+        more = "no pruning meets all" if np.isnan(first) else more
+        yield f"assumptions of the model not met at a pruning of {chosen:g}: {doubt}; {more}"
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
         return

@@ -116,8 +116,8 @@ class Folder:
                 path.unlink(missing_ok=True)
                 left += 1
         said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
-        said += f", {damaged:,} damaged parts removed" if damaged else ""
-        return todo, said + (f", {left:,} unfinished files removed" if left else "")
+        said += f", damaged parts removed: {damaged:,}" if damaged else ""
+        return todo, said + (f", unfinished files removed: {left:,}" if left else "")
 
 
 def open_folder(path: Path) -> Folder:

@@ -23,7 +23,7 @@ class Column(NamedTuple):
 COLUMNS = {
     "x": Column(),
     "y": Column(),
-    "height": Column(also=("z", "h", "heights")),
+    "height": Column(also=("z", "h", "heights", "höhe", "hoehe")),
     "tip_radius": Column(also=("radius",), positive=True),
     "load": Column("force"),
     "force": Column("force"),

@@ -253,8 +253,14 @@ def _text_source(table: TextTable) -> _Source:
             whole.append(row)
     pointless = not any("." in row.text for row in table.rows)
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    if style.separator == "," and doubled and pointless:
-        found = f"rows: found up to {2 * width} parts between commas, expected {width} numbers"
+    if (
+        style.separator == ","
+        and pointless
+        and (
+            doubled or (header is None and any(re.search(r",0\d", row.text) for row in table.rows))
+        )
+    ):
+        found = f"rows: found up to {max(counts)} parts between commas, expected numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
         header,

@@ -55,6 +55,8 @@ _GROUPED = re.compile(
     r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
 )
 PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+#: What instruments write for a hole. Spaces may separate columns, so this is replaced.
+_NO_DATA = re.compile(r"\bno data\b", re.I)
 _SURROGATE = re.compile("[\udc80-\udcff]")
 #: The separators in a comment that may be a header.
 _APART = re.compile(r"\s*[,;\s]\s*")
@@ -173,11 +175,12 @@ def read_text_table(
     known : names of columns, in lower case; the line with most of them is the header
     required : names of columns; the sheet of a workbook that has most of them is read. Among sheets
         with equally many, it is the first that has a column of `known`, or else the first
-    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map
+    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines
+        of text above the numbers that are not a header are comments
     """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
-    title, separator, sheet = "", "", ""
+    titles, separator, sheet = list[tuple[int, str]](), "", ""
     units: list[str] = []
     numbered = _lines(path)
     if path.suffix.lower() in WORKBOOKS:
@@ -185,6 +188,7 @@ def read_text_table(
         sheet, numbered, comments = _sheet_lines(path, known, required, is_map)
     for number, line in numbered:
         text = line.strip("\r\n")
+        text = _NO_DATA.sub("nan", text) if is_map else text
         inner = text.strip()
         if not lines and not separator and re.fullmatch(r"sep=.", inner):  # written by Excel
             separator = inner[-1]
@@ -194,7 +198,7 @@ def read_text_table(
             if not units and _are_units(cells := _APART.split(said)):
                 units = cells
             else:
-                title = title if lines else said
+                titles.append((number, said))
         elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
             text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
             comments += behind if not lines else ()
@@ -209,9 +213,10 @@ def read_text_table(
     rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
     if not rows:
         raise FileError(f"{path}: empty")
-    above, (header, rows) = rows, _headed(rows, title, style, known)
+    above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
+    top = header.number if header and header.number else rows[0].number
+    comments += [row.text for row in above if row.number < top]
     if header:
-        comments += [row.text for row in above if row.number < header.number]
         below = rows[0].cells if rows else []
         if _are_units(below) and len(below) <= len(header.cells):
             units, rows = below, rows[1:]
@@ -219,14 +224,19 @@ def read_text_table(
             units = []
         header = header._replace(cells=_with_units(header.cells, units))
     elif len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
-        rows = [row for row in every if filled[0].number <= row.number <= filled[-1].number]
+        top = top if above[0].number < top else filled[0].number
+        rows = [row for row in every if top <= row.number <= filled[-1].number]
     return TextTable(*_trimmed(header, rows, style), style, comments)
 
 
 def _headed(
-    rows: list[TextRow], title: str, style: Style, known: Sequence[str]
+    rows: list[TextRow],
+    titles: Sequence[tuple[int, str]],
+    style: Style,
+    known: Sequence[str],
+    is_map: bool,
 ) -> tuple[TextRow | None, list[TextRow]]:
-    """The header or None, and the rows below."""
+    """The header, from the rows or the last of the numbered titles, or None; and the rows below."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -234,6 +244,7 @@ def _headed(
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     width = len(rows[first].cells) if first < len(rows) else 0
     if first == 0:
+        title = next((said for number, said in titles[::-1] if number < rows[0].number), "")
         for named in (_header(title, style), _APART.split(title.strip())):
             count = wanted(named) + sum(name.lower() in PLACES for name in named)
             if len(named) == width and (count >= 2 or 2 * count >= width):
@@ -243,6 +254,10 @@ def _headed(
     place = max(
         range(len(headers)), key=lambda i: (wanted(headers[i]), len(headers[i]) == width, -i)
     )
+    if is_map and 0 < width != len(headers[place]) and wanted(headers[place]) < 2:
+        numbers = [[style.number(cell) is not None for cell in row.cells] for row in rows[:first]]
+        if all(2 * sum(found) < len(found) for found in numbers):  # else a damaged row
+            return _headed(rows[first:], titles, style, known, is_map)
     line, names, rows = rows[place], headers[place], rows[place + 1 :]
     if style.separator == " " and rows:
         first = first - place - 1 if width else 0

@@ -41,9 +41,23 @@ def test_what_trust_needs() -> None:
     good = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
                 crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0)  # fmt: skip
     fine = {}, {"scope": "local"}
-    wrong = ({"scope": "none"}, {"undecided": 1}, {"crowding": 1.001}, {"model_error": 0.0501},
-             {"crowding": np.nan})  # fmt: skip
+    wrong = ({"contacts": 4}, {"scope": "none"}, {"undecided": 1}, {"crowding": 1.001},
+             {"model_error": 0.0501}, {"crowding": np.nan})  # fmt: skip
     for change in (*fine, *wrong):
         trusted = change in fine
         curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})
         assert (curve.trusted.tolist(), curve.trusted_from == 0.1) == ([trusted], trusted)
+
+
+def test_prunings_that_leave_few_contacts_are_not_advised() -> None:
+    """Neither alone, on a crowded map, nor as a reason to doubt weaker prunings."""
+    for crowding, first in (([1.2, 1.1, 0.1, 0.0], np.nan), ([1.2, 0.9, 0.1, 0.0], 0.1)):
+        size = np.ones(4)
+        curve = Provability(
+            prune=np.array([0.0, 0.1, 0.3, 0.5]), heights=size, summits=np.array([90, 40, 4, 1]),
+            contacts=np.array([30, 20, 4, 1]), undecided=0 * size, scope=np.full(4, "global"),
+            crowding=np.array(crowding), model_error=0 * size, approaches=size, loads=size,
+        )  # fmt: skip
+        assert_allclose(curve.trusted_from, first)
+        assert curve.doubts[0] == "discs overlap"
+        assert curve.doubts[-1] == "fewer than 5 contacts"

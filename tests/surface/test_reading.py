@@ -87,7 +87,13 @@ def test_what_gwyddion_writes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "header",
-    ["x [mm], y [mm], z [µm]\n", "X/mm,Y/mm,Z/µm\n", "# x,y,z\n# mm,mm,µm\n", "x,y,height\n", ""],
+    [
+        "x [mm], y [mm], Höhe [µm]\n",
+        "X/mm,Y/mm,Z/µm\n",
+        "# x,y,z\n# mm,mm,µm\n",
+        "x,y,height\n",
+        "",
+    ],
 )
 def test_lists(tmp_path: Path, header: str) -> None:
     rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
@@ -203,7 +209,15 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
 
 #: Contents, in which @ is a matrix, with options, and what is said of them.
 WRONG: list[tuple[str, dict[str, Any], str]] = [
-    ("Height [nm]\n@", ONE, r"row 1: text: found 'Height \[nm\]', expected a co"),
+    ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
+    ("Made by hand\nX step: 2.0\n\n@", ONE, "comments: found X step: 2.0, expected "),
+    ("0.5 1.5 no 2.5\n@", ONE, "columns: found 0.5, 1.5, no, 2.5, expected a column"),
+    ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
+    (
+        "% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n",
+        {},
+        r'"x \[µm\] y \[µm\] z \[nm\]" above columns',
+    ),
     ("@", {}, "pixel: found none, expected its size, which the file does not state"),
     (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
     (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
@@ -238,7 +252,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("@\n@", ONE, "without numbers between rows 7 and 9, expected one map"),
     ('"-0,1","0,2","0,1","0,4"\n' * 4, ONE, "row 1: found -0,1, expected decimal points, not c"),
     ("@1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
-    ("a b c\n@", ONE, "columns: found a, b, c, expected a column 'x'"),
+    ("a b c d e f g h i\n@", ONE, "columns: found a, b, c, .*, expected a column 'x'"),
     ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
     ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
     ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
@@ -301,6 +315,20 @@ def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
 def test_other_comments_are_ignored(tmp_path: Path) -> None:
     said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 20 °C, m = 5\n"
     assert raw(tmp_path / "map.txt", said + matrix(), pixel=1.0).pixel == (1.0, 1.0)
+
+
+def test_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:
+    """Above a matrix and above columns, in which No Data marks a hole."""
+    text = "Instrument: FocusVar X\nDate: 2026-03-01\nPoints X: 9\n\n"
+    assert_array_equal(raw(tmp_path / "map.txt", text + matrix(), pixel=1.0).heights, HEIGHTS)
+    lines = [f"{i} {j} {HEIGHTS[j, i]!s}" for j, i in np.ndindex(7, 9)]
+    lines[5] = "5 0 No Data"
+    for title in ("Sample 3, after polishing\n", ""):
+        surface = raw(tmp_path / "map.xyz", title + "\n".join(lines), fill=True)
+        assert np.argwhere(surface.filled_pixels).tolist() == [[0, 5]]
+        assert_array_equal(surface.heights[1:], HEIGHTS[1:])
+    turned = raw(tmp_path / "map.xyz", "Sample A\n# y x z\n" + "\n".join(lines), fill=True)
+    assert_array_equal(turned.heights.T, surface.heights)
 
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

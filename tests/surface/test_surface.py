@@ -79,6 +79,7 @@ def test_a_paraboloid_of_a_turned_cylinder() -> None:
     surface = cr.surface.Surface(0.1 * X - across**2 / 500 + NOISE, PIXEL, "mm")
     (removed,) = surface.detrend("paraboloid").removed
     assert_allclose(removed.curvatures, (1 / 250, 0.0), atol=1e-5)
+    assert_allclose(removed.angle, np.degrees(np.arctan2(0.6, 0.8)), atol=0.5)
     assert_allclose(removed.slopes, (0.1, 0.0), atol=1e-3)
     metres = surface.detrend("paraboloid").to_unit("m")
     assert_allclose(metres.removed[0].curvatures, np.multiply(1e3, removed.curvatures))
@@ -166,6 +167,9 @@ def test_spikes_and_drop_outs_are_named() -> None:
     missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
     told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
     assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
+    few = np.round(made, 5)
+    few.flat[::500] = 0.0
+    assert cr.surface.Surface(few, 1.0).repeated == 33
     assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
     for enlarged in (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3]):
         (said,) = cr.surface.Surface(enlarged, 10.0).detrend("plane").warnings

@@ -250,7 +250,7 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
     with caplog.at_level(logging.INFO, "convexrough"):
         again = swept(SMALL, out=folder, resume=True)
     said = [news for news in caplog.messages if "scenes" in news]
-    removed = "1 damaged parts removed, 1 unfinished files removed"
+    removed = "damaged parts removed: 1, unfinished files removed: 1"
     assert said[0] == f"found 14 scenes of an earlier run, {removed}"
     assert said[-1].startswith("2 of 2 scenes, ")
     assert {path: path.stat().st_mtime_ns for path in times} == times
