@@ -176,10 +176,10 @@ def _answer(
 def _check_proof(certificate: Certificate, whose: str = "") -> None:
     __tracebackhide__ = True
     if certificate.scope == "none":
+        why = certificate.meaning.removeprefix("nothing is proved")
         raise AssertionError(
-            f"nothing is proved about the loads{whose}: they are too far from a solution, or the "
-            f"contacts are too crowded (convexity number {certificate.convexity_number:.3g}; the "
-            "energy is proved convex below 1)"
+            f"nothing is proved about the loads{whose}{why}; convexity number "
+            f"{certificate.convexity_number:.3g}, expected below 1"
         )
 
 

@@ -21,7 +21,14 @@ from convexrough.cli.output import (
     say_aside,
     written,
 )
-from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on, file_errors
+from convexrough.errors import (
+    ConvexroughError,
+    FileError,
+    InputError,
+    ProofError,
+    blamed_on,
+    file_errors,
+)
 
 if TYPE_CHECKING:
     from convexrough.arrays import Array
@@ -167,22 +174,27 @@ def verify(
         normal = judged_loads(of_loads.certificate, of_loads.values)
         summary = headed(normal=normal) | report.verdict_summary(claims)
         holds = all(claim.holds for claim in claims)
+        found = of_loads.solution
         claimed = np.where(of_loads.claimed, of_loads.values, 0.0)
         if new is not None:
             _write(new, summary, claims)
-        prove = partial(_proof, file, claimed, holds, scene)
+        prove = partial(_proof, file, claimed, of_loads, scene)
         proof = output.proved(prove, new.path if new else Path())
     if junit is not None:
         write_text(junit, report.junit(claims, names))
     lines = [*(each.note for each in read), *about]
     for claim in claims:
         lines += ["", *report.describe_claim(claim, ": --json and --out list all")]
-    lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
+    scaled = of_loads.total_prescribed not in (None, of_loads.total_given)
+    scaling = "; gaps and energy after scaling them to the prescribed total" if scaled else ""
+    lines += ["", f"certificate of the given loads{scaling}", *describe(normal, file.scene.units)]
     lines += written(new) if new else []
-    output.say(summary, lines, cautions_about(file.scene, claimed))
+    output.say(summary, lines)
     for claim in claims:
         for hint in claim.hints():
             say_aside("hint", hint)
+    for caution in cautions_about(file.scene, claimed if found is None else found.loads):
+        say_aside("warning", caution)
     if not holds:
         reasons = filter(None, map(report.reason, claims))
         say_aside("warning", f"not certified: {', '.join(reasons)}")
@@ -211,13 +223,19 @@ def _write(new: Writer, summary: dict[str, Any], claims: Sequence[Claim]) -> Non
     new.figures(verdict_figures(*claims))
 
 
-def _proof(file: SceneFile, loads: Array, holds: bool, scene: Path) -> Proof:
+def _proof(file: SceneFile, loads: Array, claim: Claim, scene: Path) -> Proof:
     """The proof that starts from the claimed loads or, if the claim holds, from the solution."""
     from convexrough.contact import solve
     from convexrough.proof import prove
 
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        if holds:  # claimed loads may be too inaccurate for an exact proof
+        if claim.holds:  # claimed loads may be too inaccurate for an exact proof
             loads = solve(file.problem(), start=loads).loads
-        return prove(file.scene, loads, **control)
+        try:
+            return prove(file.scene, loads, **control)
+        except ProofError as error:
+            if claim.holds or claim.solution is None or not claim.solution.certificate.holds:
+                raise
+            far = "nothing is proved: the given loads are too far from the solution"
+            raise ProofError(far) from error

@@ -112,10 +112,9 @@ class Certificate(Table):
         if self.scope == "global":
             return "the only solution"
         if self.scope == "none":
-            why = f": {self.obstacle}" if self.obstacle else ""
             count = len(self.in_the_way)
-            which = "1 asperity" if count == 1 else f"{count:,} asperities"
-            return f"nothing is proved because of {which}{why}"
+            where = f" (asperities in the way: {count:,})" if count else ""
+            return ": ".join(filter(None, ("nothing is proved", self.obstacle))) + where
         others = []
         if self.other_solutions_cover:
             others.append("a contact disc that covers the summit of its nearest neighbour")

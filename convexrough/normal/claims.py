@@ -132,8 +132,12 @@ class Claim(ABC):
         return not wrong and self.near_enough and self.total_holds
 
     def hints(self) -> Iterator[str]:
-        """Lines that name a possible cause of wrong forces, such as a wrong unit or sign."""
-        if self.holds or (nearby := self.nearby()) is None:
+        """Lines that name a possible cause of wrong forces, such as a wrong unit or sign.
+
+        There are none if the claim holds, and would also hold with the default of `within`.
+        """
+        passed = self.holds and self.error <= WITHIN
+        if passed or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
         if np.abs(values - true).max() <= CORRECTED:  # the statuses are wrong, not the forces
@@ -183,10 +187,11 @@ class Claim(ABC):
         elif power := _power_of_ten(abs(factor)):
             prefix = PREFIXES.get(power)
             unit = self.of.units.force or "N"
-            example = f", as {prefix}N for N" if prefix and unit == "N" else ""
+            example = f" (as {prefix}N for N)" if prefix and unit == "N" else ""
             modulus = ", or of the modulus" if self.total_prescribed is None else ""
-            size = f"are 10^{power} times what they should be: another unit{example}{modulus}?"
-        sign = "have the other sign than the prescribed total" if factor < 0 else ""
+            cause = f"another unit of force{example}{modulus}"
+            size = f"are 10^{power} times what they should be: {cause}?"
+        sign = "have the opposite sign to the prescribed total" if factor < 0 else ""
         return " and ".join(filter(None, (sign, size)))
 
     @property

@@ -33,10 +33,10 @@ POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
 
-CROWDED = "their discs overlap so much that the energy is not proved to be convex"
-POORLY_KNOWN = "their loads, with error bounds, may lie outside the box where the energy is convex"
-ELSEWHERE = "no given box is proved to contain their loads"
-NOT_OPEN = "they are fixed open, but their gaps are not proved"
+CROWDED = "contact discs overlap so much that the energy is not proved to be convex"
+POORLY_KNOWN = "loads, with error bounds, may lie outside the box where the energy is convex"
+ELSEWHERE = "no given box is proved to contain the loads"
+NOT_OPEN = "no gap is proved where the proof assumes one"
 
 
 def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from decimal import ROUND_CEILING, Context
 from typing import Any
 
 #: A table: a row of headings, then rows with the same number of cells.
@@ -28,9 +29,12 @@ def markdown(table: PrintedTable, *, left: int) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in [rows[0], rule, *rows[1:]]]
 
 
-def bound(value: float) -> str:
-    """An upper bound as text: two digits, rounded up; "unknown" if it is infinite."""
-    return f"{float(f'{1.05 * value:.2g}'):g}" if math.isfinite(value) else "unknown"
+def bound(value: float, digits: int = 3) -> str:
+    """An upper bound as text, rounded up to some digits; "unknown" if it is infinite."""
+    if not math.isfinite(value):
+        return "unknown"
+    rounded = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(str(float(value)))
+    return f"{float(rounded):g}"
 
 
 def _padded(table: PrintedTable, left: int, digits: int) -> list[list[str]]:

@@ -174,7 +174,8 @@ def read_text_table(
 
     known : names of columns, in lower case; the line with most of them is the header
     required : names of columns; the sheet of a workbook that has most of them is read. Among sheets
-        with equally many, it is the first that has a column of `known`, or else the first
+        with equally many, it is the first that has a column of `known`, or else the first; if no
+        sheet has any, it is the first with most columns of `known`
     is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines
         of text above the numbers that are not a header are comments
     """
@@ -341,13 +342,14 @@ def _sheet_lines(
             for page in book.worksheets
         }  # fmt: skip
 
-    def value(rows: list[list[str]]) -> tuple[int, bool]:
+    def value(rows: list[list[str]]) -> tuple[int, int]:
         names = {bare(cell).lower() for row in rows[:SAMPLE] for cell in row}
-        return len(names & {*required}), not names.isdisjoint(known)
+        wanted, others = (len(names & {*each}) for each in (required, known))
+        return wanted, min(others, 1) if wanted else others
 
     values = {name: value(rows) for name, rows in pages.items()}
     best, *others = [name for name in pages if values[name] == max(values.values())]
-    if values[best] == (0, False):
+    if values[best] == (0, 0):
         others = []
     aside: list[str] = []
     if is_map and len(pages) > 1:

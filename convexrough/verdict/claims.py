@@ -22,11 +22,12 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.height_grid import steps
+from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import Reading
 from convexrough.tabular.table import ReadTable, few, read_table
 from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
-from convexrough.verdict.verdict import rounded_up, verify_on
+from convexrough.verdict.verdict import verify_on
 
 #: Negative loads up to this fraction of the largest load, in absolute value, may be noise.
 SMALL = 1e-3
@@ -232,11 +233,11 @@ def _negative(
         found = f"no {name} is positive"
         if largest > floor:
             found = f"no {name} is above {largest:.2g}, and the least is {-least:.4g}"
-            advice += f" and --floor {rounded_up(largest)}"
+            advice += f" and --floor {bound(largest, 1)}"
         yield f"column {name}: {found}, expected positive compression: {advice}"
         return
     if least <= SMALL * largest:
-        hint = f"; --floor {rounded_up(least)} counts noise as 0"
+        hint = f"; --floor {bound(least, 1)} counts noise as 0"
     for i in bad:
         found = f": found {float(loads[i])!r}, expected a number that is not negative{hint}"
         yield mistake(int(i), found)

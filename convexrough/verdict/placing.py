@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import permutations
+from itertools import chain, permutations
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +18,11 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
+from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import is_index
 from convexrough.tabular.table import ReadTable, in_sheet
 from convexrough.tabular.units import bare
-from convexrough.verdict.verdict import rounded_up
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -47,9 +48,6 @@ FEW_FAR = 0.1
 #: asperity's distance from its neighbour. At 1 the node may be an asperity that the scene lacks.
 REACH = 0.9
 
-#: The expected positions, in the message for shifted ones.
-ON_THE_AXIS = "expected x, y relative to the sphere's axis"
-
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
@@ -57,8 +55,15 @@ MOST_UNREAD = 8
 #: each as a fraction of that asperity's distance from its neighbour; about 0.4 for random points.
 BY_CHANCE = 0.25
 
+#: Numbers with signs of both kinds, of which the fewer reach this part of the others in size, are
+#: positions rather than loads.
+BOTH_SIGNS = 0.1
+
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
+
+#: Another way to interpret the positions: the message, and the points (m, 2).
+Read = tuple[str, Array]
 
 
 @dataclass
@@ -121,7 +126,7 @@ class Placing:
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
         moved = ""
         if loaded.any() and not self._fits(self.points[most]):
-            moved = self._misread(loaded) or self._about_shifted(loaded, values)
+            moved = self._misread(loaded, self._about_shifted(loaded, values))
         if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
@@ -138,6 +143,12 @@ class Placing:
             first = {row: i for i, row in reversed([*enumerate(rows)])}
             self._refuse_repeated(np.array([first[row] for row in rows]), loaded, "each node once")
         self.how = f"{len(owners):,} nodes summed at their nearest asperities"
+        loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
+        modulus, tips = self.scene.material.contact_modulus, self.scene.relative_radii
+        radii = hertz.contact_radius(loads, modulus, tips)[owners]
+        if self.column != "force" and (held := loaded & (radii > 0)).any():
+            farthest = float((distances[held] / radii[held]).max())
+            self.how += f" (largest distance {farthest:.3g} contact radii)"
         return owners
 
     # By an index, or in order
@@ -197,8 +208,9 @@ class Placing:
             where = " and ".join(self.table.rows[i] for i in np.flatnonzero(index == twice)[:2])
             wrong = f"{twice} in {where}, expected each asperity once"
         elif least > 0 and most < count:
-            more = f"a row 0 if they count from 0, a row {count} if they count from 1"
-            wrong = f"numbers from {least} to {most}, expected also {more}; or columns x and y"
+            more = f"0, if they count from 0, or {count}, if they count from 1"
+            wrong = f"numbers from {least} to {most}, expected also {more}"
+            wrong += f": add this row with {self.column} 0"
         elif most - (first := min(least, 1)) >= count:
             last = f"{count - 1 + first}, the last asperity"
             wrong = f"{most}, expected at most {last}; or columns x and y"
@@ -309,12 +321,12 @@ class Placing:
         doubtful = far.any() if len(points) == len(self.scene) else far.mean() > 0.5
         if doubtful or not alone:
             every = np.ones(len(points), dtype=np.bool_)
-            if moved := self._misread(every) or self._shifted(points):
+            if moved := self._misread(every, self._shifted(points)):
                 self.mistakes.append(f"positions: {moved}")
                 return owners
-        if far.any() and alone and float(rounded_up(most)) <= self._spacing / 2:
+        if far.any() and alone and float(bound(most, 1)) <= self._spacing / 2:
             found = f"found them up to {most:.3g} from the nearest asperities"
-            advice = f"if they are rounded: --tolerance {rounded_up(most)}"
+            advice = f"if they are rounded: --tolerance {bound(most, 1)}"
             self.mistakes.append(f"positions: {found}, expected at most {allowed:.3g}; {advice}")
             return owners
         for i in np.flatnonzero(far):
@@ -323,24 +335,40 @@ class Placing:
         self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
-    def _misread(self, rows: NDArray[np.bool_]) -> str:
-        """A message that names columns, signs or units with which the rows fit; "" if none do."""
-        return next((said for said, points in self._readings(rows) if self._fits(points)), "")
+    def _misread(self, rows: NDArray[np.bool_], shifted: Iterator[Read]) -> str:
+        """A message on columns, signs, units or a shift with which the rows fit; "" if none do."""
+        orders, named = self._orders(), chain(self._readings(rows), shifted)
+        ways = chain(named, orders) if self._may_be_loads(self.column) else chain(orders, named)
+        return next((said for said, points in ways if self._fits(points)), "")
 
-    def _readings(self, rows: NDArray[np.bool_]) -> Iterator[tuple[str, Array]]:
-        """Other ways to interpret x and y: for each the message, and the points (m, 2)."""
-        held = {name: self.table.columns[name] for name in ("x", "y", self.column)}
-        called = {name: quote(bare(self.table.called[name])) for name in held}
-        headed = not all(map(str.isdecimal, called.values()))
-        found = f"{'the header names' if headed else 'no header, and'} the columns in another order"
-        for order in permutations(held):
-            a, b, _ = order
-            if {a, b} != {"x", "y"}:
-                named = dict(zip(held, map(called.__getitem__, order), strict=True))
-                yield f"{found}: {_options('column', named)}", np.column_stack((held[a], held[b]))
+    def _may_be_loads(self, name: str) -> bool:
+        low, high = (float(each(self.table.columns[name])) for each in (np.min, np.max))
+        return min(-low, high) <= BOTH_SIGNS * max(-low, high)
+
+    @cached_property
+    def _called(self) -> dict[str, str]:
+        """The headers of x, y and the loads, quoted; numbers if there is no header."""
+        return {name: quote(bare(self.table.called[name])) for name in ("x", "y", self.column)}
+
+    @cached_property
+    def _headed(self) -> bool:
+        return not all(map(str.isdecimal, self._called.values()))
+
+    def _orders(self) -> Iterator[Read]:
+        """The columns in each order in which the column of loads holds positions."""
+        held, start = self.table.columns, "the header names" if self._headed else "no header, and"
+        for order in permutations(self._called):
+            if order[2] != self.column and self._may_be_loads(order[2]):
+                named = dict(zip(self._called, map(self._called.__getitem__, order), strict=True))
+                said = f"{start} the columns in another order: {_options('column', named)}"
+                yield said, np.column_stack([held[name] for name in order[:2]])
+
+    def _readings(self, rows: NDArray[np.bool_]) -> Iterator[Read]:
+        """Other axes, signs and units of x and y."""
+        called, held = self._called, self.table.columns
         points = np.column_stack((held["x"], held["y"]))[rows]
         exchanged = {"x": called["y"], "y": called["x"]}
-        exchange = _options("column", exchanged if headed else called | exchanged)
+        exchange = _options("column", exchanged if self._headed else called | exchanged)
         yield f"x and y are exchanged, or the array is turned: {exchange}", points[:, ::-1]
         for names, verb in (("x", "has"), ("y", "has"), ("xy", "have")):
             factors = {name: -self.table.factors.get(name, 1.0) for name in names}
@@ -359,29 +387,35 @@ class Placing:
                 )
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
-    def _shifted(self, points: Array) -> str:
-        """A message with the shift after which all points fit; "" if there is none."""
+    def _shifted(self, points: Array) -> Iterator[Read]:
+        """Shifts after which the first points fit."""
         positions = self.scene.asperities.positions
         tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
         if len(points) == len(positions):
             tried = [positions.mean(axis=0) - points.mean(axis=0)]
         for shift in tried:
-            if self._fits(points[:20] + shift) and self._fits(points + shift):
-                digit = 0.1 * min(self._allowed, float(np.abs(shift).max()))
-                by = _pair(np.round(-shift / digit) * digit)
-                return f"all are shifted by {by}, {ON_THE_AXIS}, to within {self._allowed:.3g}"
-        return ""
+            if self._fits(points[:20] + shift):
+                yield self._moved(points, shift)
 
-    def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> str:
-        """A message with the approximate shift after which loaded nodes fit; "" if none does."""
+    def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> Iterator[Read]:
+        """The shift from the axis that is likely for loaded nodes."""
         assert self.points is not None
         points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
         shift = np.average(points, axis=0, weights=weights)
         for _ in range(REFINEMENTS):  # the weighted mean vector from the nearest asperities
             near = places[self._nearest(points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
-        fits = self._fits(points - shift)
-        return f"all are shifted by about {_pair(shift)}, {ON_THE_AXIS}" if fits else ""
+        yield self._moved(points, -shift)
+
+    def _moved(self, points: Array, shift: Array) -> Read:
+        size = (0.1 if self.summed else 0.01) * min(
+            self._allowed, float(np.abs(shift).max())
+        ) or 1.0
+        digit = 10.0 ** math.floor(math.log10(size))
+        by = f"[{', '.join(f'{each + 0.0:.4g}' for each in np.round(-shift / digit) * digit)}]"
+        by = f"about {by}" if self.summed else f"{by}, to within {self._allowed:.3g}"
+        expected = "expected x, y relative to the sphere's axis: subtract the shift in the file"
+        return f"all are shifted by {by}, {expected}", points + shift
 
     def _refuse(self, row: Any, found: str, expected: str) -> None:
         self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
@@ -404,10 +438,6 @@ def unused(table: ReadTable) -> str:
 
 def _options(option: str, values: Mapping[str, str]) -> str:
     return " ".join(f"--{option} {name}={value}" for name, value in values.items())
-
-
-def _pair(point: Array) -> str:
-    return f"[{', '.join(f'{each + 0.0:.4g}' for each in point)}]"
 
 
 def _polar(radii: Array, angles: Array) -> Array:

@@ -7,7 +7,6 @@ shows which loads are wrong. `friction.verdict` compares shear forces with a sol
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,6 +26,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
+from convexrough.tabular.columns import bound
 
 #: A hint proposes --floor if the loads of all asperities that are claimed to touch, but proved
 #: open, are at most this fraction of the largest load.
@@ -45,7 +45,8 @@ class Verdict(Claim, Table, Plottable):
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
     solution    : the contact that Newton's method finds from the given loads or, if it fails, from
-        its default start; None if it finds none, or if the certificate proves the whole claim
+        its default start; None if it finds none, or if the certificate proves the whole claim, with
+        errors of at most 1 %
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone, list(verdict.hints()), verdict.nearby()
@@ -109,21 +110,17 @@ class Verdict(Claim, Table, Plottable):
         return None if found is None else (found.loads, found.certificate.load_errors)
 
     def hints(self) -> Iterator[str]:
-        """Lines that suggest where wrong loads may come from; none if the claim holds."""
+        """Lines that suggest where wrong loads may come from."""
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
                 f"{len(small):,} of the given loads, on asperities proved open, are at most "
                 f"{noise:.2g} ({noise / self.largest:.1g} of the largest load): "
-                f"--floor {rounded_up(noise)} counts them as 0"
+                f"--floor {bound(noise, 1)} counts them as 0"
             )
+        if 0 < (largest := float(self.loads.max())) <= self.floor:
+            yield f"--floor {self.floor:g} counts every load as 0: the largest is {largest:.4g}"
         yield from super().hints()
-
-
-def rounded_up(value: float) -> str:
-    """A positive value as text, rounded up to one significant digit."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
 
 
 def verify(
@@ -182,7 +179,7 @@ def verify_on(
     total = None if problem.load is None else problem.load * problem.units.force
     certificate = certify_on(problem, claimed)
     verdict = Verdict(problem.scene, given, floor, within, total, certificate)
-    if verdict.holds:
+    if verdict.holds and verdict.error <= WITHIN:
         return verdict
     for start in (claimed, None):  # Newton's method may diverge from inaccurate loads
         try:

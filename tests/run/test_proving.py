@@ -58,7 +58,10 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     (tmp_path / "loads.csv").write_text("load\n" + "1e-3\n" * 61)
     wrong = command(*asked, "--force")
     assert wrong.status == 3
-    assert "warning: proof.json is not written: nothing is proved" in wrong.err
+    assert (
+        "warning: proof.json is not written: nothing is proved: the given loads are too far"
+        in wrong.err
+    )
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
 
 

@@ -301,7 +301,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                       for name, each in case.pixels().items()},
         "", "found x, y 10^3 times as large as", "--scale x=0.001 --scale y=0.001"),
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
-                       "all are shifted by about [0.0001997, 8.8"),
+                       "all are shifted by about [0.0001997, 9e-08], expected x, y rela"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
                           "x and y are exchanged, or the array is turned: --column x=y --c"),
     "places under other names": (lambda case: case.table("COORD1 COORD2 load"), "",
@@ -342,6 +342,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: case.pixels() | {name: [*each, more] for (name, each), more in
                                       zip(case.pixels().items(), (0.01, 0.0, 1.0), strict=True)},
         "", "row 14643: found a load at [0.01, 0.0]"),
+    "a header of nodes in another order": (
+        lambda case: dict(zip(("x", "load", "y"), patches(case).values(), strict=True)),
+        "a.csv --nodes", "the header names the columns in another order: --column x=x --column y="),
     "x mirrored": (lambda case: case.table(x=-PLACES[case.order, 0]), "",
                    "x has the other sign: --scale x=-1"),
     "nodes in km": (moved(lambda x, y: (1e-3 * x, 1e-3 * y)), "a.csv --nodes",
@@ -377,8 +380,8 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
-                                      "found numbers from 3 to 5, expected columns x and y, or al",
-                                      "also a row 0 if they count from 0, a row 12 if they cou"),
+                                      "found numbers from 3 to 5, expected also 0, if they count",
+                                      "or 12, if they count from 1: add this row with load 0"),
     "tables below one another": (
         lambda case: {name: np.tile(each, 3) for name, each in case.table().items()}
         | {"fraction": np.repeat([0.1, 0.37, 0.5], COUNT)}, "",
@@ -404,8 +407,11 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: [[["load", "E"], [3.0, 70e9]], cells(case.table())], "a.xlsx",
         'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
     "sheets without loads": (
-        lambda _: [[["x", "y"], [0.0, 0.0]], [["y"], [0.0]]], "a.xlsx",
-        "found x, y in sheet \"Sheet\", not \"Sheet1\", expected a column 'load'"),
+        lambda _: [[["x"], [0.0]], [["y"], [0.0]]], "a.xlsx",
+        "found x in sheet \"Sheet\", not \"Sheet1\", expected a column 'load'"),
+    "a sheet of notes before that of loads": (
+        lambda case: [[["Project", "X"]], cells(case.table("x y Kraft"))], "a.xlsx",
+        "found x, y, Kraft in sheet \"Sheet1\", expected a column 'load'; --column load=Kraft nam"),
     "a sign with noise": (
         lambda case: {"load": np.where(case.loads > 0, -case.loads, 1e-9 * case.loads.max())}, "",
         "and the least is -", "expected positive compression: --sign -1 and --floor "),
@@ -501,8 +507,28 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     name = put(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
     with pytest.raises(TableError) as refused:
         read_loads(tmp_path / name, scene, Manner())
-    cause = "all are shifted by [0.001, 0], expected x, y relative to the sphere's axis, to within"
-    assert str(refused.value) == f"{tmp_path / name}: positions: {cause} 1e-05"
+    cause = "all are shifted by [0.001, 0], to within 1e-05, expected x, y relative to the sphere's"
+    assert f"{tmp_path / name}: positions: {cause} axis" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("factor", "shift", "said"),
+    [(1e-3, 0.0, "--scale x=1000 --scale y=1000"), (1.0, 0.02, "shifted by about [0.02, 0], ")],
+)
+def test_headers_of_nodes_at_a_square_lattice(
+    tmp_path: Path, factor: float, shift: float, said: str
+) -> None:
+    """Loads taken as positions fit by chance, so the header must not be blamed first."""
+    asperities = cr.Asperities.square(spacing=0.04, tip_radius=0.15, within=0.25)
+    scene = cr.Scene(8.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+    loads = cr.press(scene, approach=8e-4).loads
+    touched, angles = np.flatnonzero(loads), np.arange(8) * np.pi / 4
+    around = 4e-3 * np.column_stack((np.cos(angles), np.sin(angles)))
+    x, y = factor * (scene.contact_points[touched][:, None] + around + [shift, 0]).reshape(-1, 2).T
+    columns = {"x": x, "y": y, "load": np.repeat(115384.6 * loads[touched] / 8, 8)}
+    with pytest.raises(TableError) as refused:
+        read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+    assert said in str(refused.value)
 
 
 # Units
@@ -639,12 +665,12 @@ def test_what_is_unlikely_is_told(
     assert all(each in outcome.err for each in said)
 
 
-def test_an_unlikely_modulus_is_told_before_loads_are_blamed(case: Case) -> None:
+def test_an_unlikely_modulus_is_told_beside_the_hint_about_loads(case: Case) -> None:
     write_scene("youngs_modulus = 210e3")
     outcome = case.verify(case.table())
     assert outcome.status == 3
-    blamed = "10^6 times what they should be: another unit, as µN for N, or of the modulus?"
-    assert 0 < outcome.err.index("softer than rubber") < outcome.err.index(blamed)
+    blamed = "10^6 times what they should be: another unit of force (as µN for N), or of the modu"
+    assert 0 < outcome.err.index(blamed) < outcome.err.index("softer than rubber")
 
 
 # What else is read, and said

@@ -131,8 +131,9 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     model = f" (but the model does not apply: crowding {crowding:.3g})" if crowding > 1 else ""
 
     def known(name: str) -> str:
-        most = "at most " if math.isfinite(proof[name]) else ""
-        return f"{most}{bound(proof[name])} {unit_of(name, units)}".rstrip()
+        if not math.isfinite(proof[name]):
+            return "unknown"
+        return f"at most {bound(proof[name])} {unit_of(name, units)}".rstrip()
 
     least = "that of the solution" if proof["scope"] == "local" else "its minimum"
     lines = [
