@@ -37,8 +37,8 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
-#: Under a prescribed load, Newton's method includes all asperities if they are at most FEW: a bound
-#: on the approach, by which some of them are known to be open, takes more time.
+#: Under a prescribed load, Newton's method includes all asperities if there are at most FEW:
+#: a bound on the approach, which would show that some are open, takes more time than it saves.
 FEW = 128
 
 #: A summit counts as beside a contact disc up to this multiple of the contact radius from the
@@ -60,8 +60,8 @@ class Contact(Cached, Table, Plottable):
     approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : estimate of the largest relative error of a displacement at a loaded asperity
-        that is due to point forces in place of pressures: the largest of `surface.model_errors`
+    model_error   : point forces in place of pressures make displacements at loaded asperities slightly
+        wrong; this is the largest relative error, estimated: the largest of `surface.model_errors`
     crowding      : largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii
         a and distances r; 0 if fewer than two touch. If it exceeds 1, contact discs overlap and the
         model fails
@@ -159,7 +159,7 @@ class Contact(Cached, Table, Plottable):
                 raise ProofError(f"sheared[{k}]: an indentation may fall as the load rises")
             left = levels.top.load - Ball.exact(drop / Fraction(levels.problem.units.force))
             near = levels.at(left).trial
-            assert near is not None  # only the level at the load 0 has no trial
+            assert near is not None  # only a level at the load 0 has no trial loads
             states.append((state.force, near))
         assert levels.top.trial is not None
         return prove(
@@ -411,7 +411,9 @@ def covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """(n,) [force] first-order changes of loads at constant approach, from "summit" to "closest".
+    """(n,) [force] first-order changes of loads from the geometry "summit" to "closest".
+
+    The approach is constant.
 
     They are 0 if the scene has the geometry "closest" already. In this geometry an asperity of tip
     radius rho at the distance r from the axis touches a sphere of radius R at the distance

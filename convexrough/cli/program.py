@@ -43,8 +43,8 @@ def program() -> None:
     """Compute rough frictional contact, with a proof of which asperities touch.
 
     Exit status: 0 done, everything proved; 1 standard output was closed or full, or `check` refused
-    a proof file; 2 wrong input; 3 done, but a result is wrong or not proved; 4 a solver or a scene
-    of a sweep failed; 130 interrupted.
+    a proof file; 2 wrong input; 3 done, but a result is not proved, or a checked claim is wrong or
+    not proved; 4 a solver or a scene of a sweep failed; 130 interrupted.
     """
 
 

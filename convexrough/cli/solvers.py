@@ -91,10 +91,10 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
     """Write a scene as cone and quadratic programs for other solvers.
 
     The cone program, which is equivalent to the contact law, and its dual, which bounds the energy
-    from below, are written as cbf, json (Clarabel) and npz, one file each. The quadratic program of
-    bristles (springs that together approximate Hertz's law) is written as mps and npz (qpsolvers).
-    For each program, index.json gives the minimum of the objective, the units of energy and load,
-    and the indices of the asperities.
+    from below, are written as cbf, json (Clarabel) and npz, each in its own files. The quadratic
+    program of bristles (springs that together approximate Hertz's law) is written as mps and npz
+    (qpsolvers). For each program, index.json gives the minimum of the objective, the units of
+    energy and load, and the indices of the asperities.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

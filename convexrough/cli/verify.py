@@ -73,8 +73,9 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.argument("scene", type=PATH)
 @click.argument("loads", type=PATH)
 @click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-              help="Largest error allowed: of a load or shear force, as a fraction of the largest "
-              "one; of a sum with a prescribed total, as a fraction of the total.")  # fmt: skip
+              help="Largest error allowed of a load or shear force, as a fraction of the largest "
+              "one. If their sum is prescribed, its error counts as a fraction of it."
+              )  # fmt: skip
 @click.option("--floor", metavar="X", type=float, default=0.0,
               help="Treat loads from -X to X as zero: their asperities are claimed to be open."
               )  # fmt: skip
@@ -93,8 +94,8 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.option("--nodes", is_flag=True,
               help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
 @click.option("--shear", metavar="FORCES", type=PATH,
-              help="Also check the shear forces in this file, under a shear force that has grown "
-              "from 0 to Q.")  # fmt: skip
+              help="Also check the shear forces in this file, after the total shear force has grown "
+              "from 0 to the Q of --shear-force.")  # fmt: skip
 @click.option("--shear-force", metavar="Q", type=float,
               help="Prescribed sum of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")

@@ -65,9 +65,9 @@ class Certificate(Table):
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
         which one of these asperities touches are not excluded
-    other_solutions_crowding : lower bound on the crowding of every other solution, the largest
-        (a_i + a_j) / r_ij of all pairs of asperities that can touch, with the distance r_ij and the
-        contact radii a, which are 0 where open. The bound is infinite if there is no other
+    other_solutions_crowding : lower bound on the crowding of every other solution. The
+        crowding is the largest (a_i + a_j) / r_ij of all pairs of asperities that can touch, with
+        their distance r_ij and the contact radii a, which are 0 where open. The bound is infinite if there is no other
         solution, and 0 if nothing is proved
     other_solutions_cover : True if, in every other solution, the contact disc of some asperity
         covers the summit of its nearest neighbour
@@ -191,7 +191,8 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     """The certificate of the given `loads` (N,) [force] of all asperities of the scene.
 
     level : the solution that is proved to be near these loads, or the obstacle to a proof
-    start : the trial of the given loads of asperities that can touch, scaled to a prescribed total
+    start : the given loads of the asperities that can touch, scaled to a prescribed total, with
+        their gaps
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
@@ -273,7 +274,10 @@ def _apart(loads: Array, found: Level) -> Array:
 
 
 def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
-    """(N,) [force] bounds on |load - load in the solution|; the load where it cannot touch."""
+    """(N,) [force] bounds on |load - load in the solution|.
+
+    For an asperity that cannot touch, the bound is its given load.
+    """
     errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
     scaled = given / force  # tiny loads underflow
     errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
@@ -303,7 +307,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         most[opened] = 0.0
     if (most > box.loads).any():  # on the box A >= -theta H, theta = box.convexity_number
         most = np.maximum(box.loads, most)
-        # At larger loads H is at least this fraction of its value on the box.
+        # Up to `most`, H is at least cbrt(part) times its value at the upper ends of the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
         if not (convex or box.convexity_at(problem.compliance(most)) < 1):
@@ -319,7 +323,9 @@ class _Screened(NamedTuple):
 
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
-    coupling: Coupling | None  # maps loads to their displacements; None if all can touch
+    coupling: (
+        Coupling | None
+    )  # maps loads to displacements of these asperities; None if all can touch
     indentation: Array  # approach + offset - displacement, which is minus the gap
     rounding: Array  # bounds on errors of the indentation
 
@@ -377,7 +383,7 @@ class OtherSolutions(NamedTuple):
 
     @classmethod
     def of(cls, level: Level, box: Box) -> OtherSolutions:
-        """The properties of solutions other than that in the box, which is near `level`."""
+        """The properties of all solutions other than the one that `level` encloses in `box`."""
         if box.scope == "global":
             return NO_OTHERS
         assert level.trial is not None

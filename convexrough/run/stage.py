@@ -33,7 +33,8 @@ Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 Labels = Mapping[str, Sequence[float]]
 
-#: Statuses of asperities, which are also names of the number of asperities with each status.
+#: Statuses of asperities. In rows of results, the name of a status stands for the number of
+#: asperities that have it.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
 #: Names of numbers in results and of keys of scene files, by physical dimension; other numbers are
@@ -90,7 +91,7 @@ class Stage(FileTable):
         if known and not 1 / FAR <= load / known <= FAR:
             yield (
                 f"{name} has loads up to {load:.4g}, and [normal] has the load {known:.4g}: check "
-                f"the units in both tables, and the key reference of {name}"
+                f"the units in both tables, and the key `reference` of {name}"
             )
         if 0 < self.highest_force < SLIGHT * checks.friction(contact.scene.friction) * load:
             yield (
@@ -103,7 +104,7 @@ class Stage(FileTable):
 
     @classmethod
     def sheared_by(cls, keys: Any) -> str:
-        """The part of a stage with these keys that needs [friction], for messages; "" if none."""
+        """What needs [friction] if the stage has these keys, for messages; "" if nothing does."""
         return f"[{cls.name}]"
 
     def compute(self, contact: Contact) -> Result:
@@ -120,7 +121,7 @@ def limit(contact: Contact) -> float:
 
 
 def same(*names: str) -> dict[str, str]:
-    """Headings of printed columns that are the names of the numbers."""
+    """Headings of printed columns: for each number its own name."""
     return {name: name for name in names}
 
 
@@ -198,8 +199,8 @@ class Result(Record):
             needs = f"which the proof of [{self.name}] needs"
             yield f"not proved: that indentations increase with the load, {needs}"
         elif "proved for one step" in self.orders and "loss" in self.stage.numbers:
-            why = "it is proved for one step only that indentations increase with the load"
-            yield f"not proved: the losses of [{self.name}], as {why}"
+            why = 'because order is "proved for one step" only'
+            yield f"not proved: the losses of [{self.name}], {why}"
 
     def cautions(self) -> Iterator[str]:
         """Warnings about limits of the model."""

@@ -191,7 +191,9 @@ class Summits(Table, Asperities, Plottable):
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about maxima; all arrays but `whole` are about the n with `whole` True.
+    """Paraboloids fitted around maxima.
+
+    `whole` has an entry for each maximum, other arrays for each of the n with `whole` True.
 
     whole      : for each of the given maxima, True if its paraboloid curves downwards in every
         direction and has its top within the fitted pixels

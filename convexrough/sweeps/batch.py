@@ -36,7 +36,7 @@ Row = tuple[str, str, list[float]]
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of a sweep file at `path`, with its contents without [sweep] as `tables`.
+    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep].
 
     Paths in the tables are relative to the folder of the file.
     """

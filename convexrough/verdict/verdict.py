@@ -144,7 +144,8 @@ def verify(
     influence : compliance operator, as for `press`
 
     The errors are bounded by certificates (docs/theory/certificate.md, "The bound"). Raises
-    InputError if the number of loads is wrong, or if a load is not finite or less than -floor.
+    InputError if the number of loads is wrong, if a load is not finite, or if a load is less than
+    -floor.
 
     >>> claimed = contact.loads.copy()
     >>> claimed[3] = 0.0
