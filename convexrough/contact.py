@@ -60,8 +60,9 @@ class Contact(Cached, Table, Plottable):
     approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : point forces in place of pressures make displacements at loaded asperities slightly
-        wrong; this is the largest relative error, estimated: the largest of `surface.model_errors`
+    model_error   : point forces in place of pressures make displacements at loaded asperities
+        slightly wrong; this is an estimate of the largest relative error (the largest of
+        `surface.model_errors`)
     crowding      : largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii
         a and distances r; 0 if fewer than two touch. If it exceeds 1, contact discs overlap and the
         model fails

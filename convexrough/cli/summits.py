@@ -135,8 +135,8 @@ def summits(
     for several values of --prune, and from which value on the assumptions of the asperity model are
     met. Stronger pruning lowers the load at a given approach. With --whole it also computes
     the contact of the whole map at the same approach, with one boundary element per pixel, and
-    compares the two. Summits, a summary and, without --no-figures, figures are written to the folder
-    of --out; by default this is a-summits for a.npz.
+    compares the two. Summits, a summary and, without --no-figures, figures are written to the
+    folder of --out; by default this is a-summits for a.npz.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

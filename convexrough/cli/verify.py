@@ -94,8 +94,8 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.option("--nodes", is_flag=True,
               help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
 @click.option("--shear", metavar="FORCES", type=PATH,
-              help="Also check the shear forces in this file, after the total shear force has grown "
-              "from 0 to the Q of --shear-force.")  # fmt: skip
+              help="Also check the shear forces in this file, after the total shear force has "
+              "grown from 0 to the Q of --shear-force.")  # fmt: skip
 @click.option("--shear-force", metavar="Q", type=float,
               help="Prescribed sum of the forces in FORCES.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")

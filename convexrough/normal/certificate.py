@@ -67,8 +67,8 @@ class Certificate(Table):
         which one of these asperities touches are not excluded
     other_solutions_crowding : lower bound on the crowding of every other solution. The
         crowding is the largest (a_i + a_j) / r_ij of all pairs of asperities that can touch, with
-        their distance r_ij and the contact radii a, which are 0 where open. The bound is infinite if there is no other
-        solution, and 0 if nothing is proved
+        their distance r_ij and the contact radii a, which are 0 where open. The bound is
+        infinite if there is no other solution, and 0 if nothing is proved
     other_solutions_cover : True if, in every other solution, the contact disc of some asperity
         covers the summit of its nearest neighbour
     in_the_way : (m,) indices of asperities that prevent a proof; empty if there is a proof

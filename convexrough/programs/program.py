@@ -91,7 +91,9 @@ class Program(Record):
     def loads(self, values: ArrayLike) -> Array:
         """(n,) [force] loads of all asperities of the scene, from a solver's solution.
 
-        values : the solution x, with or without the last variable that a file in CBF adds. For the dual, the multipliers of the equations, or of all constraints, in the order of the file; solvers differ in their sign, and both signs are accepted
+        values : the solution x, with or without the last variable that a file in CBF adds. For the
+            dual, the multipliers of the equations, or of all constraints, in the order of the file;
+            solvers differ in the sign of multipliers, and both signs are accepted
 
         Raises InputError for a wrong number of values.
 

@@ -100,7 +100,7 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
             if result.name != "shakedown":  # states follow from one step, losses do not
                 several[k] = replace(found, order="proved for one step")
                 (said,) = replace(result, found=tuple(several)).doubts()
-                assert said.startswith(f"not proved: the losses of [{result.name}], as")
+                assert said.startswith(f"not proved: the losses of [{result.name}],")
 
 
 def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
