@@ -67,6 +67,7 @@ class Contact(Cached, Table, Plottable):
         model fails
     candidates    : number of asperities that the solver included; all others are proved open
     influence     : the compliance operator: "dense", "lattice" or "scattered"
+    solver : name of the solver, with " + refinement" if Newton steps corrected a user's loads
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
     >>> contact = cr.press(scene, approach=5e-5)
@@ -341,6 +342,7 @@ def _contact(
             top = level if problem.influence.stored and len(problem) <= ALL_SHARP else None
         else:
             certificate = certify_on(problem, loads)
+    said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")
     contact = Contact(
         scene=scene,
         loads=loads,
@@ -352,7 +354,7 @@ def _contact(
         crowding=crowding,
         candidates=len(problem),
         influence=problem.influence.name,
-        solver=solver.name,
+        solver=solver.name + (" + refinement" if refine and not said else ""),
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,17 @@ class Table(Record):
         """The fields whose value is one number or one text, by name."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
+
+
+class Proved(Table):
+    """Base class of certificates, which have no truth value: they do not judge the given values."""
+
+    def __bool__(self) -> NoReturn:
+        """Raise TypeError, so that `assert certify(...)` does not pass for wrong values."""
+        raise TypeError(
+            f"{type(self).__name__}: neither true nor false; `all_proved` is about statuses only, "
+            "and `verify` judges loads"
+        )
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:

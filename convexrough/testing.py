@@ -81,7 +81,7 @@ def assert_shear_certified(
 
     >>> state = cr.shear(contact, force=9e-8)
     >>> proof = cr.testing.assert_shear_certified(contact, state.forces, force=9e-8, within=1e-9)
-    >>> proof.holds
+    >>> proof.all_proved
     True
     """
     __tracebackhide__ = True

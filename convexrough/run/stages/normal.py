@@ -78,7 +78,8 @@ class NormalResult(Result):
         return plausibility.doubts_of(self.contact)
 
     def cautions(self) -> Iterator[str]:
-        return plausibility.cautions(self.known[0], self.units)
+        yield from plausibility.wrong_loads(self.contact)
+        yield from plausibility.cautions(self.known[0], self.units)
 
     def figures(self) -> Mapping[str, Any]:
         return plots.press_figures(self.contact)
