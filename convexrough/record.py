@@ -24,6 +24,9 @@ COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 #: Arrays of at most FEW numbers and texts of at most LINE characters are printed in full.
 FEW, LINE = 4, 76
 
+#: The warnings of at most MANY scenes are printed.
+MANY = 100
+
 
 class Record:
     """Base class of results. `repr` gives a line for each field that is not empty."""
@@ -69,12 +72,15 @@ class Record:
         scene = getattr(getattr(self, "contact", self), "scene", None)
         if units := str(getattr(scene, "units", "")):
             yield "units", units
-        yield from (("warning", in_text(each)) for each in self.warnings)
+        scenes = getattr(getattr(self, "contacts", self), "scenes", ())
+        if len(scenes) <= MANY:  # else warnings take seconds
+            yield from (("warning", in_text(each)) for each in self.warnings)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the result, as sentences: the warnings of its `contact`, if any."""
-        return getattr(getattr(self, "contact", None), "warnings", ())
+        """Reasons to doubt the result, as sentences: those of its `contact` or `contacts`."""
+        pressed = getattr(self, "contact", None) or getattr(self, "contacts", None)
+        return getattr(pressed, "warnings", ())
 
     def _headline(self) -> str:
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
