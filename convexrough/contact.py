@@ -105,6 +105,11 @@ class Contact(Cached, Table, Plottable):
         """(n,) "contact" or "open" where that is proved, else "undecided"."""
         return self.certificate.status
 
+    @property
+    def area(self) -> float:
+        """[length^2] total contact area: the sum of the areas of the contact discs."""
+        return total_area(self.contact_radii)
+
     @cached_property
     def covered(self) -> int:
         """Number of open summits within 1.5 contact radii of the centre of a contact disc.
@@ -220,6 +225,17 @@ class Contact(Cached, Table, Plottable):
         return frozen(mean_pressures(self.loads, self.contact_radii))
 
 
+def discs_of(scene: Scene, loads: Array) -> Array:
+    """(n,) [length] the radii of the contact discs under loads (n,) [force]."""
+    modulus = scene.material.contact_modulus
+    return np.asarray(hertz.contact_radius(loads, modulus, scene.relative_radii))
+
+
+def total_area(radii: Array) -> float:
+    """[length^2] the area of contact discs with these radii (n,)."""
+    return float(np.pi * (radii**2).sum())
+
+
 def mean_pressures(loads: Array, radii: Array) -> Array:
     """(n,) loads divided by contact areas; 0 where the contact radius is 0."""
     areas = np.pi * radii**2
@@ -332,7 +348,7 @@ def _contact(
                 state = refined_loads(problem, solution.loads, problem.pressed_product)
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))
-        radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+        radii = discs_of(scene, loads)
         model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
         LOGGER.info("certifying")
         if refine:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact, covered, mean_pressures
+from convexrough.contact import Contact, covered, discs_of, mean_pressures
 from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import UnitNames
 
@@ -189,7 +188,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
 
 def cautions_about(scene: Scene, loads: Array) -> list[str]:
     """The warnings of `cautions` for loads (n,) [force]."""
-    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+    radii = discs_of(scene, loads)
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
     return [*cautions(limits(scene, loads, radii, near, covered(scene, radii)), scene.units)]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import frames
+from convexrough.errors import InputError
 
 if TYPE_CHECKING:
     import pandas
@@ -106,8 +107,14 @@ class Table(Record):
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays with these names, or all columns, by their names in the singular."""
+        """The arrays with these names, or all columns, by their names in the singular.
+
+        Raises InputError for other names.
+        """
         wanted = names or next(iter(self._along.values()))
+        valid = [name for some in self._along.values() for name in some]
+        for name in {*wanted}.difference(valid):
+            raise InputError("columns", found=repr(name), expected=f"some of {', '.join(valid)}")
         return {singular(name): getattr(self, name) for name in wanted}
 
     def to_dataframe(self) -> pandas.DataFrame:

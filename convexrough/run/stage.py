@@ -46,6 +46,7 @@ KINDS = {
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
+    "area": ("area",),
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
@@ -314,6 +315,7 @@ def unit_of(name: str, units: UnitNames) -> str:
     return {
         "length": length,
         "force": force,
+        "area": f"{length}²" if length else "",
         "work": f"{force} {length}" if both else "",
         "stiffness": f"{force}/{length}" if both else "",
     }.get(KIND.get(name, ""), "")
