@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import combinations
+from itertools import combinations, count
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any, Literal, NamedTuple
@@ -107,7 +107,7 @@ class Comparison(Table, Plottable):
     @property
     def certified(self) -> bool:
         """True if at least one solver's loads prove the status of every asperity."""
-        return any(contact.certificate.holds for contact in self.contacts)
+        return any(contact.certificate.all_proved for contact in self.contacts)
 
     def disagreeing(self, within: float) -> dict[str, float]:
         """The values of `disagreement` that exceed `within`, by the name of the solver.
@@ -180,9 +180,17 @@ def compare(
         kept: AbstractContextManager[Sequence[Any]] = logged_steps() if log else nullcontext(())
         with kept as steps:
             entry = _enter(solver, pressed)
-        entries.append(replace(_against(entry, [*entries, entry][0]), steps=tuple(steps)))
-    answers = [entry.contact for entry in entries if entry.contact is not None]
-    pairs = combinations([Answer.of(contact) for contact in answers], 2)
+        name, taken = entry.solver, [each.solver for each in entries]
+        numbered = (f"{name} ({k})" if k > 1 else name for k in count(1))
+        name = next(each for each in numbered if each not in taken)
+        entry = replace(_against(entry, [*entries, entry][0]), solver=name, steps=tuple(steps))
+        entries.append(entry)
+    answers = [
+        Answer.of(entry.contact)._replace(name=entry.solver)
+        for entry in entries
+        if entry.contact is not None
+    ]
+    pairs = combinations(answers, 2)
     return Comparison(
         entries=tuple(entries),
         contradictions=tuple(
@@ -258,7 +266,7 @@ def _enter(solver: solvers.Solver, pressed: Callable[..., Contact]) -> Entry:
         places = [each for each in extract_tb(error.__traceback__) if each.filename == file]
         place = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
         return Entry(solver.name, "failed", f"{type(error).__name__}: {error}{place}")
-    return Entry(solver.name, "answered", contact=contact, memory=memory.risen())
+    return Entry(contact.solver, "answered", contact=contact, memory=memory.risen())
 
 
 def _against(entry: Entry, reference: Entry) -> Entry:

@@ -68,6 +68,7 @@ class Contact(Cached, Table, Plottable):
         model fails
     candidates    : number of asperities that the solver included; all others are proved open
     influence     : the compliance operator: "dense", "lattice" or "scattered"
+    solver : name of the solver, with " + refinement" if Newton steps corrected a user's loads
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
     >>> contact = cr.press(scene, approach=5e-5)
@@ -104,6 +105,11 @@ class Contact(Cached, Table, Plottable):
     def status(self) -> NDArray[np.str_]:
         """(n,) "contact" or "open" where that is proved, else "undecided"."""
         return self.certificate.status
+
+    @property
+    def area(self) -> float:
+        """[length^2] total contact area: the sum of the areas of the contact discs."""
+        return total_area(self.contact_radii)
 
     @cached_property
     def covered(self) -> int:
@@ -220,6 +226,17 @@ class Contact(Cached, Table, Plottable):
         return frozen(mean_pressures(self.loads, self.contact_radii))
 
 
+def discs_of(scene: Scene, loads: Array) -> Array:
+    """(n,) [length] the radii of the contact discs under loads (n,) [force]."""
+    modulus = scene.material.contact_modulus
+    return np.asarray(hertz.contact_radius(loads, modulus, scene.relative_radii))
+
+
+def total_area(radii: Array) -> float:
+    """[length^2] the area of contact discs with these radii (n,)."""
+    return float(np.pi * (radii**2).sum())
+
+
 def mean_pressures(loads: Array, radii: Array) -> Array:
     """(n,) loads divided by contact areas; 0 where the contact radius is 0."""
     areas = np.pi * radii**2
@@ -332,7 +349,7 @@ def _contact(
                 state = refined_loads(problem, solution.loads, problem.pressed_product)
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))
-        radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+        radii = discs_of(scene, loads)
         model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
         LOGGER.info("certifying")
         if refine:
@@ -342,6 +359,7 @@ def _contact(
             top = level if problem.influence.stored and len(problem) <= ALL_SHARP else None
         else:
             certificate = certify_on(problem, loads)
+    said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")
     contact = Contact(
         scene=scene,
         loads=loads,
@@ -353,7 +371,7 @@ def _contact(
         crowding=crowding,
         candidates=len(problem),
         influence=problem.influence.name,
-        solver=solver.name,
+        solver=solver.name + (" + refinement" if refine and not said else ""),
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,

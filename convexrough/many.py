@@ -6,6 +6,7 @@ solved and proved together; the others are pressed one by one.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,7 @@ from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.steady import cycle
+from convexrough.plausibility import cautions_about
 from convexrough.record import Along, Table, in_text, singular
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.rows import CYCLE, MATRICES, TOTALS, PressedRows, in_rows
@@ -125,6 +127,22 @@ class Contacts(Table):
                 values[k] = getattr(one, singular(name))
         fields = {name: frozen(values) for name, values in fields.items()}
         return Cycles(contacts=self, maximum=frozen(upper), minimum=frozen(lower), **fields)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the contacts: a line for each kind, with the first scene that has it.
+
+        The kind of a warning is its text without numbers.
+        """
+        kinds = dict[str, list[str]]()
+        for k, (scene, loads) in enumerate(zip(self.scenes, self.asperity_loads, strict=True)):
+            pressed = "undecided" in self.status[k]
+            for line in self[k].warnings if pressed else cautions_about(scene, loads):
+                kinds.setdefault(re.sub(r"\d\S*", "", line), []).append(f"scenes[{k}]: {line}")
+        return tuple(
+            lines[0].replace("]", f"], the first of {len(lines):,}" if lines[1:] else "]", 1)
+            for lines in kinds.values()
+        )
 
     @cached_property
     def _known(self) -> dict[int, Contact]:

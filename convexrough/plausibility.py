@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact, covered, mean_pressures
+from convexrough.contact import Contact, covered, discs_of, mean_pressures
 from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import UnitNames
 
@@ -35,6 +34,9 @@ RUBBER, DIAMOND = 1e6, 1.2e12
 
 #: A larger coefficient of friction causes a warning. Clean metals in vacuum have a larger one.
 HIGH_FRICTION = 2.0
+
+#: A larger bound on the error of a load, as a fraction of the largest load, causes a warning.
+INACCURATE = 0.1
 
 #: At this ratio of contact radius to radius of curvature, paraboloid and sphere differ by 1 %.
 STEEP = 0.2
@@ -96,6 +98,19 @@ def warnings_of(contact: Contact) -> Iterator[str]:
     yield from cautions_of(contact)
 
 
+def wrong_loads(contact: Contact) -> Iterator[str]:
+    """A warning if the loads may be far from those of the solution whose statuses are proved."""
+    proof, largest = contact.certificate, float(contact.loads.max())
+    loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
+    far = proof.load_error > INACCURATE * largest and "contact" in proof.status
+    if loaded or far:
+        off = f"{100 * proof.load_error / (largest or 1.0):.2g} % of the largest load"
+        yield (
+            f"the loads err by up to {off}; asperities with a load that are proved open: "
+            f"{loaded}; check the solver"
+        )
+
+
 def doubts_of(contact: Contact) -> Iterator[str]:
     """The reason why not every status is proved, if that is so."""
     if contact.certificate.scope == "none":
@@ -105,8 +120,9 @@ def doubts_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact) -> Iterator[str]:
-    """The warnings of `cautions` for a contact."""
-    return cautions(limits_of(contact), contact.scene.units)
+    """The warnings of `wrong_loads` and `cautions` for a contact."""
+    yield from wrong_loads(contact)
+    yield from cautions(limits_of(contact), contact.scene.units)
 
 
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
@@ -172,7 +188,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
 
 def cautions_about(scene: Scene, loads: Array) -> list[str]:
     """The warnings of `cautions` for loads (n,) [force]."""
-    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+    radii = discs_of(scene, loads)
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
     return [*cautions(limits(scene, loads, radii, near, covered(scene, radii)), scene.units)]

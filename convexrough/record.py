@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import frames
+from convexrough.errors import InputError
 
 if TYPE_CHECKING:
     import pandas
@@ -23,6 +24,9 @@ COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
 #: Arrays of at most FEW numbers and texts of at most LINE characters are printed in full.
 FEW, LINE = 4, 76
+
+#: The warnings of at most MANY scenes are printed.
+MANY = 100
 
 
 class Record:
@@ -69,12 +73,15 @@ class Record:
         scene = getattr(getattr(self, "contact", self), "scene", None)
         if units := str(getattr(scene, "units", "")):
             yield "units", units
-        yield from (("warning", in_text(each)) for each in self.warnings)
+        scenes = getattr(getattr(self, "contacts", self), "scenes", ())
+        if len(scenes) <= MANY:  # else warnings take seconds
+            yield from (("warning", in_text(each)) for each in self.warnings)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the result, as sentences: the warnings of its `contact`, if any."""
-        return getattr(getattr(self, "contact", None), "warnings", ())
+        """Reasons to doubt the result, as sentences: those of its `contact` or `contacts`."""
+        pressed = getattr(self, "contact", None) or getattr(self, "contacts", None)
+        return getattr(pressed, "warnings", ())
 
     def _headline(self) -> str:
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
@@ -101,8 +108,14 @@ class Table(Record):
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """The arrays with these names, or all columns, by their names in the singular."""
+        """The arrays with these names, or all columns, by their names in the singular.
+
+        Raises InputError for other names.
+        """
         wanted = names or next(iter(self._along.values()))
+        valid = [name for some in self._along.values() for name in some]
+        for name in {*wanted}.difference(valid):
+            raise InputError("columns", found=repr(name), expected=f"some of {', '.join(valid)}")
         return {singular(name): getattr(self, name) for name in wanted}
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -145,6 +158,17 @@ class Table(Record):
         """The fields whose value is one number or one text, by name."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
+
+
+class Proved(Table):
+    """Base class of certificates, which have no truth value: they do not judge the given values."""
+
+    def __bool__(self) -> NoReturn:
+        """Raise TypeError, so that `assert certify(...)` does not pass for wrong values."""
+        raise TypeError(
+            f"{type(self).__name__}: neither true nor false; `all_proved` is about statuses only, "
+            "and `verify` judges loads"
+        )
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from convexrough import checks
 from convexrough.compare import Answer, contradictions, joined
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -20,6 +21,7 @@ from convexrough.friction.shear import ShearCertificate
 from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.normal.claims import WITHIN, Claim, tolerance
+from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.verdict import verify
 from convexrough.verdict.report import describe_claim, reason
@@ -81,7 +83,7 @@ def assert_shear_certified(
 
     >>> state = cr.shear(contact, force=9e-8)
     >>> proof = cr.testing.assert_shear_certified(contact, state.forces, force=9e-8, within=1e-9)
-    >>> proof.holds
+    >>> proof.all_proved
     True
     """
     __tracebackhide__ = True
@@ -167,6 +169,8 @@ def _answer(
 ) -> Answer:
     if isinstance(given, Contact):
         return Answer(f"{name} ({given.solver})", given.loads, given.certificate)
+    if isinstance(given, Record):
+        checks.instance(name, given, Contact)
     if scene is None:
         raise InputError("scene", found="none", expected=f"the scene of the loads `{name}`")
     certificate = certify(scene, given, approach=approach, load=load)

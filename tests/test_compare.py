@@ -72,7 +72,7 @@ def test_all_agree(name: str, control: str) -> None:
         assert entry.disagreement <= limits[entry.solver], entry.solver
         assert entry.different_statuses == entry.different_contacts == 0
         assert entry.contact is not None
-        assert entry.contact.certificate.holds
+        assert entry.contact.certificate.all_proved
         assert entry.contact.certificate.duality_gap >= 0
     raw = comparison.entries[-1]
     assert raw.disagreement > 1e-6  # it is another discretisation, not the reference again
@@ -262,6 +262,16 @@ class Exit(Mine):
     def changed(self, loads):
         raise SystemExit(0)
 
+class Ones:  # the loads of a solver are judged as they are
+    name = "newton"
+    refine = {}
+    def solve(self, problem, start=None):
+        D = problem.approach or 1.0
+        return Solution.of(problem, np.ones(len(problem)), D, 1, **self.refine)
+
+class Refined(Ones):
+    refine = {"refine": True}
+
 class Short(Mine):
     name = "short"
     def solve(self, problem, start=None):
@@ -316,3 +326,12 @@ def test_a_solver_of_ones_own_by_its_name(
     assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
     mine = json.loads(profiled.out)["profile"][1]
     assert mine["right"] == mine["contact set right"] == len(mine["outcomes"]) > 0
+    both = [x for name in ("Ones", "Refined") for x in ("--solver", f"desk_solvers.{name}")]
+    names = ["newton", "newton (2)", "newton + refinement"]
+    ran = command("compare", "scene.toml", *both, "--json")
+    assert ran.status == 3
+    assert [each["solver"] for each in json.loads(ran.out)["compare"]] == names
+    profile = json.loads(command("gallery", "--profile", "few", *both, "--json").out)["profile"]
+    assert [(each["solver"], bool(each["right"])) for each in profile] == [
+        *zip(names, (True, False, True), strict=True)
+    ]

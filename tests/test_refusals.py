@@ -90,3 +90,21 @@ def test_maps_of_the_wrong_kind() -> None:
     for name, value in wrong.items():
         with pytest.raises(cr.InputError, match=f"^{name}: found"):
             cr.surface.Surface(heights, **{"pixel": 1.0, name: value})
+
+
+def test_arguments_of_a_wrong_kind() -> None:
+    asperities = cr.Asperities.hexagonal(spacing=0.002, tip_radius=0.02, within=0.004)
+    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5), approach=5e-5)
+    state = cr.shear(contact, force=0.1 * contact.load)
+    program = cr.program(contact.scene, approach=5e-5)
+    for call, said in (
+        (lambda: contact.plot("load"), "axes: found type str, expected Axes"),
+        (lambda: contact.columns("loads", "load"), "columns: found 'load', expected some of stat"),
+        (lambda: cr.testing.assert_agree(contact, state), "found type ShearState, expected a Con"),
+        (
+            lambda: program.loads(np.full(len(program.data.linear), np.nan)),
+            r"values\[0\]: found nan",
+        ),
+    ):
+        with pytest.raises(cr.InputError, match=said):
+            call()

@@ -1,6 +1,8 @@
 """`verify`: wrong claims are found, the guilty are named first, and nothing wrong passes."""
 
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from scenes import MATERIAL, PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
+from convexrough.normal.problem import NormalProblem
 
 KINDS = ("dropped", "added", "scaled", "swapped")
 
@@ -86,7 +89,7 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
             verdict = cr.verify(contact.scene, loads, **given)
             assert verdict.wrongly_open.tolist() == [i]
             assert not verdict.holds
-            passed += verdict.certificate.holds
+            passed += verdict.certificate.all_proved
     assert passed > 5  # whose statuses alone say that all is well
 
 
@@ -105,10 +108,29 @@ def test_what_is_right_holds() -> None:
     assert near.error < 1e-3
 
 
+def test_wrong_loads_do_not_pass_as_true() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    half = 0.5 * contact.loads
+    assert cr.verify(paper(), contact.loads, approach=PAPER_APPROACH)
+    assert not cr.verify(paper(), half, approach=PAPER_APPROACH)
+    with pytest.raises(TypeError, match=r"all_proved.*verify"):
+        bool(cr.certify(paper(), half, approach=PAPER_APPROACH))
+    problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
+    halved = cr.solvers.Solution.of(problem, half[problem.candidates], PAPER_APPROACH, 0)
+    halves = SimpleNamespace(
+        name="half",
+        solve=lambda problem, start: replace(halved, loads=halved.loads / problem.units.force),
+    )
+    (said,) = set(cr.press(paper(), approach=PAPER_APPROACH, solver=halves).warnings) - set(
+        contact.warnings
+    )
+    assert said.startswith("the loads err by up to")
+
+
 def test_totals_in_another_unit() -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)
     verdict = cr.verify(paper(), 1e3 * contact.loads, load=contact.load)
-    assert verdict.certificate.holds  # the set is right
+    assert verdict.certificate.all_proved  # the set is right
     assert not verdict.total_holds
     assert not verdict.holds
     assert verdict.total_given / verdict.total_prescribed == pytest.approx(1e3)

@@ -86,20 +86,21 @@ def profile_of(
     cases   : names of cases or families; default: all
     within  : largest error of a right answer, divided by the largest load
     """
-    tried = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
-    wanted = names(*cases)
-    seconds = np.full((len(tried), len(wanted)), np.inf)
+    solvers = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
+    wanted, said = names(*cases), [each.name for each in solvers]
+    seconds = np.full((len(solvers), len(wanted)), np.inf)
     outcomes = np.full(seconds.shape, "", dtype="U8")
     sets = np.zeros(seconds.shape, dtype=bool)
     for column, name in enumerate(wanted):
         LOGGER.info(name)
         hard = case(name)
-        for row, entry in enumerate(compare(hard.scene, **hard.control, solvers=tried).entries):
+        for row, entry in enumerate(compare(hard.scene, **hard.control, solvers=solvers).entries):
             outcomes[row, column] = entry.outcome
             if entry.contact is not None:
+                said[row] = entry.solver  # says whether the loads are refined
                 checked = hard.check(entry.contact.loads, within=within)
                 sets[row, column] = not (len(checked.wrongly_open) or len(checked.wrongly_loaded))
                 outcomes[row, column] = "right" if checked.error <= within else "wrong"
                 if checked.error <= within:
                     seconds[row, column] = entry.contact.seconds
-    return Profile([each.name for each in tried], wanted, seconds, outcomes, sets)
+    return Profile(said, wanted, seconds, outcomes, sets)

@@ -23,7 +23,7 @@ from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
-from convexrough.record import Along, Table
+from convexrough.record import Along, Proved, Table
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShearCertificate(Table):
+class ShearCertificate(Proved):
     """What is proved about a friction state, independently of how it was computed.
 
     Arrays are (n,), in the order of the scene's asperities.
@@ -51,11 +51,11 @@ class ShearCertificate(Table):
         unless the contact slides as a whole or `order` is "fails" (then infinite)
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
-    >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
+    >>> judged.scope, judged.all_proved, (judged.status == "sliding").sum().item()
     ('global', True, 6)
     """
 
-    _shown = ("holds",)
+    _shown = ("all_proved",)
     _along: ClassVar[Along] = {
         ("asperity",): ("status", "force_errors", "slip_errors", "stick_radius_errors")
     }
@@ -70,8 +70,11 @@ class ShearCertificate(Table):
     displacement_error: float
 
     @property
-    def holds(self) -> bool:
-        """True if every asperity is proved to slide, to keep a stick disc, or to be open."""
+    def all_proved(self) -> bool:
+        """True if every asperity is proved to slide, to keep a stick disc, or to be open.
+
+        It does not judge given forces: see `force_errors`, or use `verify_shear`.
+        """
         return self.scope != "none" and not bool((self.status == "undecided").any())
 
 

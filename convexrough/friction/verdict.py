@@ -175,7 +175,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
     >>> force = 0.25 * contact.load
     >>> state = cr.shear(contact, force=force)
-    >>> cr.certify_shear(contact, state.forces, force=force).holds
+    >>> cr.certify_shear(contact, state.forces, force=force).all_proved
     True
     """
     return verify_shear(contact, forces, force=force).certificate

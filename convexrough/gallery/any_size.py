@@ -42,7 +42,7 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)
-    >>> proof.holds, bool(proof.load_errors.max() < 1e-9 * made.loads.max())
+    >>> proof.all_proved, bool(proof.load_errors.max() < 1e-9 * made.loads.max())
     (True, True)
     """
     checks.whole("count", count)

@@ -56,6 +56,10 @@ class Checked(Record):
         wrong = len(self.wrongly_open) + len(self.wrongly_loaded)
         return wrong == 0 and self.error <= self.within
 
+    def __bool__(self) -> bool:
+        """True if the loads or forces are `right`."""
+        return self.right
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HardCase(Record):

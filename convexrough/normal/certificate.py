@@ -25,7 +25,7 @@ from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import Trial, refined, trial_of
-from convexrough.record import Along, Table
+from convexrough.record import Along, Proved
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
@@ -41,8 +41,10 @@ ROOMY = 0.52
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Table):
-    """What is proved about given loads. Arrays are (n,), in the order of the loads.
+class Certificate(Proved):
+    """What is proved near given loads. Arrays are (n,), in the order of the loads.
+
+    Statuses are those of the solution, and not those that the given loads imply.
 
     scope : "global": the scene has exactly one solution; "local": the bounds hold for one solution
         near these loads, but others are not excluded (`meaning` describes which are possible);
@@ -75,11 +77,11 @@ class Certificate(Table):
     obstacle : a sentence that says why these asperities prevent a proof
 
     >>> judged = contact.certificate
-    >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
+    >>> judged.scope, judged.all_proved, judged.load_error < 1e-12 * contact.load
     ('global', True, True)
     """
 
-    _shown = ("holds", "meaning", "status", "load_error", "gap_error")
+    _shown = ("all_proved", "meaning", "status", "load_error", "gap_error")
     _along: ClassVar[Along] = {("asperity",): ("status", "load_errors", "gaps", "gap_errors")}
 
     scope: Scope
@@ -130,8 +132,11 @@ class Certificate(Table):
         return f"the only solution near these loads{fixed_open}"
 
     @property
-    def holds(self) -> bool:
-        """True if every asperity is proved to touch or proved to be open."""
+    def all_proved(self) -> bool:
+        """True if the status of every asperity is proved.
+
+        It does not judge the loads, which may be wrong: see `load_error`, or use `verify`.
+        """
         return self.scope != "none" and bool(self.codes.all())
 
     @property
@@ -164,7 +169,7 @@ def certify(
     Raises InputError for loads that are negative, not finite or not of the shape (n,).
 
     >>> judged = cr.certify(scene, contact.loads.round(12), approach=5e-5)
-    >>> judged.holds, judged.load_error < 1e-11
+    >>> judged.all_proved, judged.load_error < 1e-11
     (True, True)
     """
     checks.instance("scene", scene, Scene)

@@ -114,7 +114,7 @@ class Claim(ABC):
     @property
     def decided_alone(self) -> bool:
         """True if all statuses are proved from the given forces alone."""
-        return bool(self.certificate.holds)
+        return bool(self.certificate.all_proved)
 
     @cached_property
     def errors(self) -> Array:
@@ -130,6 +130,10 @@ class Claim(ABC):
         """True if all claimed statuses are proved, and forces and total are right to `within`."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
+
+    def __bool__(self) -> bool:
+        """True if the claim `holds`."""
+        return self.holds
 
     def hints(self) -> Iterator[str]:
         """Lines that name a possible cause of wrong forces, such as a wrong unit or sign.

@@ -7,6 +7,7 @@ from importlib import import_module
 import numpy as np
 from matplotlib.axes import Axes
 
+from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
@@ -63,6 +64,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
         axes = new_axes((SINGLE, 3.2))
+    checks.instance("axes", axes, Axes)
     contact = getattr(result, "contact", result)
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)

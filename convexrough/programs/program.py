@@ -102,7 +102,7 @@ class Program(Record):
         (61,)
         """
         m, data = len(self.asperities), self.data
-        given = checks.numbers("values", values).ravel()
+        given = checks.array("values", checks.numbers("values", values).ravel())
         valid = [len(data.linear), len(data.linear) + 1]
         if isinstance(data, ConeProgram) and self.form == "dual":
             valid = [data.equalities, len(data.constant)]
@@ -258,19 +258,20 @@ def write_programs(
     bristles       : number of bristles per asperity
 
     A program is left out if the solution is not in the box on which it is exact, or if its file
-    would not fit in memory; the index gives the reason. If no program remains, InputError is raised
-    with the last of these reasons. Raises FileError if a file cannot be written.
+    would not fit in memory; the index gives the reason. If no program remains, the last of these
+    reasons is raised, a ConvexroughError. Raises FileError if a file cannot be written.
     """
     problem, own = solved(scene, approach, load)
     about: dict[str, Any] = {}
     left_out: dict[str, str] = {}
+    last: ConvexroughError = InputError("formats", found=formats, expected="at least one")
     written: list[Path] = []
     for form in FORMS:
         endings = [ending for ending in WRITERS[form] if ending in formats]
         try:
             program = stated(problem, own, form, bristles) if endings else None
         except ConvexroughError as error:
-            left_out[form] = str(error)
+            left_out[form], last = str(error), error
             continue
         for ending in endings:
             assert program is not None
@@ -278,14 +279,12 @@ def write_programs(
             try:
                 program.save(path)
             except InputError as error:
-                left_out[path.name] = str(error)
+                left_out[path.name], last = str(error), error
                 continue
             written.append(path)
             about[path.name] = program.about()
     if not written:
-        last = [*left_out.values()][-1]
-        expected = "a scene with a convex program: a smaller approach or load, or sharper tips"
-        raise InputError("programs", found=last, expected=expected)
+        raise last
     index = {
         "schema": 1,
         "version": __version__,

@@ -79,7 +79,8 @@ def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Pro
     """
     contact = results[0].contact
     most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
-    forces = sorted({force for result in results for force in result.proved_forces()})
+    found = (force for result in results for force in result.proved_forces())
+    forces = sorted({f"{force:.12g}": force for force in found}.values())  # equal but for rounding
     states = [shear(contact, force=it) for it in forces if 0 < it < most]
     with suppress(ProofError):
         return contact.proof(sheared=states)

@@ -47,6 +47,7 @@ KINDS = {
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
+    "area": ("area",),
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
@@ -315,6 +316,7 @@ def unit_of(name: str, units: UnitNames) -> str:
     return {
         "length": length,
         "force": force,
+        "area": f"{length}²" if length else "",
         "work": f"{force} {length}" if both else "",
         "stiffness": f"{force}/{length}" if both else "",
     }.get(KIND.get(name, ""), "")

@@ -237,7 +237,7 @@ def judged(
             advice="try newton_step=True or more iterations",
             iterate=loads,
         )
-    return Solution.of(problem, loads, approach, answer.iterations, refine=False)
+    return Solution.of(problem, loads, approach, answer.iterations)
 
 
 def _pressed_on(
@@ -292,7 +292,7 @@ class Conic(ConeSolver):
     max_iterations : largest number of iterations
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Conic())
-    >>> contact.solver, contact.certificate.holds
+    >>> contact.solver, contact.certificate.all_proved
     ('conic + Newton step', True)
     """
 

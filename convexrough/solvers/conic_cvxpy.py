@@ -69,7 +69,7 @@ class ConicCVXPY(ConeSolver):
     newton_step    : True to end with one or two Newton steps
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.ConicCVXPY())
-    >>> contact.solver, contact.certificate.holds
+    >>> contact.solver, contact.certificate.all_proved
     ('conic in CVXPY + Newton step', True)
     """
 

@@ -123,7 +123,7 @@ class Newton:
     if a step does not halve it.
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Newton(tolerance=1e-6))
-    >>> contact.iterations, contact.certificate.holds
+    >>> contact.iterations, contact.certificate.all_proved
     (2, True)
     """
 
@@ -222,7 +222,7 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
     state = newton.descend(law, before, law.direction(before, 0.0))
     approach = float(state.at.approach)
     residual = problem.residual(state.forces, approach, state.at.displacement)
-    return Solution(state.forces, approach, 1, residual)
+    return Solution(state.forces, approach, 1, residual, refine=True)
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:

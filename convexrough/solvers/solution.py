@@ -21,7 +21,8 @@ class Solution(Record):
     iterations : number of steps of the solver
     residual : residual of the contact law for `loads`, as in `NormalProblem.residual`; if `trial`
         is given, an upper bound on the residual of the loads in `trial`
-    refine   : True if the loads may be corrected to more digits; False to certify them unchanged
+    refine   : True if Newton steps may correct the loads; False to certify and report them
+        unchanged
     trial    : the loads to more digits, if the solver has computed such loads; else None
 
     >>> from convexrough.normal.problem import NormalProblem
@@ -36,7 +37,7 @@ class Solution(Record):
     approach: float
     iterations: int
     residual: float
-    refine: bool = True
+    refine: bool = False
     trial: Trial | None = None
 
     @classmethod
@@ -47,7 +48,7 @@ class Solution(Record):
         approach: float,
         iterations: int,
         *,
-        refine: bool = True,
+        refine: bool = False,
     ) -> Solution:
         """A solution with the residual computed from the loads; inf if it is not a number.
 

@@ -87,7 +87,9 @@ class Scanned:
     @property
     def certified(self) -> bool:
         """True if nothing was pressed, or if the contact is certified."""
-        return self.curve is None or (self.contact is not None and self.contact.certificate.holds)
+        return self.curve is None or (
+            self.contact is not None and self.contact.certificate.all_proved
+        )
 
 
 def surface_summary(scanned: Scanned) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.contact import Contact
+from convexrough.contact import Contact, discs_of, total_area
 from convexrough.errors import ConvexroughError, InputError
 from convexrough.friction.onset import onset_of_sliding
 from convexrough.plausibility import cautions_about, cautions_of
@@ -159,6 +159,7 @@ NORMAL: dict[str, Callable[[Found], Array]] = {
     "approach": lambda found: found["approaches"],
     "approach_error": lambda found: found["approach_errors"],
     "load": lambda found: found["loads"],
+    "area": lambda found: found["areas"],
     "largest_load": lambda found: found["asperity_loads"].max(axis=1),
     "certificate.load_error": lambda found: found["asperity_load_errors"].max(axis=1),
 }
@@ -210,6 +211,8 @@ def _known(
 ) -> dict[int, Measured]:
     """The numbers of those rows in which everything is proved, by the number of the row."""
     contacts = rows.contacts()
+    discs = map(discs_of, scenes, contacts["asperity_loads"])
+    contacts["areas"] = np.array([*map(total_area, discs)])
     good = ~(contacts["status"] == "undecided").any(axis=1)
     values = {(f"normal.{name}", ""): number(contacts) for name, number in NORMAL.items()}
     if cycle is not None:

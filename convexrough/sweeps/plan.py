@@ -79,15 +79,15 @@ def plan_of(
     if measure is not None and isinstance(table, dict):
         table = {**table, "measure": list(measure)}
     grid, mistakes = validate_table("sweep", table, Grid)
-    mistakes += _nothing_random(contents)
-    if grid is None or mistakes:
+    random = [*_nothing_random(contents)]
+    if grid is None:
         varied = {key.partition(".")[0] for _, key in swept(table_in(contents, "sweep"))}
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
         rest = [each for each in others if "missing table" not in each]
-        raise SceneFileError(str(path), [*mistakes, *rest])
+        raise SceneFileError(str(path), [*mistakes, *random, *rest])
     study, mistakes = _of_values(grid, tables)
-    if study is None or mistakes:
-        raise SceneFileError(str(path), mistakes)
+    if study is None or mistakes or random:
+        raise SceneFileError(str(path), [*mistakes, *random])
     own = [tables.get("asperities", {}).get("path")]
     files = {str(each) for each in grid.axes.get("asperities.path", own) if each is not None}
     inputs = {each: digest(path.parent / each) for each in sorted(files)}

@@ -27,7 +27,7 @@ _SLIPS = [
         "an exponent with e",
     ),
     (
-        rf"=\s*(?P<number>{_NUMBER})\s*[^\d\s#.,;\]\[\"'=_-][^\s#=]*",
+        rf"=\s*(?P<number>{_NUMBER})\s*(?![exEX]\W*\d)[^\W\d_][^\s#=]*",  # 5e+-5 has no unit
         "{number}",
         "a number without unit; units are only named, in [units]",
     ),
@@ -35,6 +35,11 @@ _SLIPS = [
         r"=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)",
         "{number}",
         "digits on both sides of the point",
+    ),
+    (
+        r"=\s*(?P<word>(?i:[+-]?inf|true|false))",
+        "{word}",
+        "lower case",
     ),
     (
         r"=\s*[\u201c\u201d\u201e\u2018\u2019\u00ab]?"
@@ -63,7 +68,8 @@ def explained(path: object, text: str, error: Exception) -> str:
         shown = line.strip() if len(line) <= MOST_SHOWN else f"{line[:MOST_SHOWN].strip()}..."
         meant = _corrected(line) if len(line) < 200 else None
         if meant is None:
-            what = f"{path}: not a TOML file: {error}"
+            said = str(error).replace("Cannot overwrite a value", "key given twice")
+            what = f"{path}: not a TOML file: {said}"
             found.append(f"{what}: {shown}" if shown else what)
             break
         fixed, why = meant
@@ -85,6 +91,8 @@ def _corrected(line: str) -> tuple[str, str] | None:
             parts = {name: part.strip() for name, part in found.groupdict().items()}
             if "number" in parts:
                 parts["number"] = _number(parts["number"])
+            if "word" in parts:
+                parts["word"] = parts["word"].lower()
             mended = f"{parts['key']} = {meant.format(**parts)}"
             try:
                 tomllib.loads(mended)

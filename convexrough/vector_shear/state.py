@@ -62,7 +62,7 @@ class VectorShearState(Table, Plottable):
     displacement, the slips, `residual` and `duality_gap` are then infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
-    >>> state.forces.shape, state.certificate.holds
+    >>> state.forces.shape, state.certificate.all_proved
     ((61, 2), True)
     """
 

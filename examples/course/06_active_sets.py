@@ -175,7 +175,7 @@ for name, judged in [
     ("normal map", cr.certify(scene, by_map, approach=APPROACH)),
 ]:
     error = judged.load_error / contact.loads.max()
-    print(f"{name}: proved {judged.holds}, {judged.status.tolist()}, loads within {error:.1e}")
+    print(f"{name}: proved {judged.all_proved}, {judged.status.tolist()}, loads within {error:.1e}")
 good = cr.certify(scene, by_map, approach=APPROACH)
 bad = cr.certify(scene, force * loads, approach=APPROACH)
 assert good.status.tolist() == bad.status.tolist() == ["contact", "contact", "open", "contact"]

@@ -188,7 +188,7 @@ scene = cr.Scene(
 )
 certificate = cr.certify(scene, [float(p) for p in P], approach=1.0)
 print(certificate.scope, certificate.status, certificate.load_errors)
-assert certificate.holds
+assert certificate.all_proved
 assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.5
 
 # %%

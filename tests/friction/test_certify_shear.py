@@ -85,7 +85,7 @@ def test_an_asperity_that_nearly_touches_is_decided(fraction: float, ulps: int) 
     height = alone / (np.pi * spacing) - approach + spacing**2 / 2
     contact = cr.press(scene(height + ulps * np.spacing(height)), approach=approach)
     state = cr.shear(contact, force=fraction * FRICTION * contact.load)
-    assert state.certificate.holds
+    assert state.certificate.all_proved
     assert np.isfinite(state.certificate.force_errors).all()
     assert state.certificate.slip_errors.max() <= 1e-15 * state.displacement
 
@@ -101,7 +101,7 @@ def test_an_uncertified_contact_gets_no_status() -> None:
     judged = cr.certify_shear(contact, 0.1 * contact.loads, force=force)
     for known in (state.certificate, judged, *vectors):
         assert known.scope == "none"
-        assert not known.holds
+        assert not known.all_proved
         assert (known.status == "undecided").all()
     assert np.isinf(state.certificate.force_errors).all()
     assert np.isinf([cycle.loss_error, state.certificate.displacement_error]).all()

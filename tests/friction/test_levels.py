@@ -39,7 +39,7 @@ def test_states_and_cycles(name: str, holding: Any, fraction: float) -> None:
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
     proof = state.certificate
     assert state.order == cycle.order == "proved"
-    assert proof.holds
+    assert proof.all_proved
     with ctx.workdps(DIGITS):
         assert_state(state, true)
         assert_known(cycle.loss, cycle.loss_error, true.energy, BOUND)

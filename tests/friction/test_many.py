@@ -114,3 +114,14 @@ def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
         assert cycles.order[k] == one.order
         assert cycles.losses[k] == one.loss
         assert_array_equal(cycles.status[k], one.status)
+
+
+def test_warnings_of_many() -> None:
+    soft = replace(PAPER.material, hardness=1e-4)
+    scenes = [*rough(2), *(replace(each, material=soft) for each in rough(2))]
+    contacts = cr.press_many(scenes, approach=5e-5)
+    (yielding,), (one,) = contacts.warnings, contacts[2].warnings
+    assert yielding == f"scenes[2], the first of 2: {one}"
+    assert contacts.cycles(1e-9).warnings == contacts.warnings
+    assert repr(contacts).count("warning") == 1
+    assert "warning" not in repr(cr.press_many(scenes[2:] * 51, approach=5e-5))

@@ -178,6 +178,7 @@ def test_wrong_answers_are_judged_wrong() -> None:
     case = gallery.case("grazing-load-1e-12")
     loads = np.array([float(each) for each in case.loads])
     assert case.check(loads).right
+    assert not case.check(0 * loads)
     dropped = loads.copy()
     dropped[-1] = 0.0
     judged = case.check(dropped)

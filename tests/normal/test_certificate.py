@@ -84,7 +84,7 @@ def test_attacks_on_random_scenes(
         exact = solve_exactly(scene, approach=approach, start=contact.loads)
         assert_honest(certificate, wrong, exact)
         if kind == "none":
-            assert certificate.holds
+            assert certificate.all_proved
     if contact.load == 0:
         return
     candidates = NormalProblem.assemble(scene, load=contact.load).candidates
@@ -108,7 +108,7 @@ def test_touching_to_rounding(steps: int) -> None:
     assert_honest(contact.certificate, contact.loads, exact)
     assert contact.certificate.scope == "global"
     assert list(contact.status) == ["contact", "contact" if exact.loads[1] > 0 else "open"]
-    assert contact.certificate.holds
+    assert contact.certificate.all_proved
 
 
 def test_touching_exactly_is_undecided() -> None:
@@ -116,7 +116,7 @@ def test_touching_exactly_is_undecided() -> None:
     contact = cr.press(on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125]), approach=0.0)
     assert list(contact.status) == ["undecided", "undecided"]
     assert list(contact.loads) == [0.0, 0.0]
-    assert not contact.certificate.holds
+    assert not contact.certificate.all_proved
 
 
 @pytest.mark.parametrize("kind", OPERATORS)
@@ -133,13 +133,13 @@ def test_scopes(kind: Kind) -> None:
     assert local.scope == crowded.scope == "local"
     assert shells.convexity_number < 0.75
     assert (cholesky.convexity_number in (0.9, 0.999)) == (kind == "dense")
-    assert local.holds
+    assert local.all_proved
     assert crowded.fixed_open > local.fixed_open == 0
     scene, load = twins()
     if kind in operators(scene):
         nothing = cr.press(scene, load=load, influence=kind).certificate
         assert nothing.scope == "none"
-        assert not nothing.holds
+        assert not nothing.all_proved
         assert np.isinf(nothing.load_errors).all()
         assert (nothing.status == "undecided").all()
         assert list(nothing.in_the_way) == [0, 1]

@@ -83,7 +83,7 @@ def test_random_points_are_proved(seed: int) -> None:
         certificate = contact.certificate
         assert contact.crowding > 1.5
         assert certificate.scope == "local"
-        assert certificate.holds
+        assert certificate.all_proved
         assert certificate.fixed_open == (contact.status == "open").sum()
         assert certificate.load_error < 1e-6 * contact.loads.max()
         assert "fixed open" in certificate.meaning

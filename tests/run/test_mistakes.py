@@ -158,6 +158,9 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         ("spacing = 0.0025,", "spacing = 0.0025", "end of the line"),
         ("pattern = hexagonal", 'pattern = "hexagonal"', "straight quotes"),
         ("pattern = “hexagonal”", 'pattern = "hexagonal"', "straight quotes"),
+        ("spacing = 2.5e-3;", "spacing = 2.5e-3", "end of the line"),
+        ("spacing = Inf", "spacing = inf", "lower case"),
+        ("convert = True", "convert = true", "lower case"),
         ("path = my summits.csv", 'path = "my summits.csv"', "straight quotes"),
     ],
 )
@@ -167,6 +170,23 @@ def test_a_slip(tmp_path: Path, wrong: str, meant: str, why: str) -> None:
     number = text.split("\n").index(wrong) + 1
     assert line.startswith(f"line {number}: found {wrong}, expected {meant}: ")
     assert why in line
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "spacing = 1\nspacing = 2e-3",
+        *(f"spacing = {it}" for it in ("5*10^-5", "1/400", "5e+-5", "5e\u22125")),
+    ],
+)
+def test_no_number_is_invented(tmp_path: Path, wrong: str) -> None:
+    text = scene_text('pattern = "hexagonal"\n' + wrong)
+    (line,) = refused(tmp_path, text)
+    last = wrong.split("\n")[-1]
+    assert line.startswith("not a TOML file: ")
+    assert f"line {text.split(chr(10)).index(last) + 1}" in line
+    assert line.endswith(f": {last}")
+    assert ("given twice" in line) == ("\n" in wrong)
 
 
 @pytest.mark.sample(1)

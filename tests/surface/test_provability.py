@@ -32,7 +32,7 @@ def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
         assert_allclose(curve.approaches[i], contact.approach, rtol=1e-9)
         _, values = crowded(contact, above=0.1)
         assert_allclose(values[0], contact.crowding, rtol=1e-12)
-        if contact.certificate.holds:
+        if contact.certificate.all_proved:
             assert curve.contacts[i] == (contact.status == "contact").sum()
             assert curve.undecided[i] == 0
 

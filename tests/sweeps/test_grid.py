@@ -114,6 +114,10 @@ WRONG = [
     ),
     (sweeping(seeds=3), "seeds: nothing is random"),
     (
+        sweeping(seeds=3, over={"asperities.heigth_std": [1e-7]}),
+        '[asperities] heigth_std: unknown key, did you mean "height_std"?',
+    ),
+    (
         sweeping(seeds=1, draw={"sphere.radius": {"uniform": [2, 1]}}),
         "uniform = [low, high] with low < high",
     ),

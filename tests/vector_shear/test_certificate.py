@@ -110,7 +110,7 @@ def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
     force = fraction * FRICTION * contact.load
     truth, state = shear_vector(contact, force=force), shear_vector(doubtful, force=force)
     known = state.certificate
-    assert known.holds
+    assert known.all_proved
     assert (lengths(state.forces - truth.forces) <= known.force_errors).all()
     assert (state.status == truth.status).all()
 

@@ -209,7 +209,8 @@ class CycleResult(Result):
         return self.printed if self.smooth else over
 
     def lines(self) -> list[str]:
-        said = "no W/W0: a flat or a cylinder has no smooth reference"
+        bodies = "a flat or a cylinder has no smooth reference"
+        said = f"no W/W0: {bodies if self.contact.load else 'no asperity carries a load'}"
         return [*super().lines(), *([] if self.smooth else [said])]
 
     def figures(self) -> Mapping[str, Any]:

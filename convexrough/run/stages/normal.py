@@ -27,7 +27,7 @@ DIFFERENT = 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
 COUNTS = ("contact", "open", "undecided")
-FOUND = ("candidates", "influence", "solver", "iterations", "seconds", "model_error")
+FOUND = ("area", "candidates", "influence", "solver", "iterations", "seconds", "model_error")
 SCOPES = {
     "global": "global: the scene has exactly one solution",
     "local": "local: exactly one solution with contact radii near those of these loads",
@@ -78,7 +78,8 @@ class NormalResult(Result):
         return plausibility.doubts_of(self.contact)
 
     def cautions(self) -> Iterator[str]:
-        return plausibility.cautions(self.known[0], self.units)
+        yield from plausibility.wrong_loads(self.contact)
+        yield from plausibility.cautions(self.known[0], self.units)
 
     def figures(self) -> Mapping[str, Any]:
         return plots.press_figures(self.contact)
@@ -154,6 +155,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
             ("model error", f"about {model_error:.2g} of displacements  (due to point forces)"),
             ("crowding", f"{crowding:.3g}  (above 1 contact discs overlap)"),
             *([("bodies", beta)] if beta else []),
+            ("contact area", f"{normal['area']:.4g} {unit_of('area', units)}".rstrip()),
             ("mean pressure", _described_pressure(normal, units)),
             ("geometry", _described_geometry(normal)),
             ("contact modulus", plausibility.described_modulus(normal["contact_modulus"], units)),
