@@ -328,9 +328,7 @@ class _Screened(NamedTuple):
 
     which: Indices  # their indices in the scene
     below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
-    coupling: (
-        Coupling | None
-    )  # maps loads to displacements of these asperities; None if all can touch
+    coupling: Coupling | None  # maps loads to displacements here; None if all can touch
     indentation: Array  # approach + offset - displacement, which is minus the gap
     rounding: Array  # bounds on errors of the indentation
 
