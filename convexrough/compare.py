@@ -185,12 +185,8 @@ def compare(
         name = next(each for each in numbered if each not in taken)
         entry = replace(_against(entry, [*entries, entry][0]), solver=name, steps=tuple(steps))
         entries.append(entry)
-    answers = [
-        Answer.of(entry.contact)._replace(name=entry.solver)
-        for entry in entries
-        if entry.contact is not None
-    ]
-    pairs = combinations(answers, 2)
+    answers = ((each.solver, each.contact) for each in entries if each.contact is not None)
+    pairs = combinations([Answer(name, it.loads, it.certificate) for name, it in answers], 2)
     return Comparison(
         entries=tuple(entries),
         contradictions=tuple(

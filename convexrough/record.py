@@ -25,9 +25,6 @@ COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 #: Arrays of at most FEW numbers and texts of at most LINE characters are printed in full.
 FEW, LINE = 4, 76
 
-#: The warnings of at most MANY scenes are printed.
-MANY = 100
-
 
 class Record:
     """Base class of results. `repr` gives a line for each field that is not empty."""
@@ -74,7 +71,7 @@ class Record:
         if units := str(getattr(scene, "units", "")):
             yield "units", units
         scenes = getattr(getattr(self, "contacts", self), "scenes", ())
-        if len(scenes) <= MANY:  # else warnings take seconds
+        if len(scenes) <= 100:  # the warnings of more scenes take seconds
             yield from (("warning", in_text(each)) for each in self.warnings)
 
     @property

@@ -36,11 +36,7 @@ _SLIPS = [
         "{number}",
         "digits on both sides of the point",
     ),
-    (
-        r"=\s*(?P<word>(?i:[+-]?inf|true|false))",
-        "{word}",
-        "lower case",
-    ),
+    (r"=\s*(?P<word>(?i:[+-]?inf|true|false))", "{word}", "lower case"),
     (
         r"=\s*[\u201c\u201d\u201e\u2018\u2019\u00ab]?"
         r"(?P<text>[^\W\d][^\"'=#\[\]{}\u201c\u201d\u2018\u2019\u00bb]*?)"
