@@ -40,8 +40,8 @@ from convexrough.solvers import named
 #: A message names at most this many asperities, and gives the number of the others.
 MOST_NAMED = 5
 
-#: A contact differs if one load is above this fraction of the reference's largest load, and the
-#: other below a tenth of it.
+#: Two solutions differ in a contact if the load of an asperity is above this fraction of the
+#: reference's largest load in one of them, and below a tenth of this fraction in the other.
 CARRIES = 1e-6
 
 #: Solvers that CVXPY can call if the packages with these names are installed.
@@ -56,8 +56,8 @@ class Entry(Record):
     message : the reason if there is no solution, else ""
     contact : the solution with its certificate; None if there is no solution
     disagreement : largest |load - load of the reference|, divided by the reference's largest load
-    different_statuses : number of asperities whose status, also "undecided", differs from that in
-        the reference
+    different_statuses : number of asperities whose status differs from that in the reference;
+        "undecided" counts as a status
     different_contacts : number of asperities whose load is above 1e-6 of the reference's largest
         load in one of the two solutions, and below 1e-7 of it in the other
     steps : for each iteration its solver, step, objective and residual, if `compare` was called

@@ -7,8 +7,9 @@ a point with the defect F is
     d = beta - F - A W y,     (I + W A W) y = W (beta - F).
 
 If the loads must keep their sum, beta is the number for which sum W y = 0; otherwise beta is 0. The
-matrix I + W A W is positive definite where the energy is convex. If it is not positive definite,
-diag(`shells`) is added to A, with which it is. Conjugate gradients also give A W y, from which the
+matrix I + W A W is positive definite where the energy is convex. If it is not, diag(`shells`) is
+added to A. By the shell lemma (docs/theory/convexity.md) the sum is positive semidefinite, so I + W
+(A + diag(`shells`)) W is positive definite. Conjugate gradients also give A W y, from which the
 step d follows for every asperity, touching or open.
 """
 
@@ -161,9 +162,9 @@ def _iterate(
 class _Smoothed:
     """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
 
-    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. If balanced, a call also
-    adds a multiple of the diagonal of W to the residual, so that single precision is enough. The
-    sum of these multiples, `shift`, is beta of the step, divided by the scale of the defect.
+    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. If balanced, each call
+    also adds a factor times the diagonal of W to the residual, so that single precision is enough.
+    The sum of these factors, `shift`, is beta of the step, divided by the scale of the defect.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:

@@ -55,10 +55,11 @@ FACTORISED = 1500
 #: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
 CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
-#: Least radii of overlapping shells: t times one of WIDTHS, the cheapest first; and
-#: WIDENED t / (1 - c)^(1/2), with the largest c = (t_i t_j)^(1/2) / r_ij of near neighbours j. Each
-#: radius is then raised to the radius of each near neighbour minus LESS times its distance, if that
-#: is larger. Heuristics: any radii give valid bounds.
+#: The radius of an overlapping shell is at first the larger of w t and WIDENED t / (1 - c)^(1/2).
+#: Here w is one of WIDTHS, tried in this order (the cheapest first), and c is the largest (t_i
+#: t_j)^(1/2) / r_ij with a near neighbour j. The radius is then raised, where that is larger, to
+#: the radius of a near neighbour minus LESS times its distance. Heuristics: any radii give valid
+#: bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of near neighbours that affect the radius of a shell.
@@ -83,7 +84,7 @@ class Box(NamedTuple):
     loads: Array  # (n,) upper ends of the box; the lower ends are 0
     compliance: Array  # (n,) h at the upper ends
     convexity_number: Any  # 1 - mu
-    faces: Array  # (n,) limits of loads that the proof must show; infinite where none is needed
+    faces: Array  # (n,) the proof must show that loads are below these; else infinite
     fixed_open: NDArray[np.bool_]  # (n,) True where assumed open, which the proof must then show
 
     def at(self, rows: Indices) -> Box:
@@ -159,7 +160,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Iterator[
             shells, theta = fitted, number
     if theta < 1:
         theta = (1.0 + theta) / 2.0
-        # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
+        # The loads at which the contact radius is theta (pi/2) s_i; there h_i = shell_i / theta.
         faces = (2.0 / 3.0 * problem.coefficients * theta / shells) ** 3
         local = np.minimum(box.loads, faces)
         h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
@@ -244,7 +245,8 @@ class Overlaps(NamedTuple):
 
 
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
-    """The largest of `margins` mu for which  H + A >= mu H  is proved; 0 if there is none.
+    """The largest of `margins` mu for which  H + A >= mu H  is proved by the first shells that
+    prove any of them; 0 if there is none.
 
     lengths : (n,) t_i = 1 / (pi E* h_i)
     """

@@ -51,7 +51,8 @@ class Response(NamedTuple):
 class Springs(NamedTuple):
     """The contacts of a level as linear springs, for the system that `Level.response` solves.
 
-    touching  : (n,) True where the asperity touches and bounds on its compliance are known
+    touching : (n,) True where the asperity is proved to touch and bounds on its compliance are
+        known; if nothing is proved, where it has a load in `trial`
     doubtful  : (n,) True for other asperities that may touch
     slopes    : (n,) c = dP/dn, 0 where not touching;  compliance : (n,) 1/c, 0 where not touching
     bound     : (n,) h, a lower bound on 1/c where the asperity may touch; infinite where open
@@ -210,7 +211,8 @@ class Level:
         touching, bound, margin = state.inside, np.full(len(self.problem), np.inf), 0.0
         doubtful = np.zeros(len(touching), dtype=bool)
         if self.box is not None:
-            touching = self.touching & self.loads.positive  # else nothing bounds its compliance
+            # If the ball of a load contains 0, nothing bounds the compliance.
+            touching = self.touching & self.loads.positive
             doubtful = ~touching & ~self.open
             with np.errstate(divide="ignore"):
                 known = np.maximum(self.compliance, (1.0 - SAFETY) / stiffness.upper)
@@ -299,8 +301,9 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Bounds on the residual after a change of x_j that makes the total right, on this
-            change, and on the displacements by this change and by asperities without proved status.
+            """Three bounds for a change of x_j that makes the total right: on the residual after
+            it, on the change, and on the displacements by it and by asperities without a proved
+            status.
 
             others : bound on the sum of |x| of asperities neither proved to touch nor to be open
             """
@@ -358,7 +361,7 @@ def rows_of(levels: Sequence[Level]) -> Rows:
     return Rows(load, approach, loads, indentation, touching, open_)
 
 
-@np.errstate(invalid="ignore")  # unproved levels
+@np.errstate(invalid="ignore")  # nan occurs only for levels that are not proved
 def energies(levels: Sequence[Level]) -> Ball:
     """(k,) the energies V(L) of k levels of one scene; errors are infinite without a proof."""
     high, low, radius = np.zeros((3, len(levels)))

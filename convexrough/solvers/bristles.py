@@ -60,8 +60,8 @@ from convexrough.solvers.programs import (
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: The convexity number 2 b_i / (pi s_i) at which a box is cut; below 1 the matrix is definite. A
-#: heuristic.
+#: The convexity number S = 2 b_i / (pi s_i) at which a box is cut; below 1 the matrix is definite.
+#: A heuristic.
 LARGEST_S = 0.99
 
 #: This part of the diagonal is subtracted from the matrix before a Cholesky factorisation decides
@@ -183,9 +183,9 @@ class BristleProgram:
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
         """The loads, from the forces phi of the bristles and the multipliers of phi >= 0.
 
-        A bristle carries a force where h phi exceeds m times the absolute value of its multiplier,
-        a criterion that is clear even where the solver's phi is nearly 0. Raises TooDenseError if
-        a load reaches an upper end that was cut.
+        A bristle carries a force where h phi exceeds m times the absolute value of its multiplier.
+        At the exact solution one of the two is 0, so this decides even where the solver's phi is
+        nearly 0. Raises TooDenseError if a load reaches an upper end that was cut.
         """
         problem, n, m = self.problem, len(self.problem), self.m
         P, e = raw.x[:n], raw.x[n:].reshape(n, m)

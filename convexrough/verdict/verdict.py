@@ -1,8 +1,9 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-If the certificate of the loads does not prove the whole claim, Newton's method computes a solution,
-first from these loads or, if it fails, from its default start. The certificate of the solution
-shows which loads are wrong. `friction.verdict` compares shear forces with a solution.
+Unless the certificate of the loads proves the whole claim, with errors of at most 1 %, Newton's
+method computes a solution: from these loads or, if that fails, from its default start. The
+certificate of the solution shows which loads are wrong. `friction.verdict` compares shear forces
+with a solution.
 """
 
 from __future__ import annotations
