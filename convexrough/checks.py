@@ -16,7 +16,7 @@ from convexrough.errors import InputError
 #: of a few numbers do not underflow or overflow.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: What a message expects if a number is outside these limits.
+#: The text after "expected" in a message on a number outside these limits.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
@@ -75,7 +75,8 @@ def whole(what: str, value: int, least: int = 1) -> int:
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
     """A float64 copy, of any shape; raises InputError unless all values are real numbers.
 
-    The copy of an array that stores only one number (`arrays.even`) does so, too.
+    If an array of equal values stores only one number (`arrays.even`), its copy does not store
+    more.
     """
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
         found = f"{values.mask.sum()} masked values"

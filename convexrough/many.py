@@ -1,7 +1,7 @@
 """Press many scenes with equal numbers of asperities at once, and compute a cycle of each.
 
-Scenes with the same positions and tip radii share one compliance matrix. Where possible, scenes are
-solved and proved together; the others are pressed one by one.
+Scenes that differ only in heights and friction share one compliance matrix. Where possible, scenes
+are solved and proved together; the others are pressed one by one.
 """
 
 from __future__ import annotations
@@ -235,7 +235,7 @@ def press_many(
             what, solver, advice = f"scenes[{k}]: {error.what}", error.solver, error.advice
             raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
-        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # the last term: of the sum
+        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
         for total, value in zip(TOTALS, own, strict=True):
             fields[total][k] = value

@@ -121,7 +121,8 @@ class Pair(NamedTuple):
     def total(self) -> Pair:
         """The sum along the last axis; the error is at most 2^-97 times the sum of absolute values.
 
-        Numbers are divided into parts with so few bits that float64 sums of these parts are exact.
+        Numbers are divided into parts with so few bits that float64 sums of these parts are exact,
+        except for a last part, which is so small that the rounding of its sum does not matter.
         """
         high, low = np.asarray(self.high), np.asarray(self.low)
         n = high.shape[-1]

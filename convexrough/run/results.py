@@ -1,4 +1,4 @@
-"""Results as a summary, a report and warnings, and the folder to which they are written.
+"""Results as a summary, as a proof and as files, and the folder to which they are written.
 
 The new files are written to a temporary folder, which is then renamed. If a folder of the final
 name exists already, the complete new files are moved to this folder one by one, `files.json` last.
@@ -51,8 +51,7 @@ SWEEP_MANIFEST, SWEEP_PARTS = "manifest.json", "parts"
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
-#: The proof leaves out shear forces of at least this fraction of f P, at which all asperities
-#: slide.
+#: The proof leaves out shear forces of at least this fraction of f P, the force of gross sliding.
 BELOW_LIMIT = 1 - 1e-9
 
 
@@ -80,7 +79,8 @@ def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Pro
     contact = results[0].contact
     most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
     found = (force for result in results for force in result.proved_forces())
-    forces = sorted({f"{force:.12g}": force for force in found}.values())  # equal but for rounding
+    # Of forces that differ only by rounding, one is enough.
+    forces = sorted({f"{force:.12g}": force for force in found}.values())
     states = [shear(contact, force=it) for it in forces if 0 < it < most]
     with suppress(ProofError):
         return contact.proof(sheared=states)
@@ -189,7 +189,8 @@ def results_folder(
         if folder.exists() and not folder.is_dir():
             raise FileExistsError(17, "File exists")
         for each in reads:
-            places = {Path(each).resolve().parent, Path(each).parent.resolve()}  # of links, too
+            # For a link these are its own folder and that of its target.
+            places = {Path(each).resolve().parent, Path(each).parent.resolve()}
             if folder.resolve() in places:
                 raise FileError(f"{folder}: holds {Path(each).name}, an input; name another folder")
         if folder.is_dir() and any(folder.iterdir()) and not force:
@@ -270,7 +271,7 @@ def slider_page(pressed: Result) -> str:
 
     Raises InputError if the scene has no friction, or another shape than a sphere.
     """
-    from convexrough.plots.slider import slider_html  # matplotlib: only when it draws
+    from convexrough.plots.slider import slider_html  # imported only if a page is requested
 
     return slider_html(pressed.contact, pressed.lines())
 

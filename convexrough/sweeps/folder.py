@@ -2,7 +2,8 @@
 
 The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
 named by its first scene. All parts except the last have the same number of rows, which the manifest
-states. Manifest and parts are replaced only together.
+states. A complete part is never changed; a damaged one is removed and computed again. Another sweep
+replaces the manifest and all parts together.
 """
 
 from __future__ import annotations
@@ -159,7 +160,9 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
             if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
-                raise FileError(f"{path}: holds {strangers[0]}, but no sweep; {OUT} names another")
+                raise FileError(
+                    f"{path}: holds {strangers[0]}, but no sweep; {OUT} names another folder"
+                )
             if not (path / MANIFEST).exists():
                 if orphans:  # the manifest, which is written before all parts, was removed
                     raise FileError(

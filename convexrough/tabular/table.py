@@ -39,8 +39,8 @@ TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "
 #: Largest number of mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
-#: If at least this many cells have the form of 1.013, whole numbers below 100 in the same column
-#: are enough to show that the mark separates thousands.
+#: If at least this many cells have exactly three digits after the point or comma (1.013), one whole
+#: number below 100 in the same column is enough to show that this mark separates thousands.
 SURELY_GROUPED = 10
 
 _WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
@@ -54,9 +54,9 @@ class ReadTable(NamedTuple):
         .npz, .mat, .parquet)
     units   : units that headers name;  style : how text was split, "" for files of arrays
     called  : headers of the columns that were read
-    others  : the columns that were not read, by header, which may be empty, or by number from 1 if
-        there is no header. The column that `Reading.columns` names as index has the key "index". A
-        column is text if one of its cells is not a number
+    others : contents of the columns that were not asked for. Keys are headers ("" if a header is
+        empty), or numbers from 1 if there is no header. The column that `Reading.columns` names as
+        index has the key "index". A column is text if one of its cells is not a number
     factors : factors other than 1 by which columns were multiplied
     """
 
@@ -78,7 +78,7 @@ class _Source(NamedTuple):
     """Cells of a file by column. Without a header, columns are named by numbers from 1.
 
     rows, lines : as in `ReadTable`;  mistakes : messages on rows that are left out
-    said  : for each text besides the header that may name units, its place and the text
+    said : place and text of all that may name units outside the header, such as comments
     """
 
     header: list[str] | None
@@ -201,11 +201,12 @@ def matrix(path: Path, table: TextTable) -> Array:
 
 
 def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[str]:
-    """A mistake if cells such as 1.013 seem to have thousands separators, as beside 827.
+    """A mistake if cells such as 1.013 seem to have thousands separators, because the same columns
+    also contain whole numbers such as 827.
 
-    This is so if all other cells are whole numbers of at most three digits, and one of them has
-    three digits (not 999, which often marks a hole). If at least `SURELY_GROUPED` cells have the
-    form of 1.013, one whole number with fewer digits is enough.
+    This is so if all other cells, except holes, are whole numbers of at most three digits, and one
+    of them has three digits (not 999, which often marks a hole). If at least `SURELY_GROUPED` cells
+    have the form of 1.013, one whole number with fewer digits is enough.
     """
     mark = source.style.decimal
     if not mark or not any(mark in "\n".join(cells) for cells in columns):
@@ -299,7 +300,10 @@ def _named(source: _Source) -> str:
 
 
 def in_sheet(style: str) -> str:
-    """The end of a message: the sheet that was read, and others that fit; "" if no workbook."""
+    """The end of a message: the sheet that was read, and sheets with as many wanted columns.
+
+    "" if the file is no workbook.
+    """
     return f" in {style}" if style.startswith("sheet ") else ""
 
 
