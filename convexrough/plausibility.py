@@ -99,7 +99,7 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def wrong_loads(contact: Contact) -> Iterator[str]:
-    """A warning if the loads may be far from those of the solution whose statuses are proved."""
+    """A warning if the loads may be far from the exact solution, whose statuses are proved."""
     proof, largest = contact.certificate, float(contact.loads.max())
     loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
     far = proof.load_error > INACCURATE * largest and "contact" in proof.status

@@ -100,7 +100,8 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
               help="Prescribed approach, in the unit of the map.")  # fmt: skip
 @click.option("--load", metavar="P", type=float, help="Prescribed load; needs --modulus.")
 @click.option("--modulus", metavar="E", type=float,
-              help="Contact modulus E*: unit of load per square unit of the map.")  # fmt: skip
+              help="Contact modulus E*, in the unit of load per unit of the map squared."
+              )  # fmt: skip
 @click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
               help="Size of a pixel in --unit, if the file states none.")  # fmt: skip
 @click.option("--unit", metavar="UNIT", help="Unit of pixel and heights: µm, mm, ...")

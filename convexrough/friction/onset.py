@@ -42,8 +42,8 @@ class Onset(NamedTuple):
     """
 
     load: Fraction
-    lower: Fraction  # the asperity is proved open at this load
-    upper: Fraction  # the asperity is proved to touch at this load
+    lower: Fraction  # proved open at this load; 0 if none is proved
+    upper: Fraction  # proved to touch at this load; P if no lower load is proved
 
 
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
@@ -114,7 +114,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
 
-    if not levels.at(Fraction(0)).open[place]:  # it may touch first
+    if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
     known = [load for load in levels.known if depth(load) > 0]
     low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)

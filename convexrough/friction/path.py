@@ -52,15 +52,16 @@ class LoadPath(Table, Plottable):
         opposite surface, also while it is open
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
-    fronts         : (m,) [force] load down to which the contact slips at the end of the latest
-        segment along which P or Q changes; nan if nothing slips at this end, for example if the
-        load has fallen below the front
-    status         : (m, n) of each asperity at the end of this segment: "stuck" (no slip),
+    fronts         : (m,) [force] load down to which the contact slips on arrival at the point; nan
+        if nothing slips then, for example if the load has fallen below the front. A segment along
+        which P and Q do not change does not change fronts and status. Not valid if `order` is
+        "fails"
+    status : (m, n) status of each asperity on arrival at the point: "stuck" (no slip),
         "partial" (a disc sticks), "sliding" (the whole asperity slides), "open" (no contact) or
         "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
-    order          : "proved" if it is proved that no indentation falls as the load rises, between
-        the lowest and the highest load of all normal solutions used; other values as in `Cycle`
+    order          : "proved" if order (docs/theory/states.md) is proved between the lowest and the
+        highest load of all normal solutions used; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
 
@@ -122,7 +123,7 @@ class LoadPath(Table, Plottable):
         displacements: ArrayLike | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum of losses and displacements by the scene and the path.
+        """Derivatives of a weighted sum of losses and displacements, by data of scene and path.
 
         losses, displacements : (m,) weights of `losses` and `displacements`; by default the weight
             of the last loss is 1, and all other weights are 0

@@ -36,7 +36,8 @@ class Scene(Record):
         and asperity are closest) or "summit" (at the summit of the asperity, as in Dini and Hills
         2009)
     units         : names of the units of length and force, such as ("mm", "N"), for figures and
-        reports; no number is converted
+        reports, which may convert to SI units; the numbers of the scene and of results stay as they
+        are
 
     Raises InputError for bad values, and if two contact points coincide.
 
@@ -70,7 +71,8 @@ class Scene(Record):
         if own and named and own.into(named) != 1:
             expected = f'units=("{unit}", ...), or Surface.to_unit("{self.units.length}")'
             raise InputError("units", found=f"summits in {unit}", expected=expected)
-        # Equal tips, smaller than the sphere, only shrink the positions, which are distinct.
+        # With equal tips, at most as large as the sphere, contact points are the distinct summits,
+        # scaled.
         tips, sphere = self.asperities.tip_radii, min(base.along(self.sphere_radius))
         if self.geometry == "closest" and ((tips != tips[0]).any() or tips[0] > sphere):
             refuse_coincident(self.contact_points)
@@ -150,7 +152,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points: that of the summits, perhaps scaled; else None."""
+        """The lattice of the contact points: that of the summits, perhaps scaled, or None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -190,7 +192,7 @@ class Scene(Record):
     def reach(self, approach: float) -> float:
         """[length] distance from the axis beyond which none of these asperities can touch.
 
-        It is that for the largest height and tip radius; inf for a flat or a cylinder.
+        It is computed for the largest height and tip radius; inf on a flat or a cylinder.
 
         approach : [length] D0
 

@@ -1,9 +1,10 @@
 """The tangential law of one sphere at constant normal load (Cattaneo and Mindlin).
 
 The argument t is Q / (f P), the shear force divided by the friction limit. The indentation is
-n = k P^(2/3), by Hertz's law, and `ratio` gives c_t. Displacements are in units of c_t f n, and the
-potential energy is in units of c_t f^2 P n. In partial slip, with the stick radius c and the
-contact radius a, s = c / a and
+n = k P^(2/3), by Hertz's law; c_t is the ratio of tangential to normal compliance (`ratio`).
+Displacements are in units of c_t f n, and the potential energy is in units of c_t f^2 P n. In
+partial slip, with the stick radius c and the contact radius a, the ratio s = c / a gives the force
+t and the tangential deflection phi:
 
     t = 1 - s^3,    phi = 1 - s^2.
 

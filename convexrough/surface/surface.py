@@ -37,7 +37,8 @@ ROUND = 0.1
 #: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
-#: Fraction of rows equal to the row before that causes a warning. At 1 the map is a profile.
+#: A warning is given if at least this fraction of the rows equal the row before. At 1 the map is a
+#: profile.
 MANY_COPIED = 0.25
 
 #: Differences of heights below this part of the largest height are rounding errors.
@@ -202,8 +203,8 @@ class Surface(Record, Plottable):
             )
         if self.repeated:
             yield (
-                f"{self.repeated:,} pixels had exactly the same height before a trend was removed, "
-                "many more than any other height: if these are missing values, make them nan"
+                f"{self.repeated:,} pixels had exactly the same height in the data, many more than "
+                "have any other height: if these are missing values, make them nan"
             )
         if MANY_COPIED <= self.copied < 1:
             yield (
@@ -255,8 +256,8 @@ class Surface(Record, Plottable):
         """
         own, into = known_unit("unit", self.unit), known_unit("unit", unit)
         if own is None or into is None:
-            found = "none" if own is None else "none to convert to"
-            raise InputError("unit", found=found, expected="a unit of length of the map")
+            found = "a map without unit" if own is None else repr(unit)
+            raise InputError("unit", found=found, expected="units of length")
         scale = own.into(into)
         removed = tuple(each.scaled(scale) for each in self.removed)
         dx, dy = self.pixel
