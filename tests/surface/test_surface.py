@@ -52,7 +52,7 @@ def test_another_unit_is_the_same_surface() -> None:
     assert_allclose((other.radius, other.height), (1e-3 * one.radius, 1e-3 * one.height))
     assert other.slopes == one.slopes
     assert_allclose(metres.to_unit("um").summits(0.1).tip_radii, 1e3 * scan.summits(0.1).tip_radii)
-    with pytest.raises(cr.InputError, match="unit: found none, expected a unit of length of the"):
+    with pytest.raises(cr.InputError, match="unit: found a map without unit, expected units of"):
         cr.surface.Surface(cap, 1.0).to_unit("m")
 
 
