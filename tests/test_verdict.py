@@ -1,6 +1,8 @@
 """`verify`: wrong claims are found, the guilty are named first, and nothing wrong passes."""
 
 from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -218,3 +220,30 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
     assert list(wrong.hints()) == []  # the forces are right, the statuses are not
     unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
     assert not any("the loads are right" in hint for hint in unlike.hints())
+
+
+@pytest.mark.parametrize("factor", [0.9, 0.98, 1.02, 3.0, 1000.0])
+def test_a_common_factor_makes_no_suspects(factor: float) -> None:
+    """All loads are equally wrong, so differences of rounding size say nothing."""
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    verdict = cr.verify(contact.scene, contact.loads * factor, approach=PAPER_APPROACH)
+    assert not verdict.holds
+    assert len(verdict.suspects) == 0
+    assert f"{factor:g} times" in "".join(verdict.hints()) or factor == 1000.0
+
+
+def test_an_error_is_a_fraction_of_the_largest_load_of_the_solution() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    for factor in (1.0099, 1.01005, 1.0102):
+        verdict = cr.verify(contact.scene, contact.loads * factor, approach=PAPER_APPROACH)
+        assert verdict.error == pytest.approx(factor - 1, rel=1e-9)
+        assert verdict.holds == (factor < 1.01)
+
+
+@pytest.mark.parametrize("kind", [Fraction, Decimal])
+def test_exact_numbers_of_python_are_accepted(kind: Any) -> None:
+    load, scene = kind("1e-7"), paper()
+    contact = cr.press(scene, load=load)
+    assert contact.load == pytest.approx(1e-7)
+    assert cr.verify(scene, contact.loads, load=load, within=kind("0.01")).holds
+    assert cr.program(scene, load=load).constant == cr.program(scene, load=1e-7).constant

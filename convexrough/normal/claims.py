@@ -30,17 +30,17 @@ PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 #: does not explain an error of at most CORRECTED times the largest force.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: `hints` reports a common factor of the forces or a symmetry of the array if the correction by it
-#: leaves at most this part of the error.
+#: A common factor of the forces, or a symmetry of the array, explains their errors if the correction
+#: by it leaves at most this part of the largest error.
 REMAINING = 0.1
 
 
 def tolerance(name: str, within: float) -> float:
     """The tolerance `within`. Raises InputError unless it is above 0 and at most 1."""
-    if checks.positive(name, within) > 1.0:
+    if (number := checks.positive(name, within)) > 1.0:
         expected = "a fraction of the largest force, at most 1; 5 % is 0.05"
         raise InputError(name, found=within, expected=expected)
-    return within
+    return number
 
 
 class Claim(ABC):
@@ -210,9 +210,15 @@ class Claim(ABC):
 
     @property
     def largest(self) -> float:
-        """[force] the largest |force|: of those given, or of the solution if that is smaller."""
-        given, nearby = float(np.abs(self.values).max()), self.nearby()
-        return given if nearby is None else min(given, float(np.abs(nearby[0]).max()))
+        """[force] the largest |force|: of those given, or of the solution if that is smaller.
+
+        Without `solution`, it is a lower bound on the largest |force| of the exact solution.
+        """
+        given, nearby = np.abs(self.values), self.nearby()
+        if nearby is not None:
+            return min(float(given.max()), float(np.abs(nearby[0]).max()))
+        proved = float((given - self.errors_alone).max())
+        return proved if proved > 0 else float(given.max())
 
     @property
     def error(self) -> float:
@@ -248,7 +254,8 @@ class Claim(ABC):
         """(m,) indices of asperities with a wrong status or a wrong force, the likeliest first.
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
-        two. Forces with another sum than the solution are also compared after scaling to its sum.
+        two. Forces with another sum than the solution are also compared after scaling to its sum;
+        if that removes most of the error, no force stands out.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or self.near_enough:
@@ -259,8 +266,10 @@ class Claim(ABC):
             scales.append(wanted / total)
         apart = min((np.abs(scale * self.values - true) for scale in scales), key=np.sum)
         least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
-        order = np.argsort(-apart, kind="stable")
-        stand_out = (apart > least) & (np.abs(self.values - true) > least)  # also unscaled
+        order, unscaled = np.argsort(-apart, kind="stable"), np.abs(self.values - true)
+        stand_out = (apart > least) & (unscaled > least)
+        if apart.max() <= REMAINING * unscaled.max():  # all are wrong by a common factor
+            stand_out[:] = False
         stand_out[wrong] = True
         return frozen(order[stand_out[order]])
 

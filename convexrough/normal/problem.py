@@ -251,7 +251,7 @@ class NormalProblem:
             assert load is not None  # exactly_one
             given = checks.positive("load", load)
             if highest is None:
-                highest = highest_approach(scene, load, influence)
+                highest = highest_approach(scene, given, influence)
 
         # An asperity with D_i <= 0 cannot touch: A P >= 0, so its gap is at least -D_i.
         prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
@@ -259,7 +259,7 @@ class NormalProblem:
         top = float(prescribed.max(initial=0.0)) or 1.0
         if highest == np.inf:
             # the indentation of one asperity under the whole load
-            top = float(hertz.indentation(load, coefficients.max()))
+            top = float(hertz.indentation(given, coefficients.max()))
         units = Units.of(top, _middle(coefficients))
         return cls(
             scene=scene,

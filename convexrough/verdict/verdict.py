@@ -62,7 +62,7 @@ class Verdict(Claim, Table, Plottable):
         "wrongly_loaded": "claimed to touch, proved open",
     }
     claims = ("contact", "open")
-    _shown = ("holds", "wrongly_open", "wrongly_loaded", "undecided", "suspects")
+    _shown = ("holds", "error", "wrongly_open", "wrongly_loaded", "undecided", "suspects")
     _along: ClassVar[Along] = {("asperity",): ("status", "claimed", "loads", "errors")}
 
     scene: Scene

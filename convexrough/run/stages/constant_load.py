@@ -118,7 +118,7 @@ class CycleStage(Stage):
             return
         for i, (low, high) in enumerate(zip(self.lowest, self.maximum_fraction, strict=True)):
             if not low < high:
-                expected = f"expected a number above its minimum, {low}"
+                expected = f"expected a number above its minimum, {low + 0.0:g}"
                 yield f"maximum_fraction[{i}]", f"found {high}, {expected}"
 
     def fits(self, count: int) -> None:
