@@ -30,8 +30,8 @@ PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 #: does not explain an error of at most CORRECTED times the largest force.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: A common factor of the forces, or a symmetry of the array, explains their errors if the correction
-#: by it leaves at most this part of the largest error.
+#: A common factor of the forces, or a symmetry of the array, explains errors if the correction by
+#: it leaves at most this part of the largest error.
 REMAINING = 0.1
 
 
