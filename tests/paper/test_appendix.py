@@ -1,13 +1,13 @@
 """The source's appendix method: its crossing and scatter, and where it must agree with `shear`."""
 
 import numpy as np
+import papers_appendix as appendix
 import pytest
 from numpy.testing import assert_allclose
 from scenes import PAPER_APPROACH, paper
 from scipy.optimize import brentq
 
 import convexrough as cr
-from convexrough.paper import appendix
 from convexrough.sphere.smooth import smooth
 
 

@@ -1,4 +1,4 @@
-"""Slips and losses by the source paper's appendix, equations [A1] to [A15], for comparison.
+"""Slips and losses by the appendix of Dini and Hills (2009), equations [A1] to [A15].
 
 Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
 is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
