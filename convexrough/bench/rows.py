@@ -183,6 +183,8 @@ def page_block(bench: Bench) -> list[str]:
         "",
         "![Time against error, every solver, at each size](figures/work-precision.png)",
         "",
+        "![Time of a certified press against the number of asperities](figures/cost.png)",
+        "",
         *markdown(size_table(bench), left=1),
         "",
         *(f"- {line}" for line in _messages(bench)),

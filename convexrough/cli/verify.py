@@ -92,7 +92,7 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.option("--missing-open", is_flag=True,
               help="Asperities without a row are claimed to be open.")  # fmt: skip
 @click.option("--nodes", is_flag=True,
-              help="Rows are nodes; sum their forces at the nearest asperity.")  # fmt: skip
+              help="Rows are nodes; sum their forces by asperity.")  # fmt: skip
 @click.option("--shear", metavar="FORCES", type=PATH,
               help="Also check the shear forces in this file, after the total shear force has "
               "grown from 0 to the Q of --shear-force.")  # fmt: skip

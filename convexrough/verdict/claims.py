@@ -70,7 +70,7 @@ class Manner(Reading):
     tolerance : [length] largest error of a position; default: 1 % of the smallest distance of two
         asperities
     missing_open : True if asperities without a row are open
-    nodes     : True if rows are nodes or pixels, summed at the nearest asperity
+    nodes     : True if rows are nodes or pixels, summed by asperity
     """
 
     sign: int = 1

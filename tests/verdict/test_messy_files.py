@@ -499,6 +499,30 @@ def test_pressures_at_hexagonal_points(tmp_path: Path) -> None:
     assert "each of area 8.6603e-07" in claimed.note
 
 
+@pytest.mark.parametrize("height", [-2.5e-3, -2e-4])
+def test_pixels_of_a_large_disc_nearer_to_a_small_neighbour(tmp_path: Path, height: float) -> None:
+    """The neighbour is open, or its contact is missing in the map."""
+    places = [(0.0, 0.0), (0.04, 0.0), (0.1, 0.1), (-0.05, 0.1), (0.1, -0.05), (-0.05, -0.05)]
+    heights = np.array([0.0, height, 0.0, 0.0, 0.0, 0.0])
+    tips = np.array([2.0, 0.5, 0.5, 0.5, 0.5, 0.5])
+    material = cr.Material.from_youngs(210e3, 0.3)
+    scene = cr.Scene(np.inf, cr.Asperities(np.array(places), tips, heights), material)
+    contact = cr.press(scene, load=3.0)
+    assert contact.contact_radii[0] > 0.02
+    assert contact.crowding < 1
+    x, y = (each.ravel() for each in np.mgrid[-0.09:0.14:4e-4, -0.09:0.14:4e-4])
+    pressure = cr.fields.pressure(contact, np.column_stack((x, y)))
+    here = np.hypot(x - 0.04, y) < contact.contact_radii[1]
+    missing = bool(contact.loads[1] > 0)
+    pressure[here] = 0.0
+    name = put(tmp_path, {"x": x, "y": y, "pressure": pressure})
+    loads = read_loads(tmp_path / name, scene, Manner()).values
+    verdict = cr.verify(scene, loads, load=3.0, within=0.02)
+    assert verdict.wrongly_open.tolist() == ([1] if missing else [])
+    assert len(verdict.wrongly_loaded) == 0
+    assert verdict.error < 0.02
+
+
 def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     """Most rows lie on an asperity, the wrong one."""
     asperities = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=4e-3)
