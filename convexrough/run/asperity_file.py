@@ -47,6 +47,8 @@ def read_summits(
     if "height" not in columns and unread:
         some = [shortened(it) for it in unread[:MOST_NAMED]]
         named = 'columns = {height = "' + some[0] + '"} in [asperities], or no such column'
+        if "depth" in some[0].lower():
+            named = "which grows towards the sphere: write depths as negative heights"
         more = ", ..." if len(unread) > MOST_NAMED else ""
         raise InputError("columns", found=f"{', '.join(some)}{more}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip

@@ -172,6 +172,11 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
         raw(path, [INFORMATION, INFORMATION], pixel=1.0)
 
 
+def test_text_above_the_map_in_a_sheet(tmp_path: Path) -> None:
+    titled = [["Surface map"], [], *HEIGHTS.tolist()]
+    assert_allclose(raw(tmp_path / "a.xlsx", [titled], pixel=1.0).heights, HEIGHTS)
+
+
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
 ONE = {"pixel": 1.0}
 

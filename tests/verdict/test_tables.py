@@ -308,6 +308,7 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
             "x,y,elevation,load,id\n0,0,1,2,3\n",
             "columns: found elevation, but no height, expected a",
         ),
+        ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
         (
             "x,y,a,b,c,d,e,f\n0,0,1,2,3,4,5,6\n",
             "columns: found a, b, c, d, e, ..., but no height, expected a",
