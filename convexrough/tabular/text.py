@@ -255,8 +255,8 @@ def _headed(
     place = max(
         range(len(headers)), key=lambda i: (wanted(headers[i]), len(headers[i]) == width, -i)
     )
-    named = sum(map(bool, map(str.strip, headers[place])))  # a row of a sheet has empty cells, too
-    if is_map and 0 < width != named and wanted(headers[place]) < 2:
+    filled = sum(map(bool, map(str.strip, headers[place])))  # rows of a sheet have empty cells, too
+    if is_map and 0 < width != filled and wanted(headers[place]) < 2:
         numbers = [[style.number(cell) is not None for cell in row.cells] for row in rows[:first]]
         if all(2 * sum(found) < len(found) for found in numbers):  # else a damaged row
             return _headed(rows[first:], titles, style, known, is_map)
