@@ -250,26 +250,25 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    The results are (rows, stride) fields with the stride of `SiteBox.stride`; columns beyond those
-    of a given field have no meaning.
+    In the results, columns beyond those of a given field have no meaning.
 
     fields : (rows, columns) each, padded with zeros before the transform; they are read one by one.
-        A field of the shape (rows, stride) is overwritten by its result, which saves memory
+        A field of the shape (rows, stride), with `SiteBox.stride`, is overwritten by its result,
+        which saves memory
     """
     from scipy import fft
 
     height, width = padded
     stride = 2 * (width // 2 + 1)
-    rooms, halves = list[NDArray[Any]](), list[NDArray[Any]]()
+    halves: list[NDArray[Any]] = []  # the transforms of rows
+    placed: list[bool] = []  # True if in the memory of the field
     for field in fields:
-        room = field
-        if field.shape[1] != stride:
-            room = np.zeros((len(field), stride), dtype=field.dtype)
-            room[:, : field.shape[1]] = field
-        half = room.view(np.result_type(room, np.complex64))  # the transform of each row, in place
-        _row_by_row(partial(fft.rfft, axis=1), room[:, :width], half, workers)
-        rooms.append(room)
-        halves.append(half)
+        if field.shape[1] == stride:
+            halves.append(field.view(np.complex64 if field.dtype == np.float32 else np.complex128))
+            _row_by_row(partial(fft.rfft, axis=1), field[:, :width], halves[-1], workers)
+        else:
+            halves.append(fft.rfft(field, width, axis=1, workers=workers))
+        placed.append(field.shape[1] == stride)
     rows = len(halves[0])
 
     def work(each: slice) -> None:
@@ -278,9 +277,14 @@ def through_waves(
             half[:, each] = fft.ifft(full, axis=0, overwrite_x=True)[:rows]
 
     threads.each(work, in_blocks(halves[0]), workers)
-    for room, half in zip(rooms, halves, strict=True):
-        _row_by_row(partial(fft.irfft, n=width, axis=1), half, room[:, :width], workers)
-    return rooms
+    found = []
+    for half, in_place in zip(halves, placed, strict=True):
+        if in_place:
+            found.append(half.view(half.real.dtype))
+            _row_by_row(partial(fft.irfft, n=width, axis=1), half, found[-1][:, :width], workers)
+        else:
+            found.append(fft.irfft(half, width, axis=1, overwrite_x=True, workers=workers))
+    return found
 
 
 def _row_by_row(
@@ -294,7 +298,10 @@ def _row_by_row(
     def work(some: slice) -> None:
         into[some] = transform(given[some])
 
-    threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
+    if given.size <= IN_ROWS:
+        work(slice(None))
+    else:
+        threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
