@@ -203,7 +203,7 @@ def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np
         after = before + Pair.exact(np.where(near, grown, ends - before.high))
         return Pair(*(part * (near | (ends > 0)) for part in after))
 
-    return in_parts(len(step), following)
+    return following(slice(None)) if step.ndim > 1 else in_parts(len(step), following)
 
 
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:

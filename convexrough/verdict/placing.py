@@ -161,10 +161,12 @@ class Placing:
         A node at the distance r_i from asperity i belongs to the asperity with the least
         r_i^2 - a_i^2, where a_i is the contact radius. So discs that do not overlap keep all of
         their nodes, also those that are nearer to another asperity. The radii follow from the sums.
+        If a disc would reach beyond its neighbour, the nearest asperities are taken.
         """
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         assert self.points is not None
+        nearest = owners
         for _ in range(ROUNDS):
             loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
             radii, before = discs_of(self.scene, loads), owners
@@ -172,9 +174,12 @@ class Placing:
             raised = cKDTree(np.column_stack((self.scene.contact_points, height)))
             nodes = np.column_stack((self.points, np.zeros(len(owners))))
             owners = np.asarray(raised.query(nodes)[1])
-            if np.array_equal(owners, before):
+            if (radii > self._apart).any():  # loads in a wrong unit
                 break
-        return owners, radii
+            if np.array_equal(owners, before):
+                return owners, radii
+        loads = np.bincount(nearest, values, minlength=len(self.scene)).clip(min=0.0)
+        return nearest, discs_of(self.scene, loads)
 
     # By an index, or in order
 
