@@ -42,7 +42,8 @@ def work_figure(bench: Bench) -> Figure:
 
     The frontier is grey.
     """
-    panels = bench.panels()
+    every = bench.panels().items()
+    panels = {scene: tried for scene, tried in every if any(row.known for row in tried)}
     columns = min(COLUMNS, max(1, len(panels)))
     rows = max(1, -(-len(panels) // columns))
     figure = Figure(figsize=(DOUBLE, 2.1 * rows + 0.9), layout="constrained")

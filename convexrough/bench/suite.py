@@ -56,8 +56,9 @@ def _of(family: Family, *sizes: int) -> Sizes:
     return tuple((family, size) for size in sizes)
 
 
-#: Families and sizes of the scenes on which all solvers are compared.
-WORK = (*_of("lattice", 61, 700, 8_400), *_of("rough", 8_400), *_of("scattered", 8_400))
+#: Families and sizes of the scenes on which all solvers are compared. Reference loads of large
+#: scattered scenes are not proved accurate enough.
+WORK = (*_of("lattice", 61, 700, 8_400), *_of("rough", 8_400))
 
 #: Scenes on which a press with the default solver is timed.
 PRESSES = (

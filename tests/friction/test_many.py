@@ -125,3 +125,12 @@ def test_warnings_of_many() -> None:
     assert contacts.cycles(1e-9).warnings == contacts.warnings
     assert repr(contacts).count("warning") == 1
     assert "warning" not in repr(cr.press_many(scenes[2:] * 51, approach=5e-5))
+
+
+def test_more_problems_than_a_chunk_of_numbers() -> None:
+    """Two asperities each, so that one stack has more than 2^14 rows."""
+    pair = cr.Asperities([[0.0, 0.0], [2.5e-3, 0.0]], 0.02)
+    scene = cr.Scene(1.0, pair, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+    loads = np.linspace(1e-8, 3e-7, 2**14 + 16)
+    found = cr.press_many([scene] * len(loads), load=loads)
+    np.testing.assert_allclose(found.asperity_loads.sum(axis=1), loads, rtol=1e-12)

@@ -523,6 +523,18 @@ def test_pixels_of_a_large_disc_nearer_to_a_small_neighbour(tmp_path: Path, heig
     assert verdict.error < 0.02
 
 
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_nodes_with_loads_in_a_wrong_unit(tmp_path: Path, factor: float) -> None:
+    """Discs that follow from such loads overlap, so nodes belong to the nearest asperities."""
+    asperities = cr.Asperities.hexagonal(spacing=1e-3, tip_radius=0.02, within=2e-3)
+    scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+    loads = cr.press(scene, approach=2e-6).loads
+    x, y = (asperities.positions[:, None] + [[0.0, 0.0], [5e-5, 0.0]]).reshape(-1, 2).T
+    columns = {"x": x, "y": y, "load": np.repeat(loads, 2) / 2 * factor}
+    claimed = read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+    np.testing.assert_allclose(claimed.values, loads * factor, rtol=1e-6)
+
+
 def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     """Most rows lie on an asperity, the wrong one."""
     asperities = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=4e-3)
