@@ -212,7 +212,8 @@ class Claim(ABC):
     def largest(self) -> float:
         """[force] the largest |force|: of those given, or of the solution if that is smaller.
 
-        Without `solution`, it is a lower bound on the largest |force| of the exact solution.
+        Without `solution`, it is a lower bound on the largest |force| of the exact solution, if the
+        error bounds give one above 0.
         """
         given, nearby = np.abs(self.values), self.nearby()
         if nearby is not None:

@@ -170,12 +170,12 @@ class Placing:
         for _ in range(ROUNDS):
             loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
             radii, before = discs_of(self.scene, loads), owners
+            if (radii > self._apart).any():  # loads in a wrong unit
+                break
             height = np.sqrt(np.maximum(radii.max() ** 2 - radii**2, 0.0))
             raised = cKDTree(np.column_stack((self.scene.contact_points, height)))
             nodes = np.column_stack((self.points, np.zeros(len(owners))))
             owners = np.asarray(raised.query(nodes)[1])
-            if (radii > self._apart).any():  # loads in a wrong unit
-                break
             if np.array_equal(owners, before):
                 return owners, radii
         loads = np.bincount(nearest, values, minlength=len(self.scene)).clip(min=0.0)
