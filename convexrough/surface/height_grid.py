@@ -20,8 +20,7 @@ class HeightGrid(NamedTuple):
     heights : nan where the file states no height; marks of holes such as -9999 are unchanged
     pixel : size of a pixel along x and y; None if not stated
     unit, height_unit : units of the pixel and of the heights; "" if not stated
-    unclear : the first comment with a length or a unit of length that `read` does not understand;
-        "" if there is none
+    comments : the comments that `read` does not understand
     sheet : the name of the sheet of a workbook, in quotes; else ""
     """
 
@@ -29,7 +28,7 @@ class HeightGrid(NamedTuple):
     pixel: tuple[float, float] | None = None
     unit: str = ""
     height_unit: str = ""
-    unclear: str = ""
+    comments: tuple[str, ...] = ()
     sheet: str = ""
 
 

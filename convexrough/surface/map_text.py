@@ -29,8 +29,16 @@ _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
-#: Words that announce a scale.
-_SCALE = re.compile(r"pixel|scale|factor|multipl|resolution|spacing|step|\bd[xyz]\b", re.I)
+#: Words that announce a scale, with a number; and words that announce one also without a number.
+_SCALE = re.compile(
+    r"pixel|scale|fa[ck]tor|mult|gain|cal(?:ib|\b)|\bz ?cal|lsb|resolution|spacing|step"
+    r"|\bd[xyz]\b|[*×]\s*\d|\bx\s*\d+\s*$",
+    re.I,
+)
+_CHANGED = re.compile(
+    r"\b(counts|digits|volts?|waves|fringes|inverted|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
+    re.I,
+)
 
 #: A table with at most this many columns is not a matrix if two of them are coordinates of a grid.
 MOST_COLUMNS = 6
@@ -47,14 +55,14 @@ def text_map(path: Path) -> HeightGrid:
     table = read_text_table(path, known, _COMMENT, is_map=True)
     width = len(table.rows[0].cells) if table.rows else 0
     read = _matrix if table.header is None and width != 3 else _list
-    unclear = next(filter(_unclear, table.comments), "")
-    return read(path, table, width)._replace(unclear=unclear, sheet=table.style.sheet)
+    header = table.header.text.strip() if table.header else ""
+    unread = [each for each in table.comments if not _SAID.fullmatch(each)]
+    unread = [each for each in unread if each.strip("#%; ") and each.lstrip("#% ") != header]
+    return read(path, table, width)._replace(comments=tuple(unread), sheet=table.style.sheet)
 
 
-def _unclear(comment: str) -> bool:
+def states_scale(comment: str) -> bool:
     """True for a comment that seems to state a scale, such as "# Breite: 50 µm" or "# z in nm"."""
-    if _SAID.fullmatch(comment):
-        return False
     _, marked, value = comment.replace("=", ":").rpartition(":")
     length = _LENGTH.fullmatch(value.strip())
     unit = parsed(length[2] if length else value.strip())
@@ -62,7 +70,7 @@ def _unclear(comment: str) -> bool:
         return True
     if any(not (unit := parsed(each)) or unit.kind == "length" for each in in_text(comment)):
         return True
-    return bool(re.search(r"\d", comment) and _SCALE.search(comment))
+    return bool(_CHANGED.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment)))
 
 
 def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
@@ -76,8 +84,10 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             raise InputError("columns", found=found, expected="their names above them: x, y, z")
     if min(heights.shape) > 2:
         for place, lines in (("row", heights), ("column", heights.T)):
-            if _even(lines[0, 1:]) and not _even(lines[1, 1:]):
-                raise _not_heights(f"{place} 1", lines[0][~np.isnan(lines[0])])
+            for number, one, other in ((1, 0, 1), (len(lines), -1, -2)):
+                line = lines[one]
+                if _even(line[1:]) and not _even(lines[other, 1:]):
+                    raise _not_heights(f"{place} {number}", line[~np.isnan(line)])
             off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
             if (np.abs(off) < 0.01 * spread).all():
                 found = f"the means of the {'columns' if place == 'row' else 'rows'}"

@@ -14,7 +14,7 @@ from convexrough.surface.detrend import Trend
 from convexrough.surface.height_grid import HeightGrid, refuse_other
 from convexrough.surface.holes import filled
 from convexrough.surface.map_arrays import arrays_map, instrument_map
-from convexrough.surface.map_text import text_map
+from convexrough.surface.map_text import states_scale, text_map
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import reading
 from convexrough.tabular.text import WORKBOOKS
@@ -71,11 +71,12 @@ def read(
     """
     with blamed_on(path, unless_known=True):
         grid = _grid(Path(path), pixel)
-        if grid.unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
+        unclear = next(filter(states_scale, grid.comments), "")
+        if unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
             expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '
             expected += '"x [µm] y [µm] z [nm]" above columns, or all three options'
             expected += " --pixel, --unit, --height-unit, if the file is right without this line"
-            raise InputError("comments", found=grid.unclear.strip(), expected=expected)
+            raise InputError("comments", found=unclear.strip(), expected=expected)
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)
         if upwards and not length:
@@ -91,7 +92,7 @@ def read(
         size = _pixel(grid.pixel, pixel)
         name = length.name if length else ""
         source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
-        surface = Surface(heights, size, name, filled_pixels=holes, source=source)
+        surface = Surface(heights, size, name, (), holes, source, grid.comments)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:

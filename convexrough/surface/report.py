@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -28,6 +28,7 @@ from convexrough.surface.provability import (
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
+from convexrough.tabular.roles import shortened
 from convexrough.version import __version__
 
 #: The units of columns and statistics; {} stands for the unit of length.
@@ -37,6 +38,9 @@ LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 
 #: At most this many crowded pairs of summits are printed.
 MOST_LISTED = 10
+
+#: At most this many unused comments are printed.
+MOST_COMMENTS = 5
 
 #: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
@@ -101,6 +105,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
         "version": __version__,
         "surface": {
             "source": surface.source,
+            "comments": list(surface.comments),
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
@@ -163,6 +168,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     off = float(np.median(summits.deviations))
     lines = [
         ("surface", surface.source),
+        *_not_used(surface.comments),
         ("pixels", f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}"),
         ("removed", "; ".join(map(str, surface.removed)) or "nothing"),
         *_pressed_by(scanned),
@@ -196,6 +202,14 @@ def describe_surface(scanned: Scanned) -> list[str]:
     return described
 
 
+def _not_used(comments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The line on comments of the file that were not used, if there are any."""
+    if comments:
+        more = f" and {len(comments) - MOST_COMMENTS:,} more" * (len(comments) > MOST_COMMENTS)
+        shown = ", ".join(f'"{shortened(each.strip("#% "))}"' for each in comments[:MOST_COMMENTS])
+        yield "comments", f"not used: {shown}{more}"
+
+
 def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
     """The radii of one body whose shape is that of the pressing body plus the removed forms.
 
@@ -218,10 +232,12 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
     if scanned.contact is None or (found := with_form(scanned)) is None:
         return
     radii, angle = found
-    said = f"{_radii(along(scanned.contact.scene.sphere_radius))}, without the removed form; with "
-    said += f"it {_radii(radii)}" if max(radii) > 0 else "it no hill"
+    own = _radii(along(scanned.contact.scene.sphere_radius))
+    both = _radii(radii) if max(radii) > 0 else "no hill"
+    said = f"{own}; {both} with the removed form, unless {own} contains it already"
     if angle and max(radii) > 0:
-        said += f", the first {angle:.3g}° from x: turn x and y of the summits by {-angle:.3g}°"
+        said += f"; the axis of the first is at {angle:.3g}° from x: "
+        said += f"turn x and y of the summits by {-angle:.3g}°"
     if min(radii) < 0 < max(radii):
         said += "; [sphere] accepts no negative radius, but inf for a flat direction"
     yield "pressing radius", said

@@ -59,6 +59,7 @@ class Surface(Record, Plottable):
         is not the largest height, else 0
     copied  : fraction of rows that equal the row before, or the same of columns if that is larger
     source  : the file, or a description
+    comments : comments of the file that were not used
 
     By default `clipped`, `repeated` and `copied` are determined from `heights`.
 
@@ -77,6 +78,7 @@ class Surface(Record, Plottable):
     removed: tuple[Removed, ...]
     filled_pixels: NDArray[np.bool_] | None
     source: str
+    comments: tuple[str, ...]
     clipped: int
     repeated: int
     copied: float
@@ -89,6 +91,7 @@ class Surface(Record, Plottable):
         removed: tuple[Removed, ...] = (),
         filled_pixels: NDArray[np.bool_] | None = None,
         source: str = "",
+        comments: tuple[str, ...] = (),
         clipped: int | None = None,
         repeated: int | None = None,
         copied: float | None = None,
@@ -112,6 +115,7 @@ class Surface(Record, Plottable):
             removed=removed,
             filled_pixels=filled_pixels,
             source=source,
+            comments=comments,
             clipped=holes.clipped(known) if clipped is None else clipped,
             repeated=holes.repeated(known) if repeated is None else repeated,
             copied=holes.copied(measured) if copied is None else copied,

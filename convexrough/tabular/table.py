@@ -140,7 +140,13 @@ def read_table(
     pixels = instead and {"x", "y"} <= places.keys()
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
-        + ("" if source.header or how.scalable else ": add a first row with names")
+        + (
+            ""
+            if how.scalable
+            else ": rename one"
+            if source.header
+            else ": add a first row with names"
+        )
         + (f"; --column {each}={other} names another" if how.scalable else "")
         + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
         for each in missing

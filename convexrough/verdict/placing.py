@@ -298,9 +298,13 @@ class Placing:
     def _tree(self) -> cKDTree:
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
-        return cKDTree(
-            self.scene.contact_points if self.summed else self.scene.asperities.positions
-        )
+        tops, contact_points = self.scene.asperities.positions, self.scene.contact_points
+        if self.summed or self.points is None:
+            return cKDTree(contact_points if self.summed else tops)
+        of_tops, others = cKDTree(tops), cKDTree(contact_points)
+        far = [float(np.median(tree.query(self.points)[0])) for tree in (of_tops, others)]
+        # With the closest-point geometry, files can have the tops or the contact points.
+        return others if far[1] <= self._allowed < far[0] else of_tops
 
     def _nearest(self, points: Array) -> tuple[Array, Indices]:
         """(m,) [length], (m,) the distance of the nearest asperity to each point, and its index."""

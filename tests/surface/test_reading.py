@@ -307,6 +307,8 @@ def test_arrays_without_numbers(tmp_path: Path, shape: tuple[int, ...]) -> None:
     [
         *("z [nm]", "height (nm)", "all lengths in nm", "heights in nanometres", "Height map, nm"),
         *("values in Angstrom", "scale factor 0.001", "dx = 0.5", "lateral resolution 0.5 µm/px"),
+        *("ZCal: 0.5", "Gain: 0.5", "heights multiplied by two", "Mult 2", "heights in waves"),
+        *("z in counts", "volts", "z * 1000", "Faktor 0,5", "heights x1000", "LSB=0.1", "inverted"),
         *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
     ],
 )
@@ -319,7 +321,9 @@ def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
 
 def test_other_comments_are_ignored(tmp_path: Path) -> None:
     said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 20 °C, m = 5\n"
-    assert raw(tmp_path / "map.txt", said + matrix(), pixel=1.0).pixel == (1.0, 1.0)
+    surface = raw(tmp_path / "map.txt", said + matrix(), pixel=1.0)
+    assert surface.pixel == (1.0, 1.0)
+    assert surface.comments == tuple(said.splitlines())
 
 
 def test_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:

@@ -547,6 +547,17 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     assert f"{tmp_path / name}: positions: {cause} axis" in str(refused.value)
 
 
+def test_positions_of_contact_points(tmp_path: Path) -> None:
+    """With the closest-point geometry these are not the positions of the summits."""
+    asperities = cr.Asperities.square(spacing=0.04, tip_radius=0.15, within=0.25)
+    scene = cr.Scene(8.0, asperities, cr.Material(1.0, 0.3), geometry="closest")
+    loads = cr.press(scene, approach=8e-4).loads
+    x, y = scene.contact_points.T
+    name = put(tmp_path, {"x": x[::-1], "y": y[::-1], "load": loads[::-1]})
+    claimed = read_loads(tmp_path / name, scene, Manner(tolerance=1e-5))
+    np.testing.assert_array_equal(claimed.values, loads)
+
+
 @pytest.mark.parametrize(
     ("factor", "shift", "said"),
     [(1e-3, 0.0, "--scale x=1000 --scale y=1000"), (1.0, 0.02, "shifted by about [0.02, 0], ")],
