@@ -47,7 +47,7 @@ def arrays_map(path: Path) -> HeightGrid:
         expected += "marks holes"
         raise InputError("arrays", found=", ".join(others), expected=expected)
     size = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
-    units = [str(named[name]) if name in named else "" for name in STATED[1:]]
+    unit, height_unit = (str(named.get(name, "")) for name in STATED[1:])
     heights = np.squeeze(_numbers(named[chosen]))
     axes = [np.atleast_1d(np.squeeze(_numbers(named[name]))) for name in "xy" if name in named]
     if len(axes) == 1:
@@ -59,7 +59,7 @@ def arrays_map(path: Path) -> HeightGrid:
         heights, steps = placed(heights, *axes)
         size = size or steps
         refuse_other(size, steps, ROUNDED, "the steps of x and y")
-    return HeightGrid(heights, size, *units)
+    return HeightGrid(heights, size, unit, height_unit)
 
 
 def _may_change(values: NDArray[Any], heights: NDArray[Any]) -> bool:

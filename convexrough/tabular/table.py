@@ -138,15 +138,11 @@ def read_table(
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
     other = others[0] if short else "NAME" if source.header else "NUMBER"
     pixels = instead and {"x", "y"} <= places.keys()
+    advice = ": rename one" if source.header else ": add a first row with names"
+    advice = "" if how.scalable else advice
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}"
-        + (
-            ""
-            if how.scalable
-            else ": rename one"
-            if source.header
-            else ": add a first row with names"
-        )
+        + advice
         + (f"; --column {each}={other} names another" if how.scalable else "")
         + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
         for each in missing
