@@ -15,13 +15,12 @@ step d follows for every asperity, touching or open.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
@@ -66,17 +65,13 @@ def correct(
         return -defect
     direct = len(touching) <= (FACTORISED if influence.stored else FACTORISED_UNSTORED)
     for extra in (None, shells):
-        try:
-            if direct:
-                return _factorise(influence, extra, touching, root, defect, balanced)
-            return _iterate(influence, extra, root, defect, balanced, tolerance)
-        except _IndefiniteError:
-            continue
+        if direct:
+            step = _factorise(influence, extra, touching, root, defect, balanced)
+        else:
+            step = _iterate(influence, extra, root, defect, balanced, tolerance)
+        if step is not None:
+            return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
-
-
-class _IndefiniteError(Exception):
-    pass
 
 
 def _factorise(
@@ -86,8 +81,10 @@ def _factorise(
     root: Array,
     defect: Array,
     balanced: bool,
-) -> Array:
-    dpotrf, dpotrs = _cholesky()
+) -> Array | None:
+    """The step by Cholesky's factorisation; None if the matrix is not positive definite."""
+    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
+
     w = root[touching]
     matrix = influence.submatrix(touching)
     matrix *= w
@@ -96,24 +93,14 @@ def _factorise(
     # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
     factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
-        raise _IndefiniteError
+        return None
     y = dpotrs(factor, w * defect[touching], lower=1, overwrite_b=1)[0]
     shift = 0.0
     if balanced:
         border = dpotrs(factor, w, lower=1)[0]
         shift = float(w @ y) / float(w @ border)
         y -= shift * border
-    changes = np.zeros(len(root))
-    changes[touching] = w * y
-    return shift - defect + influence.apply(changes)
-
-
-@cache
-def _cholesky() -> tuple[Any, Any]:
-    """LAPACK's functions for the factorisation and the solution."""
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
-    return dpotrf, dpotrs
+    return shift - defect + influence.apply(among_zeros(w * y, touching, len(root)))
 
 
 def _iterate(
@@ -123,8 +110,10 @@ def _iterate(
     defect: Array,
     balanced: bool,
     tolerance: float,
-) -> Array:
-    """The step by preconditioned conjugate gradients: docs/theory/newton.md, "Many asperities"."""
+) -> Array | None:
+    """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
+    None if the matrix is not positive definite.
+    """
     single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
@@ -132,7 +121,11 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    smoothed = _Smoothed(influence.smoother(root) or _unsmoothed(influence, w), w, balanced)
+
+    def unsmoothed(values: Values) -> tuple[Values, float]:
+        return values.copy(), float(np.linalg.norm(influence.apply(w * values)))
+
+    smoothed = _Smoothed(influence.smoother(root) or unsmoothed, w, balanced)
     residual: Values = -w * (defect / size).astype(dtype)
     z, left, first = smoothed(residual)
     p = z.copy()
@@ -146,7 +139,7 @@ def _iterate(
         bent += diagonal * p
         curvature = float(p @ bent)
         if curvature <= 0:
-            raise _IndefiniteError
+            return None
         length = dtype(squared / curvature)
         q *= length
         y_displacement += q
@@ -160,9 +153,8 @@ def _iterate(
 
 
 class _Smoothed:
-    """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
-
-    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. If balanced, each call
+    """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). If balanced, each call
     also adds a factor times the diagonal of W to the residual, so that single precision is enough.
     The sum of these factors, `shift`, is beta of the step, divided by the scale of the defect.
     """
@@ -185,7 +177,3 @@ class _Smoothed:
             residual += self.w.dtype.type(off) * self.w
             z += self.w.dtype.type(off) * self.border
         return z, left, whole
-
-
-def _unsmoothed(influence: Influence, w: Values) -> Smoother:
-    return lambda values: (values.copy(), float(np.linalg.norm(influence.apply(w * values))))
