@@ -121,7 +121,7 @@ class Levels:
     def _sought(self, problem: NormalProblem, start: Array | None) -> Level:
         """The level proved near refined loads in the box of `top`."""
         state = refined_loads(problem, self._press(problem, start))
-        return proved(problem, state, self.top.box and iter((self.top.box.closed(problem),)))
+        return proved(problem, state, self.top.box and self.top.box.closed(problem))
 
 
 def _key(load: Ball) -> tuple[float, float, float]:
