@@ -33,37 +33,30 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
-#: Shells are also fitted to the contact radii if the convexity number is above this. A heuristic.
-FIT_FROM = 0.8
+# Heuristics: proofs are valid for any of these numbers.
 
-#: Weight of contact radii in the radii of fitted shells; half the distance to the nearest neighbour
-#: has the weight 1 - FITTED. A heuristic: any weight gives valid shells
-#: (docs/theory/certificate.md, "Choice of the box", 3).
-FITTED = 0.9
+#: Shells are also fitted to the contact radii if the convexity number is above FIT_FROM. In their
+#: radii, contact radii have the weight FITTED, and half the distance to the nearest neighbour has
+#: 1 - FITTED (docs/theory/certificate.md, "Choice of the box", 3).
+FIT_FROM, FITTED = 0.8, 0.9
 
-#: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
-MARGINS = (0.1, 1e-3)
+#: Margins mu with which a Cholesky factorisation is tried, the largest first; and those on a box of
+#: touching asperities, where the energy may be barely convex.
+MARGINS, CROWDED_MARGINS = (0.1, 1e-3), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 #: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
-#: plus LEAST_LEEWAY times the largest load. Heuristics: proofs are valid for any box.
+#: plus LEAST_LEEWAY times the largest load.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
 #: Number of touching asperities up to which a Cholesky factorisation costs no more than a proof by
 #: overlapping shells.
 FACTORISED = 1500
 
-#: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
-CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
-
 #: The radius of an overlapping shell is at first the larger of w t and WIDENED t / (1 - c)^(1/2).
 #: Here w is one of WIDTHS, tried in this order (the cheapest first), and c is the largest (t_i
-#: t_j)^(1/2) / r_ij with a near neighbour j. The radius is then raised, where that is larger, to
-#: the radius of a near neighbour minus LESS times its distance. Heuristics: any radii give valid
-#: bounds.
-WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
-
-#: Number of near neighbours that affect the radius of a shell.
-NEAREST = 8
+#: t_j)^(1/2) / r_ij with one of the NEAREST neighbours j. The radius is then raised, where that is
+#: larger, to the radius of such a neighbour minus LESS times its distance.
+WIDTHS, WIDENED, LESS, NEAREST = (4.0, 8.0), 3.0, 0.5, 8
 
 #: Largest number of pairs of overlapping shells, divided by the number of asperities, for memory.
 MOST_PAIRS = 200
@@ -97,13 +90,12 @@ class Box(NamedTuple):
 
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self, problem: NormalProblem) -> Box:
-        """A box that contains this one, to be tried at another load or approach of `problem`.
+        """A box that contains this one, to be tried at another load or approach of `problem`: the
+        proof must show that all loads are below its upper ends.
 
-        The solution at the other load or approach may lie outside this box. So `faces` are the
-        upper ends, and the proof must show that all loads are below them. If shells prove the
-        convexity on this box, an upper end above 0 is raised to the load at which `shells` / h
-        equals the convexity number of the box, if that load is larger. So asperities with small
-        loads also get upper ends far above the error bounds of their loads.
+        If shells prove the convexity on this box, an upper end above 0 is raised, so that small
+        loads get upper ends far above their error bounds, to the load at which `shells` / h equals
+        the convexity number of the box, if that load is larger.
         """
         theta = self.convexity_number
         ends = (2.0 / 3.0 * problem.coefficients * theta / self.shells) ** 3

@@ -1,8 +1,7 @@
 """The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
-The data of the scene are the given float64 numbers. The module `refine` evaluates the contact law
-in ball arithmetic, and `proved` proves that a solution exists near the refined loads. This module
-bounds the distance from the given loads to that solution.
+`refine` evaluates the contact law in balls, `proved` proves that a solution exists near the refined
+loads, and this module bounds the distance from the given loads to that solution.
 """
 
 from __future__ import annotations
@@ -191,11 +190,9 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
 
 
 def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
-    """The certificate of the given `loads` (N,) [force] of all asperities of the scene.
+    """The certificate of `loads` (N,) [force] of all asperities, from the `level` proved near them.
 
-    level : the solution that is proved to be near these loads, or the obstacle to a proof
-    start : the given loads of the asperities that can touch, scaled to a prescribed total, with
-        their gaps
+    start : the loads of the asperities that can touch, scaled to a prescribed total
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
@@ -266,11 +263,9 @@ def _apart(loads: Array, found: Level) -> Array:
 def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
-    If Phi is convex between P and P*, the bound is e'|P - P*| with the violations e of the contact
-    law at P; if Phi is not proved convex, it is infinite. Loads q on asperities fixed open add at
-    most e'q; setting these loads to 0 changes the residuals by A q.
-
-    moved : (n,) bounds on |P - P*|
+    It is e'|P - P*| with the violations e of the contact law at P and |P - P*| <= `moved`, if Phi
+    is proved convex between P and P*; else infinite. Loads q on asperities fixed open add at most
+    e'q; setting these loads to 0 changes the residuals by A q.
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total
@@ -298,12 +293,9 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
 def _screened(
     problem: NormalProblem, start: Trial, moved: Array, shift: float
 ) -> tuple[Indices, NDArray[np.bool_], Array, Array]:
-    """The asperities that cannot touch: in every solution approach plus offset is at most 0.
-
-    The result is their indices in the scene; False where approach and offset are both 0, else True;
-    their indentations, approach + offset - displacement; and bounds on the errors of these.
-
-    moved, shift : (n,) bounds on the errors of the loads, and a bound on that of the approach
+    """The asperities that cannot touch, as approach plus offset is at most 0 in every solution:
+    their indices in the scene; False where approach and offset are both 0, else True; and their
+    indentations, with error bounds from those of the loads (`moved`) and the approach (`shift`).
     """
     scene, length, loads = problem.scene, problem.units.length, start.loads.high
     left = np.ones(len(scene), dtype=bool)

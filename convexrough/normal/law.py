@@ -1,8 +1,7 @@
-"""The contact law in float64, for one problem or for a stack of problems (`normal.stack`).
+"""The contact law in float64, with the symbols of `normal.problem`, for one problem or for a stack.
 
-Arrays are (n,) for one problem and (m, n) for a stack. In a stack, quantities with one number per
-problem are (m, 1). A is the compliance matrix, k are the coefficients of Hertz's law, and D is the
-offsets plus the approach.
+Arrays are (n,) for one problem and (m, n) for a stack, in which quantities with one number per
+problem are (m, 1).
 """
 
 from __future__ import annotations

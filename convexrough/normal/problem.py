@@ -116,7 +116,7 @@ class NormalProblem:
 
     def _at(self, control: Ball, by_load: bool) -> Self:
         other = replace(self, control=control, by_load=by_load)
-        for name in ("exact", "row_norm", "largest_entry"):
+        for name in ("exact", "row_norm", "largest_entry", "squares"):
             other.__dict__[name] = getattr(self, name)
         return other
 
@@ -233,18 +233,13 @@ class NormalProblem:
         prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
-        if highest == np.inf:
-            # the indentation of one asperity under the whole load
+        if highest == np.inf:  # take the indentation of one asperity under the whole load
             top = float(hertz.indentation(given, coefficients.max()))
         units = Units.of(top, _middle(coefficients))
-        return cls(
-            scene=scene,
-            units=units,
-            **_about(scene, candidates, taken(coefficients, candidates), units, influence),
-            control=Ball.exact(given / (units.length if load is None else units.force)),
-            by_load=load is not None,
-            highest=highest / units.length,
-        )
+        about = _about(scene, candidates, taken(coefficients, candidates), units, influence)
+        control = Ball.exact(given / (units.length if load is None else units.force))
+        by_load, highest = load is not None, highest / units.length
+        return cls(scene, units, **about, control=control, by_load=by_load, highest=highest)
 
     def restricted(self, which: Indices) -> NormalProblem:
         """The problem in which only the candidates with these indices may carry loads."""

@@ -1,7 +1,7 @@
 """The contact law with error bounds, and loads refined to more digits than float64 has.
 
-Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
-one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
+Functions take one problem or a stack (`normal.stack`) of m problems, with arrays (n,) or (m, n).
+Quantities with one number per problem are numbers or (m, 1).
 
 The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0
 (symbols of `normal.problem`) is a ball, whose radius bounds the errors of the data, the product and
@@ -27,11 +27,8 @@ from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
-#: Largest number of corrections.
-CORRECTIONS = 12
-
-#: A correction aims to reduce the residual to this fraction of the residual's rounding error.
-ENOUGH = 0.1
+#: Largest number of corrections. Each aims at a residual of ENOUGH times its rounding error.
+CORRECTIONS, ENOUGH = 12, 0.1
 
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
@@ -186,9 +183,8 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
 
 
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
-    """The loads, scaled to the prescribed total, and a ball of the remaining difference.
-
-    The remaining difference, up to rounding, is added to the largest load.
+    """The loads, scaled to the prescribed total, and a ball of the difference that is left after it
+    is added, up to rounding, to the largest load.
 
     roughly : True to skip the scaling if the difference is less than FITS times the largest load
     """
@@ -225,18 +221,14 @@ def _missing(loads: Pair, total: Pair) -> Pair:
 
 def defect_of(state: Trial) -> Any:
     """The 2-norm of the residual of the contact law: a number, or (m,) for a stack."""
-    return _norm(state.defect)
+    defect = state.defect
+    return np.sqrt(np.einsum("...i,...i->...", defect, defect))
 
 
 def rounding_of(state: Trial) -> Any:
-    """The 2-norm of the rounding errors of the residual: a number, or (m,) for a stack.
-
-    Errors of positive gaps are left out, because they do not change the residual.
+    """The 2-norm of the residual's rounding errors, without those of positive gaps, which do not
+    change the residual: a number, or (m,) for a stack.
     """
     counts = state.inside | (state.gap.value <= state.gap.radius)
-    return _norm(np.where(counts, state.gap.radius, 0.0))
-
-
-def _norm(values: Array) -> Any:
-    """The 2-norm along the last axis: a number, or (m,) for (m, n) values."""
-    return np.sqrt(np.einsum("...i,...i->...", values, values))
+    errors = np.where(counts, state.gap.radius, 0.0)
+    return np.sqrt(np.einsum("...i,...i->...", errors, errors))
