@@ -65,15 +65,12 @@ class Law(Protocol):
         """The state at eta = `unknown`, which is changed where needed to satisfy the constraints,
         such as a prescribed total; None if that is impossible.
         """
-        ...
 
     def direction(self, state: Iterate, left: float) -> Array:
         """The step d of eta; the 2-norm of F + F' d is at most about `left` times that of F."""
-        ...
 
     def advice(self, state: Iterate) -> str:
         """What a user can try if the method fails at this state."""
-        ...
 
 
 def solve(

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
-from convexrough.influence.coupling import Influence, Smoother
+from convexrough.influence.coupling import Influence
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
@@ -113,6 +113,11 @@ def _iterate(
 ) -> Array | None:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
+
+    If balanced, the results of the preconditioner M are projected onto the plane sum W y = 0
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). Each projection also adds a
+    factor times the diagonal of W to the residual, so that single precision is enough. The sum of
+    these factors is beta of the step, divided by the scale of the defect.
     """
     single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
@@ -121,11 +126,27 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
+    smooth = influence.smoother(root)
+    border = smooth(w)[0] if smooth and balanced else w
+    weight, beta = float(w @ border), 0.0
 
-    def unsmoothed(values: Values) -> tuple[Values, float]:
-        return values.copy(), float(np.linalg.norm(influence.apply(w * values)))
+    def smoothed(residual: Values) -> tuple[Values, float, float]:
+        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
+        If balanced, `residual` is changed in place.
+        """
+        nonlocal beta
+        if smooth:
+            z, left = smooth(residual)
+        else:
+            z, left = residual.copy(), float(np.linalg.norm(influence.apply(w * residual)))
+        whole = float(residual @ z)
+        if balanced:
+            off = -float(w @ z) / weight
+            beta += off
+            residual += dtype(off) * w
+            z += dtype(off) * border
+        return z, left, whole
 
-    smoothed = _Smoothed(influence.smoother(root) or unsmoothed, w, balanced)
     residual: Values = -w * (defect / size).astype(dtype)
     z, left, first = smoothed(residual)
     p = z.copy()
@@ -149,31 +170,4 @@ def _iterate(
         before, squared = squared, float(residual @ z)
         p *= dtype(squared / before)
         p += z
-    return size * (smoothed.shift - y_displacement.astype(np.float64)) - defect
-
-
-class _Smoothed:
-    """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0
-    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). If balanced, each call
-    also adds a factor times the diagonal of W to the residual, so that single precision is enough.
-    The sum of these factors, `shift`, is beta of the step, divided by the scale of the defect.
-    """
-
-    def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
-        self.smooth, self.w, self.shift = smooth, w, 0.0
-        self.border = smooth(w)[0] if balanced else None
-        self.weight = 0.0 if self.border is None else float(w @ self.border)
-
-    def __call__(self, residual: Values) -> tuple[Values, float, float]:
-        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
-
-        If balanced, `residual` is changed in place.
-        """
-        z, left = self.smooth(residual)
-        whole = float(residual @ z)
-        if self.border is not None:
-            off = -float(self.w @ z) / self.weight
-            self.shift += off
-            residual += self.w.dtype.type(off) * self.w
-            z += self.w.dtype.type(off) * self.border
-        return z, left, whole
+    return size * (beta - y_displacement.astype(np.float64)) - defect

@@ -122,23 +122,16 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 def smooth_loads(scene: Scene, load: float) -> Array:
     """(n,) [force] estimated loads with the total `load`, by Hertz's law at the indentations
-    offset - w + tau,  with the displacement w by a smooth sphere under this load and a number tau.
+    offset - w + tau,  with a number tau and the displacement w by a smooth sphere under this load,
+    which has the mean curvature of the body (w = 0 for a flat).
     """
-    coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
-    sunk = smooth_displacement(scene, scene.asperities.distances, load)
+    modulus, sunk = scene.material.contact_modulus, np.zeros(len(scene))
+    if scene.curved:
+        a = float(hertz.contact_radius(load, modulus, scene.mean_radius))
+        sunk = hertz.surface_displacement(scene.asperities.distances, a, scene.mean_radius)
+    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
     return np.asarray(hertz.load(indentation, coefficients))
-
-
-def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
-    """[length] surface displacement at distances from the axis of a loaded smooth sphere that has
-    the mean curvature of the body; 0 under a flat.
-    """
-    if not scene.curved:
-        return np.zeros_like(distances)
-    radius = scene.mean_radius
-    a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
-    return np.asarray(hertz.surface_displacement(distances, a, radius))
 
 
 def all_that_could_touch(

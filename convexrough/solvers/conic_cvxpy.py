@@ -34,17 +34,8 @@ OPTIONS = {
 
 
 #: Package names, for `pip`, of CVXPY's solvers with second-order cones.
-PACKAGES = {
-    "CLARABEL": "clarabel",
-    "ECOS": "ecos",
-    "QOCO": "qoco",
-    "SCS": "scs",
-    "CVXOPT": "cvxopt",
-    "MOSEK": "Mosek",
-    "GUROBI": "gurobipy",
-    "COPT": "coptpy",
-    "CPLEX": "cplex",
-}
+PACKAGES = {name: name.lower() for name in (*OPTIONS, "CVXOPT", "CPLEX")}
+PACKAGES |= {"MOSEK": "Mosek", "GUROBI": "gurobipy", "COPT": "coptpy"}
 
 
 @dataclass(frozen=True)
