@@ -235,25 +235,15 @@ class Level:
                 break
             defect = np.where(springs.touching, left.value, 0.0)
             unit = float(np.abs(defect).max())
-            step = correct(
-                problem.influence,
-                problem.shells,
-                np.sqrt(c),
-                defect / unit,
-                balanced=True,
-                tolerance=max(REDUCTION, ENOUGH * min(rounding / size, 1.0)),
-            )
+            least = max(REDUCTION, ENOUGH * min(rounding / size, 1.0))
+            system = problem.influence, problem.shells, np.sqrt(c)
+            step = correct(*system, defect / unit, balanced=True, tolerance=least)
             following = completed(x + Pair.exact(c * step * unit))
             better, risen = residual(following)
             before, now = size, weighted(better.value)
             if now < size:
-                x, left, beta, size, rounding = (
-                    following,
-                    better,
-                    risen,
-                    now,
-                    weighted(better.radius),
-                )
+                x, left, beta, size = following, better, risen, now
+                rounding = weighted(left.radius)
             if not now < 0.5 * before:
                 break
         if size > accepted and not size <= rounding < np.inf:
@@ -272,12 +262,8 @@ class Level:
         A change of x_j makes the total right. Let s bound this change: what the total misses, and
         the sum of |x| of asperities neither proved to touch nor to be open.
         """
-        problem, springs, short = (
-            self.problem,
-            self.springs,
-            float((total - Ball.exact(x).sum()).size),
-        )
-        touching, doubtful, h = springs.touching, springs.doubtful, springs.bound
+        problem, short = self.problem, float((total - Ball.exact(x).sum()).size)
+        touching, doubtful, _, compliance, h, margin = self.springs
 
         def residual(others: float) -> tuple[Array, float, float]:
             """Bounds on the residual after the change, on s, and on the displacements by it and by
@@ -286,21 +272,21 @@ class Level:
             s = short + others
             moved = (s + others) * problem.largest_entry
             e = left.size + moved
-            e[j] += s * float(springs.compliance.upper[j])
+            e[j] += s * float(compliance.upper[j])
             return e, s, moved
 
         carried = np.zeros(len(h))
         if doubtful.any():
             e, _, _ = residual(0.0)
-            within = distance(np.where(np.isinf(h), 0.0, e), h, springs.margin)
+            within = distance(np.where(np.isinf(h), 0.0, e), h, margin)
             carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
         e, s, moved = residual(float(carried.sum()) * (1 + SAFETY))
         known = np.where(touching, h, np.inf)
-        within = distance(np.where(touching, e, 0.0), known, springs.margin)
+        within = distance(np.where(touching, e, 0.0), known, margin)
         errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
         errors[j] += s
         moved += within / np.sqrt(float(known.min())) * problem.row_norm
-        each = (left.size + springs.compliance.upper * errors)[touching]
+        each = (left.size + compliance.upper * errors)[touching]
         off = (float(each.min()) + moved) * (1 + SAFETY)
         return Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off)
 

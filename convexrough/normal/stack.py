@@ -77,14 +77,9 @@ class Stack(NormalProblem):
             return values[rows] if every else values
 
         k, d, scale = self.exact
-        return Stack.of(
-            [(some, problem) for some, (_, problem) in slices if some.stop > some.start],
-            Data(pick(k), pick(d), scale),
-            pick(self.shells),
-            pick(self.squares),
-            pick(self.control),
-            self.by_load,
-        )
+        coupled = [(some, problem) for some, (_, problem) in slices if some.stop > some.start]
+        rest = (pick(each) for each in (self.shells, self.squares, self.control))
+        return Stack.of(coupled, Data(pick(k), pick(d), scale), *rest, self.by_load)
 
     def apply(self, loads: Array) -> Array:
         """(m, n) A P in float64."""
