@@ -78,8 +78,9 @@ class Stack(NormalProblem):
 
         k, d, scale = self.exact
         coupled = [(some, problem) for some, (_, problem) in slices if some.stop > some.start]
-        rest = (pick(each) for each in (self.shells, self.squares, self.control))
-        return Stack.of(coupled, Data(pick(k), pick(d), scale), *rest, self.by_load)
+        shells, squares, control = map(pick, (self.shells, self.squares, self.control))
+        data = Data(pick(k), pick(d), scale)
+        return Stack.of(coupled, data, shells, squares, control, self.by_load)
 
     def apply(self, loads: Array) -> Array:
         """(m, n) A P in float64."""
