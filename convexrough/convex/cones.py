@@ -38,24 +38,18 @@ SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
 
 class ConeRows(NamedTuple):
-    """Rows of a program:  constant - matrix @ variables  lies in second-order cones.
-
-    cones : number of these cones, each of dimension 3
-    """
+    """Rows of a program:  constant - matrix @ variables  lies in second-order cones."""
 
     matrix: csc_array  # (3 cones, width)
     constant: Array  # (3 cones,)
-    cones: int
+    cones: int  # number of these cones, each of dimension 3
 
 
 def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
-    """The cones of n lifts as rows of  A x + s = b  with s in second-order cones.
+    """The cones of n lifts, grouped by lift, in a program with `width` variables.
 
     lifts : for four cones, the columns of y2, y3, y4, y5 and z, (n,) each; for five cones, the
         columns of y1, ..., y5 and z
-    width : number of variables of the program
-
-    Rows are grouped by lift, with three rows per cone.
     """
     from scipy.sparse import csc_array  # 0.1 s to import: only when solving
 

@@ -8,6 +8,7 @@ the factor nan or infinite, so the diagonal is checked.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -22,15 +23,10 @@ def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
 
     The search is by bisection. It assumes that `proved` is true below each margin for which it is.
     """
-    low, high = -1, len(margins)
-    middle = 0  # begin with the smallest margin: if it is not proved, no other margin needs a test
-    while high - low > 1:
-        if proved(margins[middle]):
-            low = middle
-        else:
-            high = middle
-        middle = (low + high) // 2
-    return 0.0 if low < 0 else margins[low]
+    if not proved(margins[0]):  # then no other margin needs a test
+        return 0.0
+    first_failed = bisect_left(margins, True, lo=1, key=lambda margin: not proved(margin))
+    return margins[first_failed - 1]
 
 
 def is_definite(matrix: Array) -> bool:
@@ -106,19 +102,16 @@ def _elimination_slack(matrix: Any) -> float:
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
-    n = matrix.shape[0]
+    n, options = matrix.shape[0], {"SymmetricMode": True, "Equil": False}
     try:
-        options = {"SymmetricMode": True, "Equil": False}
         found = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError:  # exactly singular
         return np.inf
-    D = found.U.diagonal()
+    D, ones = found.U.diagonal(), np.ones(n)
     if not ((found.perm_r == found.perm_c).all() and (D > 0).all()):
         return np.inf
-    L, U = abs(found.L), abs(found.U)
-    scaled = diags_array(D) @ found.L.T
+    L, U, scaled = abs(found.L), abs(found.U), diags_array(D) @ found.L.T
     rounding = n * ROUNDOFF / (1.0 - n * ROUNDOFF)
-    ones = np.ones(n)
     beyond = abs(found.U - scaled) @ ones + 2 * ROUNDOFF * (U @ ones + abs(scaled) @ ones)
     slack = float((L @ (rounding * (U @ ones) + beyond)).max())
     return slack if np.isfinite(slack) else np.inf

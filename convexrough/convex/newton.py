@@ -14,7 +14,6 @@ decreases enough (docs/theory/newton.md). A `Law` defines p, A and Phi.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -45,17 +44,17 @@ class Iterate(NamedTuple):
     unknown: Array  # eta
     forces: Array  # p(eta), which satisfy the constraints, such as a prescribed total
     defect: Array  # F(eta)
+    gradient: Array  # dPhi/dp, without multipliers of the constraints
     energy: float  # Phi(p)
+    rounding: float  # bound on the rounding error of a change of the energy
     residual: float  # the largest |F|
     scale: float  # the unit of residuals
+    noise: float  # the 2-norm of F below which, because of rounding, further steps do not help
     at: Any  # further results of the law at this point
 
 
 class Law(Protocol):
-    """A law of contact: the functions that Newton's method calls.
-
-    solver, unit : names of the solver and of the unit of residuals, for error messages
-    """
+    """A law of contact. `solver` and `unit` (of residuals) are names for error messages."""
 
     @property
     def solver(self) -> str: ...
@@ -66,77 +65,46 @@ class Law(Protocol):
         """The state at eta = `unknown`, which is changed where needed to satisfy the constraints,
         such as a prescribed total; None if that is impossible.
         """
-        ...
 
     def direction(self, state: Iterate, left: float) -> Array:
         """The step d of eta; the 2-norm of F + F' d is at most about `left` times that of F."""
-        ...
-
-    def gradient(self, state: Iterate) -> Array:
-        """The derivative of the energy, dPhi/dp, without multipliers of the constraints."""
-        ...
-
-    def energy_rounding(self, state: Iterate) -> float:
-        """Bound on the rounding error of a change of the energy."""
-        ...
-
-    def noise(self, state: Iterate) -> float:
-        """The 2-norm of F below which further steps do not help, because of rounding in A p."""
-        ...
 
     def advice(self, state: Iterate) -> str:
         """What a user can try if the method fails at this state."""
-        ...
 
 
-@dataclass(frozen=True)
-class Stopping:
-    """The conditions that end Newton's method. Residuals are divided by `Iterate.scale`.
+def solve(
+    law: Law, state: Iterate, accurate: float, tolerance: float, most: int, linear: float = 0.0
+) -> tuple[Iterate, int]:
+    """The final state, and the number of steps. Raises SolverError after `most` steps.
 
-    accurate  : unless the method ends by `linear`, an answer is accepted only if its residual is at
-        most the larger of `accurate` and `tolerance`
-    tolerance : residual at which the method ends at once; 0 for the least possible residual
-    most      : largest number of steps
-    linear    : the method also ends if the next step is expected to leave a defect of at most this
-        2-norm; the caller then makes one linear correction. 0: never
-    """
-
-    accurate: float
-    tolerance: float
-    most: int
-    linear: float = 0.0
-
-
-def solve(law: Law, state: Iterate, stopping: Stopping) -> tuple[Iterate, int]:
-    """The final state, and the number of steps.
-
-    The method ends if  residual <= tolerance * scale,  or by `Stopping.linear`. Once
-    residual <= accurate * scale,  it also ends if the defect is below `noise`, or if a step does
-    not halve the residual; in this last case the better of the states before and after the step is
-    returned. Raises SolverError after `most` steps.
+    The method ends if  residual <= tolerance * scale.  Once  residual <= accurate * scale,  it also
+    ends if the defect is below its `noise`, or if a step does not halve the residual; in this last
+    case the better of the states before and after the step is returned. If the caller makes one
+    linear correction, it gives the 2-norm `linear` of the defect that this may leave: the method
+    then also ends if the next step is expected to leave no more.
     """
     before = np.inf  # the 2-norm of the last defect
-    for step in range(1, stopping.most + 1):
+    for step in range(1, most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
-        accurate = state.residual <= stopping.accurate * state.scale
-        size, noise = math.sqrt(np.vdot(state.defect, state.defect)), law.noise(state)
-        done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
-        if done or (accurate and size <= noise):
+        near = state.residual <= accurate * state.scale
+        size = math.sqrt(np.vdot(state.defect, state.defect))
+        done = state.residual <= max(tolerance * state.scale, 0.0)
+        if done or (near and size <= state.noise):
             return state, step - 1
         expected = (size / before) ** 2 if before < np.inf else 1.0
-        if expected * size <= stopping.linear:
+        if expected * size <= linear:
             return state, step - 1
         forcing = min(MOST_LEFT, expected)
-        enough = max(noise / size, stopping.tolerance * state.scale / state.residual)
+        enough = max(state.noise / size, tolerance * state.scale / state.residual)
         direction = law.direction(state, max(forcing, OVERSOLVED * enough))
         following = descend(law, state, direction)
-        if accurate and following.residual >= 0.5 * state.residual:
+        if near and following.residual >= 0.5 * state.residual:
             return min(state, following, key=lambda each: each.residual), step
         state, before = following, size
-    needed = max(stopping.tolerance, stopping.accurate)
     raise SolverError(
-        f"residual {_relative(state):.3g} of {law.unit} after {stopping.most} steps, "
-        f"at most {needed:.3g} needed",
+        f"residual {_relative(state):.3g} of {law.unit} after {most} steps, "
+        f"at most {max(tolerance, accurate):.3g} needed",
         solver=law.solver,
         advice=law.advice(state),
         iterate=state.forces,
@@ -149,13 +117,12 @@ def _relative(state: Iterate) -> float:
 
 def descend(law: Law, state: Iterate, direction: Array) -> Iterate:
     """The state after the step, halved until the energy decreases enough by Armijo's rule."""
-    gradient, rounding = law.gradient(state).ravel(), law.energy_rounding(state)
     length = 1.0
     while length > SHORTEST:
         trial = law.evaluate(state.unknown + length * direction)
         if trial is not None:
-            slope = float(gradient @ (trial.forces - state.forces).ravel())
-            if falls(trial.energy - state.energy, slope, rounding):
+            slope = float(np.vdot(state.gradient, trial.forces - state.forces))
+            if trial.energy - state.energy <= PROMISED * min(slope, 0.0) + state.rounding:
                 return trial
         length /= 2.0
     raise SolverError(
@@ -164,8 +131,3 @@ def descend(law: Law, state: Iterate, direction: Array) -> Iterate:
         advice=law.advice(state),
         iterate=state.forces,
     )
-
-
-def falls(change: Any, slope: Any, rounding: Any) -> Any:
-    """True where the change of the energy satisfies Armijo's rule, up to rounding."""
-    return change <= PROMISED * np.minimum(slope, 0.0) + rounding

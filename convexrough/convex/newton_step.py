@@ -15,15 +15,14 @@ step d follows for every asperity, touching or open.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
-from convexrough.influence.coupling import Influence, Smoother
+from convexrough.influence.coupling import Influence
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
@@ -66,17 +65,13 @@ def correct(
         return -defect
     direct = len(touching) <= (FACTORISED if influence.stored else FACTORISED_UNSTORED)
     for extra in (None, shells):
-        try:
-            if direct:
-                return _factorise(influence, extra, touching, root, defect, balanced)
-            return _iterate(influence, extra, root, defect, balanced, tolerance)
-        except _IndefiniteError:
-            continue
+        if direct:
+            step = _factorise(influence, extra, touching, root, defect, balanced)
+        else:
+            step = _iterate(influence, extra, root, defect, balanced, tolerance)
+        if step is not None:
+            return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
-
-
-class _IndefiniteError(Exception):
-    pass
 
 
 def _factorise(
@@ -86,8 +81,10 @@ def _factorise(
     root: Array,
     defect: Array,
     balanced: bool,
-) -> Array:
-    dpotrf, dpotrs = _cholesky()
+) -> Array | None:
+    """The step by Cholesky's factorisation; None if the matrix is not positive definite."""
+    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
+
     w = root[touching]
     matrix = influence.submatrix(touching)
     matrix *= w
@@ -96,24 +93,14 @@ def _factorise(
     # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
     factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
-        raise _IndefiniteError
+        return None
     y = dpotrs(factor, w * defect[touching], lower=1, overwrite_b=1)[0]
     shift = 0.0
     if balanced:
         border = dpotrs(factor, w, lower=1)[0]
         shift = float(w @ y) / float(w @ border)
         y -= shift * border
-    changes = np.zeros(len(root))
-    changes[touching] = w * y
-    return shift - defect + influence.apply(changes)
-
-
-@cache
-def _cholesky() -> tuple[Any, Any]:
-    """LAPACK's functions for the factorisation and the solution."""
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
-    return dpotrf, dpotrs
+    return shift - defect + influence.apply(among_zeros(w * y, touching, len(root)))
 
 
 def _iterate(
@@ -123,8 +110,15 @@ def _iterate(
     defect: Array,
     balanced: bool,
     tolerance: float,
-) -> Array:
-    """The step by preconditioned conjugate gradients: docs/theory/newton.md, "Many asperities"."""
+) -> Array | None:
+    """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
+    None if the matrix is not positive definite.
+
+    If balanced, the results of the preconditioner M are projected onto the plane sum W y = 0
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). Each projection also adds a
+    factor times the diagonal of W to the residual, so that single precision is enough. The sum of
+    these factors is beta of the step, divided by the scale of the defect.
+    """
     single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
@@ -132,7 +126,27 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    smoothed = _Smoothed(influence.smoother(root) or _unsmoothed(influence, w), w, balanced)
+    smooth = influence.smoother(root)
+    border = smooth(w)[0] if smooth and balanced else w
+    weight, beta = float(w @ border), 0.0
+
+    def smoothed(residual: Values) -> tuple[Values, float, float]:
+        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
+        If balanced, `residual` is changed in place.
+        """
+        nonlocal beta
+        if smooth:
+            z, left = smooth(residual)
+        else:
+            z, left = residual.copy(), float(np.linalg.norm(influence.apply(w * residual)))
+        whole = float(residual @ z)
+        if balanced:
+            off = -float(w @ z) / weight
+            beta += off
+            residual += dtype(off) * w
+            z += dtype(off) * border
+        return z, left, whole
+
     residual: Values = -w * (defect / size).astype(dtype)
     z, left, first = smoothed(residual)
     p = z.copy()
@@ -146,7 +160,7 @@ def _iterate(
         bent += diagonal * p
         curvature = float(p @ bent)
         if curvature <= 0:
-            raise _IndefiniteError
+            return None
         length = dtype(squared / curvature)
         q *= length
         y_displacement += q
@@ -156,36 +170,4 @@ def _iterate(
         before, squared = squared, float(residual @ z)
         p *= dtype(squared / before)
         p += z
-    return size * (smoothed.shift - y_displacement.astype(np.float64)) - defect
-
-
-class _Smoothed:
-    """The preconditioner M; if balanced, its results are projected onto the plane sum W y = 0.
-
-    Source: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376. If balanced, each call
-    also adds a factor times the diagonal of W to the residual, so that single precision is enough.
-    The sum of these factors, `shift`, is beta of the step, divided by the scale of the defect.
-    """
-
-    def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
-        self.smooth, self.w, self.shift = smooth, w, 0.0
-        self.border = smooth(w)[0] if balanced else None
-        self.weight = 0.0 if self.border is None else float(w @ self.border)
-
-    def __call__(self, residual: Values) -> tuple[Values, float, float]:
-        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
-
-        If balanced, `residual` is changed in place.
-        """
-        z, left = self.smooth(residual)
-        whole = float(residual @ z)
-        if self.border is not None:
-            off = -float(self.w @ z) / self.weight
-            self.shift += off
-            residual += self.w.dtype.type(off) * self.w
-            z += self.w.dtype.type(off) * self.border
-        return z, left, whole
-
-
-def _unsmoothed(influence: Influence, w: Values) -> Smoother:
-    return lambda values: (values.copy(), float(np.linalg.norm(influence.apply(w * values))))
+    return size * (beta - y_displacement.astype(np.float64)) - defect

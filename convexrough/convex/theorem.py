@@ -23,22 +23,17 @@ from convexrough.roundoff import SAFETY
 
 
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
-    """(n,) violations e of the first-order conditions.
-
-    residual : (n,) F - beta, the gradient F of the energy minus the multiplier beta of the total
-    inside   : (n,) False where x is at its lower bound, else True. At an upper bound, the result
-        |F - beta| is at least as large as the violation
+    """(n,) violations e of the first-order conditions, from the `residual` F - beta of the gradient
+    F of the energy and the multiplier beta of the total. `inside` is False at a lower bound; at an
+    upper bound, the result |F - beta| is at least as large as the violation.
     """
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
 
 
 def distance(excess: Array, h: Array, margin: float | Array) -> Any:
-    """The right side of (1): a number, or (m, 1) for (m, n) violations.
-
-    excess : (n,) or (m, n) the violations e
-    h      : the diagonal of H, of the same shape as `excess`; infinite where x is fixed
-    margin : mu
+    """The right side of (1): a number, or (m, 1) for (m, n) violations e = `excess`. H has the
+    diagonal h, infinite where x is fixed, and mu is the `margin`.
     """
     most = largest(excess)
     with np.errstate(all="ignore"):

@@ -17,7 +17,7 @@ is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -33,37 +33,30 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 Scope = Literal["global", "local", "none"]
 
-#: Shells are also fitted to the contact radii if the convexity number is above this. A heuristic.
-FIT_FROM = 0.8
+# Heuristics: proofs are valid for any of these numbers.
 
-#: Weight of contact radii in the radii of fitted shells; half the distance to the nearest neighbour
-#: has the weight 1 - FITTED. A heuristic: any weight gives valid shells
-#: (docs/theory/certificate.md, "Choice of the box", 3).
-FITTED = 0.9
+#: Shells are also fitted to the contact radii if the convexity number is above FIT_FROM. In their
+#: radii, contact radii have the weight FITTED, and half the distance to the nearest neighbour has
+#: 1 - FITTED (docs/theory/certificate.md, "Choice of the box", 3).
+FIT_FROM, FITTED = 0.8, 0.9
 
-#: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
-MARGINS = (0.1, 1e-3)
+#: Margins mu with which a Cholesky factorisation is tried, the largest first; and those on a box of
+#: touching asperities, where the energy may be barely convex.
+MARGINS, CROWDED_MARGINS = (0.1, 1e-3), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 #: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
-#: plus LEAST_LEEWAY times the largest load. Heuristics: proofs are valid for any box.
+#: plus LEAST_LEEWAY times the largest load.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
 #: Number of touching asperities up to which a Cholesky factorisation costs no more than a proof by
 #: overlapping shells.
 FACTORISED = 1500
 
-#: Margins mu that are tried on a box of touching asperities, where the energy may be barely convex.
-CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
-
 #: The radius of an overlapping shell is at first the larger of w t and WIDENED t / (1 - c)^(1/2).
 #: Here w is one of WIDTHS, tried in this order (the cheapest first), and c is the largest (t_i
-#: t_j)^(1/2) / r_ij with a near neighbour j. The radius is then raised, where that is larger, to
-#: the radius of a near neighbour minus LESS times its distance. Heuristics: any radii give valid
-#: bounds.
-WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
-
-#: Number of near neighbours that affect the radius of a shell.
-NEAREST = 8
+#: t_j)^(1/2) / r_ij with one of the NEAREST neighbours j. The radius is then raised, where that is
+#: larger, to the radius of such a neighbour minus LESS times its distance.
+WIDTHS, WIDENED, LESS, NEAREST = (4.0, 8.0), 3.0, 0.5, 8
 
 #: Largest number of pairs of overlapping shells, divided by the number of asperities, for memory.
 MOST_PAIRS = 200
@@ -89,14 +82,7 @@ class Box(NamedTuple):
 
     def at(self, rows: Indices) -> Box:
         """The boxes of some rows of a stack."""
-        return self._replace(
-            shells=self.shells[rows],
-            loads=self.loads[rows],
-            compliance=self.compliance[rows],
-            convexity_number=self.convexity_number[rows],
-            faces=self.faces[rows],
-            fixed_open=self.fixed_open[rows],
-        )
+        return Box._make((self.scope, *(each[rows] for each in self[1:])))
 
     def convexity_at(self, compliance: Array) -> Any:
         """The convexity number that shells prove for a box with this compliance at upper ends."""
@@ -104,13 +90,12 @@ class Box(NamedTuple):
 
     @np.errstate(divide="ignore", invalid="ignore")
     def closed(self, problem: NormalProblem) -> Box:
-        """A box that contains this one, to be tried at another load or approach of `problem`.
+        """A box that contains this one, to be tried at another load or approach of `problem`: the
+        proof must show that all loads are below its upper ends.
 
-        The solution at the other load or approach may lie outside this box. So `faces` are the
-        upper ends, and the proof must show that all loads are below them. If shells prove the
-        convexity on this box, an upper end above 0 is raised to the load at which `shells` / h
-        equals the convexity number of the box, if that load is larger. So asperities with small
-        loads also get upper ends far above the error bounds of their loads.
+        If shells prove the convexity on this box, an upper end above 0 is raised, so that small
+        loads get upper ends far above their error bounds, to the load at which `shells` / h equals
+        the convexity number of the box, if that load is larger.
         """
         theta = self.convexity_number
         ends = (2.0 / 3.0 * problem.coefficients * theta / self.shells) ** 3
@@ -136,35 +121,33 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
     return Box("global", problem.shells, corner, h, number, nowhere, none)
 
 
-def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Iterator[Box]:
-    """At most one box on which convexity is proved: the global box, which contains every solution,
-    or else a local box, which contains `loads`.
-
-    displacement : (n,) A P for P = `loads`
+def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | None:
+    """The global box, which contains every solution, if convexity on it is proved; or else a local
+    box, which contains `loads`; or None. `displacement` (n,) is A times `loads`.
     """
     highest = problem.overhang(loads, displacement)
     box = widest(problem, loads, highest)
     if problem.by_load and not box.convexity_number < 1:  # this bound costs more
         box = widest(problem, loads, min(highest, problem.approach_bound))
-    if not box.convexity_number < 1:
+    if not box.convexity_number < 1 and problem.influence.stored:
         margin = convex_margin(problem.influence, box.compliance, MARGINS)
         box = box._replace(convexity_number=1.0 - margin)
     if box.convexity_number < 1:
-        yield box
-        return
+        return box
     shells, h = problem.shells, problem.compliance(loads)
     theta = convexity_number(shells, h)
     if theta > FIT_FROM:
         fitted = fitted_shells(problem.influence, problem.radii(h), FITTED)
         if (number := convexity_number(fitted, h)) < theta:
             shells, theta = fitted, number
-    if theta < 1:
-        theta = (1.0 + theta) / 2.0
-        # The loads at which the contact radius is theta (pi/2) s_i; there h_i = shell_i / theta.
-        faces = (2.0 / 3.0 * problem.coefficients * theta / shells) ** 3
-        local = np.minimum(box.loads, faces)
-        h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
-        yield Box("local", shells, local, h, theta, beyond, box.fixed_open)
+    if not theta < 1:
+        return None
+    theta = (1.0 + theta) / 2.0
+    # The loads at which the contact radius is theta (pi/2) s_i; there h_i = shell_i / theta.
+    faces = (2.0 / 3.0 * problem.coefficients * theta / shells) ** 3
+    local = np.minimum(box.loads, faces)
+    h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
+    return Box("local", shells, local, h, theta, beyond, box.fixed_open)
 
 
 def box_of_touching(
@@ -180,32 +163,27 @@ def box_of_touching(
     least = LEEWAY * loads + LEAST_LEEWAY * float(loads.max(initial=0.0))
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
     h = problem.compliance(box)
-    shells = np.zeros(len(h))
-    shells[which] = fitted_shells(influence, problem.radii(h[which]), FITTED)
+    own, shells = h[which], np.zeros(len(h))
+    shells[which] = fitted_shells(influence, problem.radii(own), FITTED)
     number = convexity_number(shells, h)
     if not number < 1:
-        number = 1.0 - crowded_margin(influence, h[which])
+        if influence.stored or len(which) <= FACTORISED:
+            margin = largest(CROWDED_MARGINS, lambda mu: convex_margin(influence, own, (mu,)) > 0)
+        else:
+            margin = overlapping_margin(influence, influence.scale / own, CROWDED_MARGINS)
+        number = 1.0 - margin
     if not number < 1:
         return None
     return Box("local", shells, box, h, number, np.where(touching, box, np.inf), ~touching)
 
 
-def crowded_margin(influence: Influence, compliance: Array) -> float:
-    """The largest mu of CROWDED_MARGINS proved for asperities of this compliance (n,); 0 if none.
-
-    The proof is by Cholesky's factorisation or by overlapping shells.
+def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
+    """The first mu of `margins` for which Cholesky's factorisation proves  H + A >= mu H,  with the
+    diagonal H of `compliance`; 0 if there is none.
     """
-    if not influence.stored and len(influence) > FACTORISED:
-        return overlapping_margin(influence, influence.scale / compliance, CROWDED_MARGINS)
-    scaled, error = _scaled(influence, compliance), influence.entry_error + 8 * ROUNDOFF
-    return largest(CROWDED_MARGINS, lambda each: proved_margin(scaled, (each,), error) > 0)
-
-
-def _scaled(influence: Influence, compliance: Array) -> Array:
-    """The matrix H^(-1/2) A H^(-1/2), with the diagonal H of `compliance`."""
     root = 1.0 / np.sqrt(compliance)
     scaled: Array = influence.matrix * root * root[:, None]
-    return scaled
+    return proved_margin(scaled, margins, influence.entry_error + 8 * ROUNDOFF)
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
@@ -218,93 +196,61 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
     if len(which) < 2:
         return which
     influence = problem.influence.restricted(which)
-    near = Nearest.of(influence.points, influence.scale / problem.compliance(loads)[which])
-    for poor in (near.closest >= 1.0 - CROWDED_MARGINS[0], near.meeting):
+    t = influence.scale / problem.compliance(loads)[which]
+    distances, others, closest = nearest(influence.points, t)
+    meeting = (t[:, None] + t[others] > distances).any(axis=1)
+    for poor in (closest >= 1.0 - CROWDED_MARGINS[0], meeting):
         if poor.any():
             return which[poor]
     return which
 
 
-def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
-    """The first mu of `margins` for which  I + H^(-1/2) A H^(-1/2) >= mu I  is proved; 0 if there
-    is none, or if A is not stored as a matrix.
-    """
-    if not influence.stored:
-        return 0.0
-    error = influence.entry_error + 8 * ROUNDOFF
-    return proved_margin(_scaled(influence, compliance), margins, error)
-
-
-class Overlaps(NamedTuple):
-    """Pairs of overlapping shells, and the entries of S for these pairs."""
-
-    first: Indices  # one asperity i of each pair
-    second: Indices  # the other asperity j
-    values: Array  # (t_i t_j)^(1/2) (1 / r_ij - U_ij)
-    sizes: Array  # (t_i t_j)^(1/2) / r_ij
-
-
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
     """The largest of `margins` mu for which  H + A >= mu H  is proved by the first shells that
-    prove any of them; 0 if there is none.
-
-    lengths : (n,) t_i = 1 / (pi E* h_i)
+    prove any of them; 0 if there is none. `lengths` (n,) are t_i = 1 / (pi E* h_i).
     """
     points = influence.points
     if len(points) > MOST_ELIMINATED:
         return 0.0
     error = 2.0 * influence.entry_error + 32 * ROUNDOFF
-    near = Nearest.of(points, lengths)
-    if not near.closest.max(initial=0.0) < 1:
+    distances, others, closest = nearest(points, lengths)
+    if not closest.max(initial=0.0) < 1:
         return 0.0
     for width in WIDTHS:
-        radii = near.wide_radii(lengths, width)
-        pairs = overlaps(points, lengths, radii)
-        if pairs is None:
+        radii = np.maximum(width, WIDENED / np.sqrt(1.0 - closest)) * lengths
+        covering = (radii[others] - LESS * distances).max(axis=1, initial=0.0)
+        radii = np.maximum(radii, covering)
+        if (pairs := overlaps(points, lengths, radii)) is None:
             return 0.0
-        indices = pairs.first, pairs.second
-        diagonal, errors = 1.0 - lengths / radii, error * pairs.sizes
-        margin = proved_sparse_margin(diagonal, indices, pairs.values, margins, errors)
-        if margin > 0:
+        indices, values, sizes = pairs
+        diagonal, errors = 1.0 - lengths / radii, error * sizes
+        if (margin := proved_sparse_margin(diagonal, indices, values, margins, errors)) > 0:
             return margin
     return 0.0
 
 
-class Nearest(NamedTuple):
-    """The nearest neighbours of each asperity."""
-
-    distances: Array  # (n, m) to the m nearest neighbours
-    which: Indices  # (n, m) indices of these neighbours
-    closest: Array  # (n,) the largest (t_i t_j)^(1/2) / r_ij with a neighbour
-    meeting: NDArray[np.bool_]  # (n,) true if t_i + t_j > r_ij with a neighbour
-
-    @classmethod
-    def of(cls, points: Array, lengths: Array) -> Nearest:
-        from scipy.spatial import cKDTree
-
-        if len(points) < 2:
-            none = np.zeros((len(points), 0))
-            alone = np.zeros(len(points))
-            return cls(none, none.astype(np.intp), alone, alone > 0)
-        found = cKDTree(points).query(points, k=min(len(points), NEAREST + 1))
-        distances, which = (np.asarray(each)[:, 1:] for each in found)
-        closest = (np.sqrt(lengths[:, None] * lengths[which]) / distances).max(axis=1)
-        meeting = (lengths[:, None] + lengths[which] > distances).any(axis=1)
-        return cls(distances, which, closest, meeting)
-
-    def wide_radii(self, lengths: Array, width: float) -> Array:
-        """(n,) radii of shells, at least `width` times `lengths`.
-
-        Requires that all numbers in the field `closest` are below 1.
-        """
-        radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
-        covering: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
-        return np.asarray(np.maximum(radii, covering))
-
-
-def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
-    """All pairs of asperities whose shells overlap; None if these may be too many to store."""
+def nearest(points: Array, lengths: Array) -> tuple[Array, Indices, Array]:
+    """(n, m) distances to the m nearest neighbours, (n, m) indices of these neighbours, and (n,)
+    the largest (t_i t_j)^(1/2) / r_ij with one of them, for t = `lengths`.
+    """
     from scipy.spatial import cKDTree  # takes 0.1 s to import
+
+    if len(points) < 2:
+        none = np.zeros((len(points), 0))
+        return none, none.astype(np.intp), np.zeros(len(points))
+    found = cKDTree(points).query(points, k=min(len(points), NEAREST + 1))
+    distances, which = (np.asarray(each)[:, 1:] for each in found)
+    closest = (np.sqrt(lengths[:, None] * lengths[which]) / distances).max(axis=1)
+    return distances, which, closest
+
+
+def overlaps(
+    points: Array, lengths: Array, radii: Array
+) -> tuple[tuple[Indices, Indices], Array, Array] | None:
+    """All pairs i, j of asperities whose shells overlap, the entries S_ij, and the numbers
+    (t_i t_j)^(1/2) / r_ij; None if there may be too many pairs to store.
+    """
+    from scipy.spatial import cKDTree
 
     tree = cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
@@ -329,4 +275,4 @@ def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
     crossing = 1.0 - (large + small - r) ** 2 / (4.0 * large * small)
     energy = np.where(r <= large - small, r / large, crossing)
     sizes = np.sqrt(lengths[i] * lengths[j]) / r
-    return Overlaps(i, j, sizes * (1.0 - energy), sizes)
+    return (i, j), sizes * (1.0 - energy), sizes

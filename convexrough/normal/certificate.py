@@ -1,8 +1,7 @@
 """The certificate: bounds on the errors of given loads, proved for the exact solution of the scene.
 
-The data of the scene are the given float64 numbers. The module `refine` evaluates the contact law
-in ball arithmetic, and `proved` proves that a solution exists near the refined loads. This module
-bounds the distance from the given loads to that solution.
+`refine` evaluates the contact law in balls, `proved` proves that a solution exists near the refined
+loads, and this module bounds the distance from the given loads to that solution.
 """
 
 from __future__ import annotations
@@ -10,16 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
-from convexrough.influence.coupling import Coupling
 from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
@@ -193,83 +190,68 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
 
 
 def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
-    """The certificate of the given `loads` (N,) [force] of all asperities of the scene.
+    """The certificate of `loads` (N,) [force] of all asperities, from the `level` proved near them.
 
-    level : the solution that is proved to be near these loads, or the obstacle to a proof
-    start : the given loads of the asperities that can touch, scaled to a prescribed total, with
-        their gaps
+    start : the loads of the asperities that can touch, scaled to a prescribed total
     """
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
-    if box is None:
-        known, screened = start.indentation, _screened(problem, start)
-        return _unproved(level, start, _gaps(_in_scene(problem, known, screened), length))
-    others, touching, opened = OtherSolutions.of(level, box), level.touching, level.open
-    load_errors = _load_errors(problem, loads, level)
-    moved = _apart(start.loads.high, level) + np.abs(start.loads.low)
+    scaled, P = loads[problem.candidates] / force, start.loads.high  # tiny loads underflow
+    moved = _apart(P, level) + np.abs(start.loads.low)
     shift = float((level.approach - start.approach.value).size)
-    energy = _energy_error(level, box, start, moved)
-    screened, here = _screened(problem, start), start is level.trial
+    here = start is level.trial
     known = level.indentation if here else start.indentation
-    indentation = _in_scene(problem, known, screened)
-    errors = problem.to_scene(
-        level.indentation.error if here else (level.indentation - known.value).size
+    others, below, beyond, errors_beyond = _screened(
+        problem, start, P if box is None else moved, shift
     )
-    errors[screened.which] = screened.rounding + shift
-    if screened.coupling is not None:
-        coupled = screened.coupling.apply(moved)
-        errors[screened.which] += coupled + screened.coupling.rounding(moved).of(coupled)
+    indentation = problem.to_scene(known.value)
+    indentation[others] = beyond
+    gaps = frozen(np.maximum(-indentation, 0.0) * length)
+    approach = float(start.approach.value) * length
+    approach_error = 0.0 if problem.load is None else shift * (1 + SAFETY) * length
+    if box is None:
+        nothing = frozen(np.full(len(loads), np.inf))
+        reason, which = level.obstacle or ("", np.zeros(0, dtype=np.intp))
+        return Certificate(
+            scope="none",
+            convexity_number=max(1.0, problem.convexity_number(P)),
+            codes=frozen(np.zeros(len(loads), dtype=np.int8)),
+            load_errors=nothing,
+            gaps=gaps,
+            gap_errors=nothing,
+            approach=approach,
+            approach_error=approach_error,
+            duality_gap=np.inf,
+            in_the_way=frozen(problem.candidates[which]),
+            obstacle=reason,
+        )
+    load_errors = loads.copy()  # the bound for an asperity that cannot touch
+    rounding = np.abs(loads[problem.candidates] - scaled * force)
+    load_errors[problem.candidates] = _apart(scaled, level) * force + rounding
+    off = level.indentation.error if here else (level.indentation - known.value).size
+    errors = problem.to_scene(off)
+    errors[others] = errors_beyond
     errors *= 1 + SAFETY
     codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
-    codes[screened.which[screened.below]] = OPEN
-    codes[problem.candidates[touching]] = TOUCHING
-    codes[problem.candidates[opened]] = OPEN
+    codes[others[below]] = OPEN
+    codes[problem.candidates[level.touching]] = TOUCHING
+    codes[problem.candidates[level.open]] = OPEN
+    energy = _energy_error(level, box, start, moved)
     energy += _screened_energy(problem, loads, indentation, errors)
+    possible, crowding, cover = _other_solutions(level, box)
     return Certificate(
-        scope="local" if others.possible else "global",
+        scope="local" if possible else "global",
         convexity_number=box.convexity_number,
         codes=frozen(codes),
         load_errors=frozen(load_errors),
-        gaps=_gaps(indentation, length),
+        gaps=gaps,
         gap_errors=frozen(errors * length),
-        approach=float(start.approach.value) * length,
-        approach_error=0.0 if problem.load is None else shift * (1 + SAFETY) * length,
+        approach=approach,
+        approach_error=approach_error,
         duality_gap=energy * (force * length),
         fixed_open=int(box.fixed_open.sum()),
-        other_solutions_crowding=others.crowding,
-        other_solutions_cover=others.cover,
-    )
-
-
-def _in_scene(problem: NormalProblem, known: Ball, screened: _Screened) -> Array:
-    """(N,) indentations of all asperities of the scene, in scaled units.
-
-    known : (n,) indentations of the asperities that can touch
-    """
-    indentation = problem.to_scene(known.value)
-    indentation[screened.which] = screened.indentation
-    return indentation
-
-
-def _gaps(indentation: Array, length: float) -> Array:
-    return frozen(np.maximum(-indentation, 0.0) * length)
-
-
-def _unproved(level: Level, start: Trial, gaps: Array) -> Certificate:
-    problem, n = level.problem, len(gaps)
-    reason, which = level.obstacle or ("", np.zeros(0, dtype=np.intp))
-    return Certificate(
-        scope="none",
-        convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
-        codes=frozen(np.zeros(n, dtype=np.int8)),
-        load_errors=frozen(np.full(n, np.inf)),
-        gaps=gaps,
-        gap_errors=frozen(np.full(n, np.inf)),
-        approach=float(start.approach.value) * problem.units.length,
-        approach_error=0.0 if problem.load is None else np.inf,
-        duality_gap=np.inf,
-        in_the_way=frozen(problem.candidates[which]),
-        obstacle=reason,
+        other_solutions_crowding=crowding,
+        other_solutions_cover=cover,
     )
 
 
@@ -278,25 +260,12 @@ def _apart(loads: Array, found: Level) -> Array:
     return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
 
 
-def _load_errors(problem: NormalProblem, loads: Array, found: Level) -> Array:
-    """(N,) [force] bounds on |load - load in the solution|.
-
-    For an asperity that cannot touch, the bound is its given load.
-    """
-    errors, force, given = loads.copy(), problem.units.force, loads[problem.candidates]
-    scaled = given / force  # tiny loads underflow
-    errors[problem.candidates] = _apart(scaled, found) * force + np.abs(given - scaled * force)
-    return errors
-
-
 def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
-    If Phi is convex between P and P*, the bound is e'|P - P*| with the violations e of the contact
-    law at P; if Phi is not proved convex, it is infinite. Loads q on asperities fixed open add at
-    most e'q; setting these loads to 0 changes the residuals by A q.
-
-    moved : (n,) bounds on |P - P*|
+    It is e'|P - P*| with the violations e of the contact law at P and |P - P*| <= `moved`, if Phi
+    is proved convex between P and P*; else infinite. Loads q on asperities fixed open add at most
+    e'q; setting these loads to 0 changes the residuals by A q.
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total
@@ -317,44 +286,38 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
         if not (convex or box.convexity_at(problem.compliance(most)) < 1):
             return np.inf
-    total = float(excess @ moved) + float(
-        start.missing.size * max(found.approach.size, start.approach.size)
-    )
-    return total * (1 + SAFETY + len(moved) * ROUNDOFF)
+    missing = float(start.missing.size * max(found.approach.size, start.approach.size))
+    return (float(excess @ moved) + missing) * (1 + SAFETY + len(moved) * ROUNDOFF)
 
 
-class _Screened(NamedTuple):
-    """The asperities that cannot touch: in every solution approach plus offset is at most 0."""
-
-    which: Indices  # their indices in the scene
-    below: NDArray[np.bool_]  # True where open; False where approach and offset are both 0
-    coupling: Coupling | None  # maps loads to displacements here; None if all can touch
-    indentation: Array  # approach + offset - displacement, which is minus the gap
-    rounding: Array  # bounds on errors of the indentation
-
-
-def _screened(problem: NormalProblem, start: Trial) -> _Screened:
+def _screened(
+    problem: NormalProblem, start: Trial, moved: Array, shift: float
+) -> tuple[Indices, NDArray[np.bool_], Array, Array]:
+    """The asperities that cannot touch, as approach plus offset is at most 0 in every solution:
+    their indices in the scene; False where approach and offset are both 0, else True; and their
+    indentations, with error bounds from those of the loads (`moved`) and the approach (`shift`).
+    """
     scene, length, loads = problem.scene, problem.units.length, start.loads.high
     left = np.ones(len(scene), dtype=bool)
     left[problem.candidates] = False
-    others = left.nonzero()[0]
-    if len(others) == 0:
-        return _Screened(others, others > 0, None, np.zeros(0), np.zeros(0))
-    coupling = problem.influence.onto(scene.contact_points[others])
-    product, offsets = coupling.apply(loads), scene.offsets[others] / length
-    below = (offsets != 0) | (problem.highest != 0)
+    which = left.nonzero()[0]
+    if len(which) == 0:
+        return which, which > 0, np.zeros(0), np.zeros(0)
+    coupling = problem.influence.onto(scene.contact_points[which])
+    product, offsets = coupling.apply(loads), scene.offsets[which] / length
     approach = float(start.approach.value)
-    rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
-    rounding += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
-    return _Screened(others, below, coupling, approach + offsets - product, rounding)
+    errors = coupling.rounding(loads).of(product) + scene.offset_errors[which] / length
+    errors += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
+    coupled = coupling.apply(moved)
+    errors = errors + shift + (coupled + coupling.rounding(moved).of(coupled))
+    return which, (offsets != 0) | (problem.highest != 0), approach + offsets - product, errors
 
 
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy of loads s on asperities that cannot touch; 0 under load control.
-
-    The energy is sum (3/5) k s^(5/3) + g's + s'A s / 2 with the gaps g.
+    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on asperities that
+    cannot touch, with their gaps g; 0 under load control.
     """
     screened = loads > 0
     screened[problem.candidates] = False
@@ -363,9 +326,8 @@ def _screened_energy(
         return 0.0
     # Loads that underflow in scaled units count as the smallest positive number.
     s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
-    coefficients = hertz.local_coefficient(
-        problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
-    )
+    modulus, radii = problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
+    coefficients = hertz.local_coefficient(modulus, radii)
     coupling = couple(problem.scene, which, problem.influence.scale, None)
     moved = coupling.apply(s)
     moved += coupling.rounding(s).of(moved)
@@ -375,40 +337,28 @@ def _screened_energy(
     return max(energy, checks.SMALLEST)
 
 
-class OtherSolutions(NamedTuple):
-    """Properties of all solutions other than the one found: docs/theory/crowded.md, "Other
-    solutions".
+def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:
+    """False if there is no solution but that of `level`; and `Certificate`'s bound on the crowding
+    and statement on the cover of all others: docs/theory/crowded.md, "Other solutions".
     """
+    none = False, np.inf, True
+    if box.scope == "global":
+        return none
+    assert level.trial is not None
+    problem, A = level.problem, level.problem.influence
 
-    possible: bool  # False if it is proved that there are none
-    crowding: float  # lower bound on their crowding (see `Certificate`); infinite if there are none
-    cover: bool  # True if in each of them a contact disc covers the nearest neighbour's summit
+    def radii(loads: Array) -> Array:
+        return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
 
-    @classmethod
-    def of(cls, level: Level, box: Box) -> OtherSolutions:
-        """The properties of all solutions other than the one that `level` encloses in `box`."""
-        if box.scope == "global":
-            return NO_OTHERS
-        assert level.trial is not None
-        problem = level.problem
-
-        def radii(loads: Array) -> Array:
-            return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
-
-        A = problem.influence
-        perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
-        a = radii(level.loads.upper)
-        # `overhang` needs weights and the displacement that exactly these weights cause.
-        highest = problem.overhang(level.trial.loads.high, level.trial.product)
-        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
-        if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
-            return NO_OTHERS
-        crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
-        cover = bool((a <= ROOMY * A.separations()).all())
-        return cls(True, max(crowding, 0.0), cover)
-
-
-NO_OTHERS = OtherSolutions(False, np.inf, True)
+    perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
+    a = radii(level.loads.upper)
+    # `overhang` needs weights and the displacement that exactly these weights cause.
+    highest = problem.overhang(level.trial.loads.high, level.trial.product)
+    t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
+    if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
+        return none
+    crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
+    return True, max(crowding, 0.0), bool((a <= ROOMY * A.separations()).all())
 
 
 def _mean(a: Array, b: Array) -> Array:

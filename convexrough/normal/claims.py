@@ -36,7 +36,7 @@ REMAINING = 0.1
 
 
 def tolerance(name: str, within: float) -> float:
-    """The tolerance `within`. Raises InputError unless it is above 0 and at most 1."""
+    """The tolerance `within`, checked to be above 0 and at most 1."""
     if (number := checks.positive(name, within)) > 1.0:
         expected = "a fraction of the largest force, at most 1; 5 % is 0.05"
         raise InputError(name, found=within, expected=expected)
@@ -44,32 +44,22 @@ def tolerance(name: str, within: float) -> float:
 
 
 class Claim(ABC):
-    """Claimed forces, one per asperity, and the statuses that they imply.
+    """Claimed forces, one per asperity, and the statuses that they imply."""
 
-    one, many : the singular and the plural of the term for a force in messages
-    proved    : the noun in messages before "proved" or "wrong", such as "contact set"
-    kinds     : names of the attributes with indices of wrong statuses, and a text on each
-    claimed   : (n,) True where the asperity is claimed to touch or, in a verdict on shear, to slide
-    claims    : the status claimed where `claimed` is True, and that where it is False, such as
-        ("contact", "open")
-    within : largest error allowed: of a force, as a fraction of the largest force; of the total, as
-        a fraction of the prescribed total
-    total_prescribed : [force] None where it is not prescribed
-    certificate : the certificate of the given forces
-    solution    : a solution with its own statuses; None where it is not needed or not found
-    """
-
-    one: ClassVar[str]
-    many: ClassVar[str]
-    proved: ClassVar[str]
-    kinds: ClassVar[Mapping[str, str]]
+    one: ClassVar[str]  # the term for a force in messages
+    many: ClassVar[str]  # its plural
+    proved: ClassVar[str]  # the noun before "proved" or "wrong", such as "contact set"
+    kinds: ClassVar[Mapping[str, str]]  # attributes with indices of wrong statuses: a text on each
+    #: the status claimed where `claimed` is True, and where it is False, such as "contact", "open"
     claims: ClassVar[tuple[str, str]]
 
-    claimed: Any
+    claimed: Any  # (n,) True where claimed to touch or, in a verdict on shear, to slide
+    #: largest error allowed: of a force, as a fraction of the largest force; of the total, as a
+    #: fraction of the prescribed total
     within: float
-    total_prescribed: float | None
-    certificate: Any
-    solution: Any
+    total_prescribed: float | None  # [force] None where it is not prescribed
+    certificate: Any  # of the given forces
+    solution: Any  # a solution with its own statuses; None where it is not needed or not found
 
     @property
     @abstractmethod
@@ -97,10 +87,7 @@ class Claim(ABC):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) statuses proved from the given forces; where none is proved, those of `solution`.
-
-        An asperity without a proved status is "undecided".
-        """
+        """(n,) statuses proved from the given forces; where "undecided", those of `solution`."""
         status: NDArray[np.str_] = self.certificate.status
         if self.solution is None:
             return status
@@ -136,9 +123,8 @@ class Claim(ABC):
         return self.holds
 
     def hints(self) -> Iterator[str]:
-        """Lines that name a possible cause of wrong forces, such as a wrong unit or sign.
-
-        There are none if the claim holds, and would also hold with the default of `within`.
+        """Lines that name a possible cause of wrong forces, such as a wrong unit or sign; none if
+        the claim holds, also with the default of `within`.
         """
         passed = self.holds and self.error <= WITHIN
         if passed or (nearby := self.nearby()) is None:
@@ -212,8 +198,7 @@ class Claim(ABC):
     def largest(self) -> float:
         """[force] the largest |force|: of those given, or of the solution if that is smaller.
 
-        Without `solution`, it is a lower bound on the largest |force| of the exact solution, if the
-        error bounds give one above 0.
+        Without `solution`, a lower bound on that of the exact solution, if there is one above 0.
         """
         given, nearby = np.abs(self.values), self.nearby()
         if nearby is not None:
@@ -247,8 +232,8 @@ class Claim(ABC):
         """True if the total is as prescribed, to a relative error of `within`."""
         if self.total_prescribed is None:
             return True
-        missing = abs(self.total_given - self.total_prescribed)
-        return missing <= self.within * abs(self.total_prescribed)
+        given, wanted = self.total_given, self.total_prescribed
+        return abs(given - wanted) <= self.within * abs(wanted)
 
     @cached_property
     def suspects(self) -> Indices:

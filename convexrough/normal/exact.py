@@ -1,7 +1,7 @@
 """The units of a normal problem, and its numbers to about thirty digits.
 
-The numbers of a scene are float64. Its coefficients, offsets and 1 / (pi E*) follow from these
-numbers by few operations on pairs and balls, which bound the rounding errors.
+They follow from the float64 numbers of a scene by few operations on pairs and balls, which bound
+the rounding errors.
 """
 
 from __future__ import annotations
@@ -28,10 +28,9 @@ INVERSE_PI = Fraction("0.3183098861837906715377675267450287240689192914809128974
 
 @dataclass(frozen=True)
 class Units:
-    """Units of length and force in which the numbers of a problem are about 1.
-
-    They are the units of the scene times a power of two (length) and a power of eight (force). So
-    scaling rounds neither float64 numbers nor forces to the power 2/3.
+    """Units of length and force in which the numbers of a problem are about 1: those of the scene
+    times a power of two (length) and a power of eight (force). So scaling rounds neither float64
+    numbers nor forces to the power 2/3.
     """
 
     length: float  # [length] the scaled unit of length
@@ -44,11 +43,8 @@ class Units:
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
-        """Units close to `approach` [length] and to the load that causes this indentation.
-
-        coefficient : k of Hertz's law, indentation = k load^(2/3)
-
-        Raises InputError if the approach is not positive and finite.
+        """Units close to `approach` [length] and to the load k^(-3/2) approach^(3/2) of this
+        indentation, k = `coefficient`. Raises InputError unless approach is positive and finite.
         """
         if not 0 < approach < math.inf:
             raise InputError("scene", found=f"indentations of {approach:g}", expected=checks.SIZED)
@@ -57,15 +53,11 @@ class Units:
 
 
 class Data(NamedTuple):
-    """The numbers of a problem as balls (numbers with error bounds), in scaled units.
+    """The numbers of a problem as balls (numbers with error bounds), in scaled units."""
 
-    coefficients : (n,) k, or (1,) if all are equal;  offsets : (n,) d
-    scale        : () 1 / (pi E*)
-    """
-
-    coefficients: Ball
-    offsets: Ball
-    scale: Ball
+    coefficients: Ball  # (n,) k, or (1,) if all are equal
+    offsets: Ball  # (n,) d
+    scale: Ball  # () 1 / (pi E*)
 
 
 def exact_data(scene: Scene, which: Indices, units: Units, sizes: Array) -> Data:
@@ -73,19 +65,14 @@ def exact_data(scene: Scene, which: Indices, units: Units, sizes: Array) -> Data
 
     sizes : (n,) bounds on the numbers from which the offsets are computed, in scaled units
     """
-    constants = (
-        scene.sphere_radius,
-        scene.material.contact_modulus,
-        units.local,
-        units.force / units.length,
-    )
-    tips, heights = (
-        taken(each, which) for each in (scene.asperities.tip_radii, scene.asperities.heights)
-    )
+    modulus = scene.material.contact_modulus
+    constants = scene.sphere_radius, modulus, units.local, units.force / units.length
+    asperities = scene.asperities
+    tips, heights = (taken(each, which) for each in (asperities.tip_radii, asperities.heights))
     if len(tips) and (tips.strides == (0,) or (tips == tips[:1]).all()):
         k = _even_coefficient(float(tips[0]), *constants)
     else:
-        k = _exact_coefficients(tips, *constants)
+        k = _coefficients(tips, *constants)
     offsets = in_parts(
         len(which), lambda some: twofold_offsets(scene, which[some], units, heights[some])
     )
@@ -110,11 +97,8 @@ def twofold_offsets(scene: Scene, which: Indices, units: Units, heights: Array) 
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Three balls: the mean curvature of the pressed body; and, in scaled units, k^3 of an asperity
-    whose relative curvature is 1, and 1 / (pi E*).
-
-    base : the radius of the pressed body;  modulus : E*
-    local, unit : factors that scale k and 1 / (pi E*)
+    """Three balls: the mean curvature of the pressed body; and, scaled by `local` and `unit`, k^3
+    of an asperity whose relative curvature is 1, and 1 / (pi E*).
     """
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
@@ -122,12 +106,12 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
     return Ball.exact(curvature), Ball.exact(cubed), Ball.exact(scale)
 
 
-def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
+def _coefficients(tips: Array, *constants: Any) -> Ball:
     curvature, cubed, _ = _constants(*constants)
     return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
 
 
 @lru_cache
 def _even_coefficient(tip: float, *constants: Any) -> Ball:
-    """(1,) the local coefficient of one tip radius, cached because scenes often share it."""
-    return _exact_coefficients(np.array([tip]), *constants)
+    """(1,) the coefficient of one tip radius, cached because scenes often share it."""
+    return _coefficients(np.array([tip]), *constants)

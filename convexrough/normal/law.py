@@ -1,8 +1,7 @@
-"""The contact law in float64, for one problem or for a stack of problems (`normal.stack`).
+"""The contact law in float64, with the symbols of `normal.problem`, for one problem or for a stack.
 
-Arrays are (n,) for one problem and (m, n) for a stack. In a stack, quantities with one number per
-problem are (m, 1). A is the compliance matrix, k are the coefficients of Hertz's law, and D is the
-offsets plus the approach.
+Arrays are (n,) for one problem and (m, n) for a stack, in which quantities with one number per
+problem are (m, 1).
 """
 
 from __future__ import annotations
@@ -21,21 +20,14 @@ WIDER = 1.1
 
 
 class Pressed(NamedTuple):
-    """Loads P by Hertz's law at given indentations delta, and the gaps that they leave.
+    """Loads P by Hertz's law at given indentations delta, and the gaps that they leave."""
 
-    own      : k P^(2/3), which is max(delta, 0), scaled if a total load is prescribed
-    loads, displacement : P and A P
-    gap      : k P^(2/3) + A P - D, the gradient of the energy
-    defect   : the residual F of the contact law: the gap where P > 0, elsewhere min(gap, 0)
-    approach : D0: prescribed, or the value for which a weighted mean of the gaps of loaded
-        asperities is 0
-    """
-
-    own: Array
-    loads: Array
-    displacement: Array
-    gap: Array
-    defect: Array
+    own: Array  # k P^(2/3), which is max(delta, 0), scaled if a total load is prescribed
+    loads: Array  # P
+    displacement: Array  # A P
+    gap: Array  # k P^(2/3) + A P - D, the gradient of the energy
+    defect: Array  # the residual F of the contact law: the gap where P > 0, elsewhere min(gap, 0)
+    #: D0: prescribed, or the value for which a weighted mean of the gaps of loaded asperities is 0
     approach: Any
 
     @classmethod
@@ -103,8 +95,7 @@ def on_hertz_pressure(problem: NormalProblem) -> Array:
 
 def smooth_reach(problem: NormalProblem) -> Any:
     """[length^2] squared contact radius of a smooth body; infinite if the body is flat."""
-    scene, units = problem.scene, problem.units
-    radius = scene.mean_radius
+    scene, units, radius = problem.scene, problem.units, problem.scene.mean_radius
     if radius == np.inf:
         return np.inf
     if problem.approach is not None:

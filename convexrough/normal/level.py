@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball, where
+from convexrough.arithmetic.balls import Ball, of_rows, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, summed
 from convexrough.convex.newton_step import correct
@@ -39,39 +39,27 @@ SOLVED = 1e-6
 
 
 class Response(NamedTuple):
-    """The solution x, beta of the linear system of `Level.response`, as balls in scaled units.
+    """The solution x, beta of the linear system of `Level.response`, as balls in scaled units."""
 
-    loads : (n,) x, 0 where open;  approach : beta
-    """
-
-    loads: Ball
-    approach: Ball
+    loads: Ball  # (n,) x, 0 where open
+    approach: Ball  # beta
 
 
 class Springs(NamedTuple):
-    """The contacts of a level as linear springs, for the system that `Level.response` solves.
+    """The contacts of a level as linear springs, for `Level.response`. All arrays are (n,)."""
 
-    touching : (n,) True where the asperity is proved to touch and bounds on its compliance are
-        known; if nothing is proved, where it has a load in `trial`
-    doubtful  : (n,) True for other asperities that may touch
-    slopes    : (n,) c = dP/dn, 0 where not touching;  compliance : (n,) 1/c, 0 where not touching
-    bound     : (n,) h, a lower bound on 1/c where the asperity may touch; infinite where open
-    margin    : mu of docs/theory/one-theorem.md, with H = diag(h); 0 if nothing is proved
-    """
-
+    #: True where the asperity is proved to touch and bounds on its compliance are known; if nothing
+    #: is proved, where it has a load in `trial`
     touching: NDArray[np.bool_]
-    doubtful: NDArray[np.bool_]
-    slopes: Array
-    compliance: Ball
-    bound: Array
-    margin: float
+    doubtful: NDArray[np.bool_]  # True for other asperities that may touch
+    slopes: Array  # c = dP/dn, 0 where not touching
+    compliance: Ball  # 1/c, 0 where not touching
+    bound: Array  # h, a lower bound on 1/c where the asperity may touch; infinite where open
+    margin: float  # mu of docs/theory/one-theorem.md, with H = diag(h); 0 if nothing is proved
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the asperities that cause this.
-
-    which : indices into `NormalProblem.candidates`, the asperities that could touch
-    """
+    """The reason why nothing is proved, and the asperities, among the candidates, that cause it."""
 
     reason: str
     which: Indices
@@ -79,47 +67,38 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A normal solution near computed loads, as balls (numbers with error bounds), in scaled units.
+    """A normal solution near computed loads, as balls, for the asperities of `problem`.
 
-    All arrays are (n,), for the asperities of `problem`. The level of a stack of m problems has one
-    row for each problem: arrays are (m, n) or, if they hold one number per problem, (m, 1). Where
-    nothing is proved, the radii of the balls are infinite, except that of a prescribed approach.
-
-    loads, indentation : P_i and n_i;  approach : () D0
-    open      : (n,) True where an asperity is proved to have a gap
-    trial     : the loads from which the solution was proved, and their residuals; None at L = 0
-    box       : a box of loads that contains exactly one solution; None if nothing is proved, and at
-        L = 0
-    distance  : bound on (sum_i h_i (P_i - P*_i)^2)^(1/2), with the loads P of `trial` scaled to the
-        total L, and the solution P*
-    compliance : (n,) these h_i: the local compliance at the upper ends of a second, smaller box,
-        which also contains the solution
-    obstacle  : the reason why nothing is proved, or None
+    The level of a stack of m problems has one row for each: arrays are (m, n) or, if they hold one
+    number per problem, (m, 1). Where nothing is proved, the radii of the balls are infinite, except
+    that of a prescribed approach.
     """
 
     problem: NormalProblem
-    loads: Ball
-    indentation: Ball
-    approach: Ball
-    open: NDArray[np.bool_]
-    trial: Trial | None
+    loads: Ball  # (n,) P_i
+    indentation: Ball  # (n,) n_i
+    approach: Ball  # () D0
+    open: NDArray[np.bool_]  # (n,) True where an asperity is proved to have a gap
+    trial: Trial | None  # the loads near which the solution was proved; None at L = 0
+    #: a box that contains exactly one solution; None if nothing is proved, and at L = 0
     box: Box | None = None
+    #: bound on (sum_i h_i (P_i - P*_i)^2)^(1/2), with the loads P of `trial` scaled to the total L,
+    #: the solution P*, and the local compliance h at the upper ends of a second, smaller box, which
+    #: also contains the solution
     distance: Any = np.inf
-    compliance: Array = field(default_factory=lambda: np.zeros(0))
-    obstacle: Obstacle | None = None
+    compliance: Array = field(default_factory=lambda: np.zeros(0))  # (n,) these h_i
+    obstacle: Obstacle | None = None  # the reason why nothing is proved
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, obstacle: Obstacle) -> Level:
         """The level for loads near which no solution is proved."""
-        loads = Ball.around(state.loads, np.inf)
-        indentation = Ball.around(state.indentation.mid, np.inf)
-        error = np.inf if problem.by_load else state.approach.radius
-        approach = Ball.around(state.approach.mid, error)
-        opened = np.zeros(len(problem), dtype=bool)
+        approach, opened = state.approach, np.zeros(len(problem), dtype=bool)
         if problem.by_load:  # asperities that carry no load in any solution
             highest = problem.approach_bound
             opened = problem.exact.offsets.upper + (highest + SAFETY * abs(highest)) < 0
-        return cls(problem, loads, indentation, approach, opened, state, obstacle=obstacle)
+            approach = Ball.around(approach.mid, np.inf)
+        loads, below = (Ball.around(x, np.inf) for x in (state.loads, state.indentation.mid))
+        return cls(problem, loads, below, approach, opened, state, obstacle=obstacle)
 
     @classmethod
     def unloaded(cls, problem: NormalProblem) -> Level:
@@ -141,10 +120,8 @@ class Level:
 
     @cached_property
     def load(self) -> Ball:
-        """() the total load L. If it is not prescribed, Cauchy's inequality bounds its error.
-
-        Where nothing is proved, the ball is around the sum of the computed loads, and its radius
-        bounds only rounding errors.
+        """() the total load L. If it is not prescribed, Cauchy's inequality bounds its error; where
+        nothing is proved, the radius bounds only rounding errors of the sum of the computed loads.
         """
         if self.problem.by_load:
             return self.problem.control
@@ -157,10 +134,7 @@ class Level:
         return Ball.around(total.mid, total.radius + np.reshape(spread, total.shape))
 
     def row(self, k: int, problem: NormalProblem) -> Level:
-        """The level in row k of a stack; all rows share one `box`.
-
-        problem : the problem of this row
-        """
+        """The level in row k of a stack whose rows share one `box`, and the problem of this row."""
         it = self.trial
         assert it is not None
         own = it.loads.at(k), it.product[k], it.gap[k]
@@ -177,10 +151,8 @@ class Level:
         return Rows(load, self.approach[:, 0], *known)
 
     def moves(self, coupling: Coupling) -> Any:
-        """(m,) bounds on the errors |A P - A P*| of the displacements at m points.
-
-        Here A is the map `coupling` from loads to the displacements at these points, P are the
-        loads of `trial`, and P* is the solution.
+        """(m,) bounds on |A P - A P*|, for the map A from loads to displacements at m points, the
+        loads P of `trial` and the solution P*.
         """
         if self.box is None or self.trial is None:
             return np.inf
@@ -236,97 +208,87 @@ class Level:
         Raises SolverError if the system is singular or nearly singular.
         """
         problem, springs = self.problem, self.springs
-        touching, c, compliance = springs.touching, springs.slopes, springs.compliance
-        weights, largest = c / c.sum(), int(np.argmax(c))
+        c, weights = springs.slopes, springs.slopes / springs.slopes.sum()
+        j = int(np.argmax(c))
 
         def completed(x: Pair) -> Pair:
-            at = x.at(largest) + (total.mid - x.total())
             high, low = x.high.copy(), x.low.copy()
-            high[largest], low[largest] = at
+            high[j], low[j] = x.at(j) + (total.mid - x.total())
             return Pair(high, low)
 
-        def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
+        def residual(x: Pair) -> tuple[Ball, Ball]:
             """x / c + A x - right - beta, and beta, which makes the mean weighted by c about 0."""
-            above = compliance * x + product - right
+            above = springs.compliance * x + problem.product(x) - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
             return above - beta, beta
 
-        def size_of(left: Ball) -> float:
-            return float(np.sqrt(c @ left.value**2))
-
-        def known(left: Ball) -> bool:
-            """True if the residual is at most its error bound, so that it cannot be reduced."""
-            return size_of(left) <= float(np.sqrt(c @ left.radius**2)) < np.inf
+        def weighted(values: Array) -> float:
+            return float(np.sqrt(c @ values**2))
 
         x = completed(Pair.exact(float(total.value) * weights))
-        left, beta = residual(x, problem.product(x))
-        size = size_of(left)
-        first = max(size, size_of(right))
+        left, beta = residual(x)
+        size, rounding = weighted(left.value), weighted(left.radius)
+        accepted = SOLVED * max(size, weighted(right.value))
         for _ in range(CORRECTIONS):
-            if size == 0.0 or known(left):
+            if size == 0.0 or size <= rounding < np.inf:
                 break
-            rounding = float(np.sqrt(c @ left.radius**2))
-            defect = np.where(touching, left.value, 0.0)
+            defect = np.where(springs.touching, left.value, 0.0)
             unit = float(np.abs(defect).max())
-            step = correct(
-                problem.influence,
-                problem.shells,
-                np.sqrt(c),
-                defect / unit,
-                balanced=True,
-                tolerance=max(REDUCTION, ENOUGH * min(rounding / size, 1.0)),
-            )
+            least = max(REDUCTION, ENOUGH * min(rounding / size, 1.0))
+            system = problem.influence, problem.shells, np.sqrt(c)
+            step = correct(*system, defect / unit, balanced=True, tolerance=least)
             following = completed(x + Pair.exact(c * step * unit))
-            better, risen = residual(following, problem.product(following))
-            before, now = size, size_of(better)
+            better, risen = residual(following)
+            before, now = size, weighted(better.value)
             if now < size:
                 x, left, beta, size = following, better, risen, now
+                rounding = weighted(left.radius)
             if not now < 0.5 * before:
                 break
-        if size > SOLVED * first and not known(left):
+        if size > accepted and not size <= rounding < np.inf:
             raise SolverError(
                 "the state has no derivative: its linear system is singular or nearly singular",
                 solver="response",
                 advice="the energy may not be convex at this load: press with a smaller load",
             )
-        return self._proved_response(x, left, beta, total)
-
-    def _proved_response(self, x: Pair, left: Ball, beta: Ball, total: Ball) -> Response:
-        problem, springs = self.problem, self.springs
-        touching, doubtful, h = springs.touching, springs.doubtful, springs.bound
         if not springs.margin > 0.0:
             return Response(Ball.around(x, np.inf), Ball.around(beta.mid, np.inf))
-        j = int(np.argmax(springs.slopes))
-        short = float((total - Ball.exact(x).sum()).size)
+        return Response(*self._bounded(x, left, beta, total, j))
 
-        def excess(others: float) -> tuple[Array, float, float]:
-            """Three bounds for a change of x_j that makes the total right: on the residual after
-            it, on the change, and on the displacements by it and by asperities without a proved
-            status.
+    def _bounded(self, x: Pair, left: Ball, beta: Ball, total: Ball, j: int) -> tuple[Ball, Ball]:
+        """Balls of the solution near x and `beta`, whose residual is `left`.
 
-            others : bound on the sum of |x| of asperities neither proved to touch nor to be open
+        A change of x_j makes the total right. Let s bound this change: what the total misses, and
+        the sum of |x| of asperities neither proved to touch nor to be open.
+        """
+        problem, short = self.problem, float((total - Ball.exact(x).sum()).size)
+        touching, doubtful, _, compliance, h, margin = self.springs
+
+        def residual(others: float) -> tuple[Array, float, float]:
+            """Bounds on the residual after the change, on s, and on the displacements by it and by
+            asperities without a proved status, whose |x| have the sum `others`.
             """
-            missing = short + others
-            missing_effect = (missing + others) * problem.largest_entry
-            e = left.size + missing_effect
-            e[j] += missing * float(springs.compliance.upper[j])
-            return e, missing, missing_effect
+            s = short + others
+            moved = (s + others) * problem.largest_entry
+            e = left.size + moved
+            e[j] += s * float(compliance.upper[j])
+            return e, s, moved
 
         carried = np.zeros(len(h))
         if doubtful.any():
-            e, _, _ = excess(0.0)
-            within = distance(np.where(np.isinf(h), 0.0, e), h, springs.margin)
+            e, _, _ = residual(0.0)
+            within = distance(np.where(np.isinf(h), 0.0, e), h, margin)
             carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
-        e, missing, missing_effect = excess(float(carried.sum()) * (1 + SAFETY))
+        e, s, moved = residual(float(carried.sum()) * (1 + SAFETY))
         known = np.where(touching, h, np.inf)
-        within = distance(np.where(touching, e, 0.0), known, springs.margin)
+        within = distance(np.where(touching, e, 0.0), known, margin)
         errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
-        errors[j] += missing
-        moved = within / np.sqrt(float(known.min())) * problem.row_norm + missing_effect
-        each = (left.size + springs.compliance.upper * errors)[touching]
+        errors[j] += s
+        moved += within / np.sqrt(float(known.min())) * problem.row_norm
+        each = (left.size + compliance.upper * errors)[touching]
         off = (float(each.min()) + moved) * (1 + SAFETY)
-        return Response(Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off))
+        return Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off)
 
     @cached_property
     def rates(self) -> Array:
@@ -353,12 +315,16 @@ class Rows(NamedTuple):
 
 def rows_of(levels: Sequence[Level]) -> Rows:
     """Levels of one scene as arrays with one row for each level."""
-    balls = [(it.load, it.approach, it.loads, it.indentation) for it in levels]
-    load, approach, loads, indentation = map(Ball.stacked, map(list, zip(*balls, strict=True)))
-    touching, open_ = (
-        np.array([getattr(it, name) for it in levels]) for name in ("touching", "open")
-    )
-    return Rows(load, approach, loads, indentation, touching, open_)
+    names = "load", "approach", "loads", "indentation", "touching", "open"
+    return Rows._make(_stacked(levels, name) for name in names)
+
+
+def _stacked(each: Sequence[Any], name: str) -> Any:
+    """The attributes of this name as arrays, pairs or balls with one row for each object."""
+    values = [getattr(it, name) for it in each]
+    if isinstance(values[0], Ball):
+        return Ball.stacked(values)
+    return of_rows(lambda *rows: np.stack(rows), *values)
 
 
 @np.errstate(invalid="ignore")  # nan occurs only for levels that are not proved
@@ -368,19 +334,17 @@ def energies(levels: Sequence[Level]) -> Ball:
     which = [k for k, level in enumerate(levels) if level.trial is not None]
     if which:
         loaded = [levels[k] for k in which]
-        states = [level.trial for level in loaded if level.trial is not None]
-        gap, product, missing = (
-            Ball.stacked([getattr(state, name) for state in states])
-            for name in ("gap", "product", "missing")
+        states = [level.trial for level in loaded]
+        trial, gap, product, missing = (
+            _stacked(states, name) for name in ("loads", "gap", "product", "missing")
         )
-        trial = Pair(*(np.stack(part) for part in zip(*(s.loads for s in states), strict=True)))
         data = loaded[0].problem.exact
         local = data.coefficients * Ball.exact(trial).two_thirds()
         per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
         found = Ball.exact(trial).dot(per_load)
         # The energy of trial loads P exceeds the least energy at their total by at most the sum of
         # e_i |P_i - P*_i|, for the solution P* and e = `excess`.
-        loads = Ball.stacked([level.loads for level in loaded])
+        loads = _stacked(loaded, "loads")
         off = loads.error + np.abs(loads.mid.low)
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
         uncertainty = np.array([float(level.load.radius) for level in loaded])

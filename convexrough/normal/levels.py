@@ -39,17 +39,13 @@ NEGLIGIBLE = 88 * ROUNDOFF
 #: once, so this limits the memory.
 NUMBERS = 2**17
 
-quietly = np.errstate(all="ignore")
-
-
 #: A function of a problem and initial loads (or None) that returns loads, all in scaled units.
 Press = Callable[[NormalProblem, Array | None], Array]
 
 
 class Levels:
-    """The normal solutions of one scene up to the load of the level `top`; `at` caches them.
+    """The normal solutions of one scene up to the load of a pressed contact, the level `top`.
 
-    top      : the level of a pressed contact
     press    : the function that computes the loads of other levels
     together : True if Newton's method may solve several levels at once, as rows of a stack
     """
@@ -65,33 +61,27 @@ class Levels:
 
     def at(self, load: Ball) -> Level:
         """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
-        key = _key(load)
-        if key not in self._known:
-            self._known[key] = self._level(load)
+        if (key := _key(load)) not in self._known:
+            if load.positive:
+                self._known[key] = self._solved(self.problem.at_load(load))
+            elif load.size == 0.0:
+                self._known[key] = Level.unloaded(self.problem)
+            else:
+                raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
         return self._known[key]
 
-    def _level(self, load: Ball) -> Level:
-        if not load.positive:
-            if load.size == 0.0:
-                return Level.unloaded(self.problem)
-            raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
-        return self._solved(self.problem.at_load(load))
-
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at k positive loads, solved together; None for a level that is not found.
-
-        `at` may still find such a level.
-        """
-        box, problem = self.top.box, self.problem
+        """The levels at k positive loads, solved together; None where only `at` may find one."""
+        problem = self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
-        if not able or box is None:
+        if not able or self.top.box is None:
             return [None] * len(loads)
         some, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
-        closed = box.closed(problem)
+        closed = self.top.box.closed(problem)
+        fixed = problem.exact, problem.shells, problem.squares
         for start in range(0, len(loads), some):
             totals = loads[start : start + some]
             rows = [(slice(0, len(totals)), problem)]
-            fixed = problem.exact, problem.shells, problem.squares
             level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
             for k in range(len(totals)):
                 levels.append(level.row(k, problem.at_load(totals[k])) if good[k] else None)
@@ -105,37 +95,33 @@ class Levels:
     def _solved(self, problem: NormalProblem) -> Level:
         """The level of `problem`, proved in the box of `top` (`Box.closed`).
 
-        The problem is solved without initial loads and, if this proves nothing, from the loads of
-        `top`. If the box of `top` is local, only the latter is done.
+        The problem is solved without initial loads, unless this box is local. If this proves
+        nothing, it is solved from the loads of `top`.
         """
         box, trial = self.top.box, self.top.trial
         from_top = None if box is None or trial is None else trial.loads.high
+
+        def sought(start: Array | None) -> Level:
+            state = refined_loads(problem, self._press(problem, start))
+            return proved(problem, state, box and box.closed(problem))
+
         if box is not None and box.scope == "local":
-            return self._sought(problem, from_top)
-        found = self._sought(problem, None)
+            return sought(from_top)
+        found = sought(None)
         if found.obstacle and from_top is not None:
             with suppress(SolverError):
-                found = self._sought(problem, from_top)
+                found = sought(from_top)
         return found
-
-    def _sought(self, problem: NormalProblem, start: Array | None) -> Level:
-        """The level proved near refined loads in the box of `top`."""
-        state = refined_loads(problem, self._press(problem, start))
-        return proved(problem, state, self.top.box and iter((self.top.box.closed(problem),)))
 
 
 def _key(load: Ball) -> tuple[float, float, float]:
     return float(load.mid.high), float(load.mid.low), float(load.radius)
 
 
-@quietly
+@np.errstate(all="ignore")
 def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
-    """The solutions of all rows, and (m,) True where a row is proved; other rows have no meaning.
-
-    A row counts as proved only if, in addition, its residual is near its rounding error and the
-    status of every asperity is proved.
-
-    box : one box for all rows; default: for each row the `widest`
+    """The solutions of all rows, and (m,) True where a row is proved in `box` (default: the
+    `widest`), with the status of every asperity, and its residual is near its rounding error.
     """
     loads = pressed(stack)
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)

@@ -54,11 +54,7 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Arr
 
 @np.errstate(all="ignore")
 def approach_bound(
-    weights: Array,
-    displacement: Array,
-    coefficients: Array,
-    offsets: Array,
-    load: float | Array,
+    weights: Array, displacement: Array, coefficients: Array, offsets: Array, load: float | Array
 ) -> Any:
     """Upper bound on the approach at every solution of total load L.
 
@@ -101,23 +97,19 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
     It is `approach_bound` with the weights `smooth_loads`.
     """
-    modulus = scene.material.contact_modulus
+    modulus, points = scene.material.contact_modulus, scene.contact_points
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    weights, scale = smooth_loads(scene, load), 1.0 / (np.pi * modulus)
-    touching = np.flatnonzero(weights)
+    weights = smooth_loads(scene, load)
     few = len(scene) <= FEW_ASPERITIES
-    which = np.arange(len(scene)) if few else touching
-    sources = couple(scene, which, scale, influence)
-    displacement = np.empty(len(scene))
-    others = np.flatnonzero(weights == 0)
-    pressing = weights[which]
-    couplings: list[tuple[Indices | slice, Coupling]]
-    if few:
-        couplings = [(which, sources)]
-    elif sources.name == "lattice":  # one box of sites for all
-        couplings = [(slice(None), sources.onto(scene.contact_points))]
-    else:
-        couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]
+    which = np.arange(len(scene)) if few else np.flatnonzero(weights)
+    sources = couple(scene, which, 1.0 / (np.pi * modulus), influence)
+    couplings: list[tuple[Indices | slice, Coupling]] = [(which, sources)]
+    if not few and sources.name == "lattice":  # one box of sites for all
+        couplings = [(slice(None), sources.onto(points))]
+    elif not few:
+        others = np.flatnonzero(weights == 0)
+        couplings.append((others, sources.onto(points[others])))
+    displacement, pressing = np.empty(len(scene)), weights[which]
     for index, coupling in couplings:
         product = coupling.apply(pressing)
         displacement[index] = product + coupling.rounding(pressing).of(product)
@@ -129,33 +121,21 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] estimated loads with the total `load`.
-
-    They are the loads by Hertz's law at the indentations  offset - w + tau,  with the displacement
-    w by a smooth sphere under this load, and the number tau for which they have this total.
+    """(n,) [force] estimated loads with the total `load`, by Hertz's law at the indentations
+    offset - w + tau,  with a number tau and the displacement w by a smooth sphere under this load,
+    which has the mean curvature of the body (w = 0 for a flat).
     """
-    coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
-    sunk = smooth_displacement(scene, scene.asperities.distances, load)
+    modulus, sunk = scene.material.contact_modulus, np.zeros(len(scene))
+    if scene.curved:
+        a = float(hertz.contact_radius(load, modulus, scene.mean_radius))
+        sunk = hertz.surface_displacement(scene.asperities.distances, a, scene.mean_radius)
+    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
     return np.asarray(hertz.load(indentation, coefficients))
 
 
-def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
-    """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
-
-    Other shapes are replaced by a sphere of the same mean curvature. Under a flat the result is 0.
-    """
-    if not scene.curved:
-        return np.zeros_like(distances)
-    radius = scene.mean_radius
-    a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
-    return np.asarray(hertz.surface_displacement(distances, a, radius))
-
-
 def all_that_could_touch(
-    scene_within: Callable[[float], Scene],
-    farthest: Callable[[float], float],
-    load: float,
+    scene_within: Callable[[float], Scene], farthest: Callable[[float], float], load: float
 ) -> tuple[Scene, float]:
     """The scene with all asperities that could touch under a load, and a bound on the approach.
 

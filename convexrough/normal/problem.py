@@ -55,30 +55,21 @@ REDUCTION = 1e-7
 class NormalProblem:
     """The asperities of a scene that could touch, and what is prescribed, in scaled units.
 
-    candidates    : (n,) indices of these asperities in the scene; no other asperity touches in any
-        solution
-    coefficients, offsets, influence : (n,) k, (n,) d, and the compliance operator A
-    offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    shells        : (n,) 1 / (pi E* s_i) with the contact modulus E*. The radii s_i are so small
-        that A + diag(shells) is positive semidefinite
-    control       : the prescribed load if `by_load` is True, else the prescribed approach D0
-    highest       : upper bound on D0 at any solution; if infinite, `approach_bound` computes one
-
     A stack (`normal.stack.Stack`) is many problems, one per row. Its arrays are (m, n), or (n,)
     where all rows are equal, and `control` and `highest` are (m, 1).
     """
 
     scene: Scene
     units: Units
-    candidates: Indices
-    coefficients: Array
-    offsets: Array
-    offset_errors: Array
-    influence: Influence
-    shells: Array
-    control: Ball
+    candidates: Indices  # (n,) in the scene; no other asperity touches in any solution
+    coefficients: Array  # (n,) k
+    offsets: Array  # (n,) d
+    offset_errors: Array  # (n,) bound on the rounding error of D_i, without that of D0
+    influence: Influence  # A
+    shells: Array  # (n,) 1 / (pi E* s_i), so large that A + diag(shells) is semidefinite
+    control: Ball  # the prescribed load if `by_load` is True, else the prescribed approach D0
     by_load: bool
-    highest: float
+    highest: float  # bound on D0 at any solution; if infinite, `approach_bound` computes one
 
     def __post_init__(self) -> None:
         # A solver, which may be any class, gets these arrays, and later the proof uses them.
@@ -114,9 +105,8 @@ class NormalProblem:
         return None if self.by_load else _numbers(self.control)
 
     def at_load(self, load: Ball) -> Self:
-        """The problem of the same asperities under a total load.
-
-        The approach under this load must be at most `approach_bound`.
+        """The problem of the same asperities under a total load, by which the approach must be at
+        most `approach_bound`.
         """
         return self._at(load, by_load=True)
 
@@ -125,13 +115,12 @@ class NormalProblem:
         return self._at(approach, by_load=False)
 
     def _at(self, control: Ball, by_load: bool) -> Self:
-        """The problem with another control, and with the cached data of this one."""
         other = replace(self, control=control, by_load=by_load)
-        for name in ("exact", "row_norm", "largest_entry"):
+        for name in ("exact", "row_norm", "largest_entry", "squares"):
             other.__dict__[name] = getattr(self, name)
         return other
 
-    @property
+    @cached_property
     def squares(self) -> Array:
         """(n,) [length^2] squared distances of the summits from the axis."""
         return self.scene.asperities.distances[self.candidates] ** 2
@@ -159,10 +148,8 @@ class NormalProblem:
         return Ball.around(product, errors * (1 + SAFETY))
 
     def pressed_product(self, loads: Pair) -> Ball:
-        """(n,) A P for loads P >= 0, precise enough for a press.
-
-        On large lattices it has fewer digits than `product`. With a stored matrix of more than
-        `ALL_SHARP` rows, only displacements of loaded asperities have thirty digits.
+        """(n,) A P for loads P >= 0, precise enough for a press: fewer digits than `product` on
+        large lattices and, for a matrix of more than `ALL_SHARP` rows, where loads are 0.
         """
         if isinstance(self.influence, LatticeInfluence):
             sums = self.influence.sums(loads, self.influence.least_slices)
@@ -179,26 +166,15 @@ class NormalProblem:
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
         """(n,) one Newton step for the equation F(delta) = 0 of docs/theory/newton.md.
 
-        delta_i is the indentation of a touching asperity, and minus the gap of an open one.
-
         slopes : (n,) dP/d(delta), 0 where open;  defect : (n,) F(delta)
         enough : fraction of the defect that the step may leave;  todo : used only by `Stack`
-
-        If `Influence.cheap_sums` is True, asperities whose slope and defect are both 0 are left out
-        to save time.
         """
         some, influence = np.arange(len(self)), self.influence
-        if influence.cheap_sums:
+        if influence.cheap_sums:  # save the time for asperities that do not move
             some = ((slopes > 0) | (defect != 0)).nonzero()[0]
             influence = influence.restricted(some)
-        step = correct(
-            influence,
-            taken(self.shells, some),
-            np.sqrt(slopes[some]),
-            defect[some],
-            balanced=self.by_load,
-            tolerance=max(REDUCTION, enough),
-        )
+        parts = influence, taken(self.shells, some), np.sqrt(slopes[some]), defect[some]
+        step = correct(*parts, balanced=self.by_load, tolerance=max(REDUCTION, enough))
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
@@ -239,7 +215,7 @@ class NormalProblem:
 
         influence : compliance operator; None for the cheapest
         highest   : [length] upper bound on the approach under `load`, or inf to make all asperities
-            candidates; default: the result of `highest_approach`
+            candidates; default: that of `highest_approach`
         """
         checks.exactly_one("approach", approach, "load", load)
         offsets, errors = scene.offsets, scene.offset_errors
@@ -257,18 +233,13 @@ class NormalProblem:
         prescribed = highest + offsets + errors + 6 * ROUNDOFF * abs(highest)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
-        if highest == np.inf:
-            # the indentation of one asperity under the whole load
+        if highest == np.inf:  # take the indentation of one asperity under the whole load
             top = float(hertz.indentation(given, coefficients.max()))
         units = Units.of(top, _middle(coefficients))
-        return cls(
-            scene=scene,
-            units=units,
-            **_about(scene, candidates, taken(coefficients, candidates), units, influence),
-            control=Ball.exact(given / (units.length if load is None else units.force)),
-            by_load=load is not None,
-            highest=highest / units.length,
-        )
+        about = _about(scene, candidates, taken(coefficients, candidates), units, influence)
+        control = Ball.exact(given / (units.length if load is None else units.force))
+        by_load, highest = load is not None, highest / units.length
+        return cls(scene, units, **about, control=control, by_load=by_load, highest=highest)
 
     def restricted(self, which: Indices) -> NormalProblem:
         """The problem in which only the candidates with these indices may carry loads."""
@@ -304,19 +275,15 @@ class NormalProblem:
         return local + displacement - self.offsets - approach
 
     def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
-        """The residual: the largest of all |g_i| where P_i > 0, and of all max(-g_i, 0) elsewhere.
-
-        displacement : (n,) A P, if known
-        """
+        """The largest |g_i| where P_i > 0 and max(-g_i, 0) elsewhere; `displacement` is A P."""
         if displacement is None:
             displacement = self.influence.apply(loads)
         gap = self.gap(loads, displacement, approach)
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
     def bounds(self, approach_bound: float) -> Array:
-        """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on the loads of every solution.
-
-        approach_bound : upper bound on the approach D0 in D_i = D0 + d_i
+        """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on the loads of every solution, from an upper
+        bound on the approach D0 in D_i = D0 + d_i.
         """
         rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
@@ -329,21 +296,15 @@ class NormalProblem:
         return h
 
     def convexity_number(self, loads: Array) -> float:
-        """The largest ratio shells_i / h_i, where h is the `compliance` at `loads`.
-
-        If it is below 1, the energy is convex for all loads from 0 up to `loads`: (3) of
-        docs/theory/convexity.md.
+        """The largest shells_i / h_i with the `compliance` h at `loads`; below 1 the energy is
+        convex for all loads from 0 up to `loads`: (3) of docs/theory/convexity.md.
         """
         return float(convexity_number(self.shells, self.compliance(loads)))
 
     def overhang(self, weights: Array, displacement: Ball) -> Any:
         """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
-        It is `highest` or, under load control, the result of `load_control.approach_bound` if that
-        is smaller.
-
-        weights      : (n,) approximate loads, not negative, not all 0
-        displacement : (n,) A times weights
+        weights : (n,) approximate loads, not negative, not all 0;  displacement : A times weights
         """
         if not self.by_load:
             return self.highest
@@ -358,10 +319,7 @@ class NormalProblem:
 def _about(
     scene: Scene, which: Indices, coefficients: Array, units: Units, kind: Kind | None
 ) -> dict[str, Any]:
-    """The fields of the problem in which the asperities `which` may touch.
-
-    coefficients : (n,) k of these asperities, not scaled;  kind : compliance operator, or None
-    """
+    """The fields of the problem in which the asperities `which` may touch; k is not scaled."""
     scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
     influence = couple(scene, which, scale, kind)
     return {

@@ -9,8 +9,7 @@ upper ends of a box.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -39,21 +38,19 @@ ELSEWHERE = "no given box is proved to contain the loads"
 NOT_OPEN = "no gap is proved where the proof assumes one"
 
 
-def proved(problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None) -> Level:
-    """The `Level` of the solution in the first box that is proved to contain it.
+def proved(problem: NormalProblem, state: Trial, box: Box | None = None) -> Level:
+    """The `Level` of the solution in `box`, or an unproved level whose `obstacle` says why not.
 
-    If there is no such box, the result is an unproved level whose `obstacle` says why.
-
-    boxes : the boxes to try. By default they are those of `normal.boxes.tried` and, if none of
-        these succeeds, boxes in which asperities without a load are assumed to be open; later boxes
-        drop this assumption for asperities whose gaps are not proved
+    The default is the box of `normal.boxes.tried` and, if this proves nothing, boxes in which
+    asperities without a load are assumed to be open; later boxes drop this assumption for
+    asperities whose gaps are not proved.
     """
     loads = state.loads.high
-    for box in boxes or tried(problem, loads, state.product):
-        inside, _, found = solution_in(problem, box, state)
-        if inside and not (box.fixed_open.any() and (box.fixed_open & ~found.open).any()):
+    if (first := box or tried(problem, loads, state.product)) is not None:
+        inside, _, found = solution_in(problem, first, state)
+        if inside and not (first.fixed_open & ~found.open).any():
             return found
-    if boxes is not None:
+    if box is not None:
         return Level.unproved(problem, state, Obstacle(ELSEWHERE, NONE))
     touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
     for _ in range(ATTEMPTS):
@@ -84,74 +81,49 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     2. (n,) bounds on the errors of the trial loads, by the theorem on the box.
     3. The level, by the theorem on a smaller box that contains the solution.
     """
-    missing = _Missing.of(problem, state)
-    inside, at_first, h, within, errors = _applied_twice(problem, box, state, missing)
-    # Bound A (P - P*) by Cauchy's inequality.
-    softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
-    moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
-    shift = _approach_error(problem, box, state, errors, moved)
-    approach = Ball.around(state.approach.mid, shift)
-    known = state.indentation
-    indentation = Ball.around(known.mid, known.radius + (moved + shift))
-    opened = indentation.negative
-    found = Ball.around(state.loads, np.where(opened, 0.0, errors))
-    solution = _sharpened(problem, found, indentation), indentation, approach, opened
-    return inside, at_first, Level(problem, *solution, state, box, within, h)
+    trial, (extra, coupled, bent) = state.loads.high, _missing(problem, state)
+    residual = np.where(box.fixed_open, 0.0, state.excess + bent)
 
+    def theorem(h: Array, number: Any) -> tuple[Any, Array]:
+        within = distance(residual, h, 1.0 - number)
+        return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + extra)
 
-def _applied_twice(
-    problem: NormalProblem, box: Box, state: Trial, missing: _Missing
-) -> tuple[Any, Array, Array, Any, Array]:
-    """As in `solution_in`: True if the box contains the solution, and the bounds by the first box;
-    then h of the smaller box, and bounds on the norm of P - P* and on its components by that box.
-    """
-    trial = state.loads.high
-    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
-
-    def theorem(h: Array, margin: Any) -> tuple[Any, Array]:
-        within = distance(residual, h, margin)
-        return within, np.asarray(within / np.sqrt(h) * (1 + SAFETY) + missing.loads)
-
-    _, at_first = theorem(box.compliance, 1.0 - box.convexity_number)
+    _, at_first = theorem(box.compliance, box.convexity_number)
     within_faces = (trial + at_first < box.faces) & np.isfinite(at_first)
     inside = (within_faces & ~(box.fixed_open & (trial > 0))).all(axis=-1)
     h = problem.compliance(np.minimum(box.loads, (trial + at_first) * (1 + SAFETY)))
-    number = np.minimum(box.convexity_number, box.convexity_at(h))
-    return inside, at_first, h, *theorem(h, 1.0 - number)
+    within, errors = theorem(h, np.minimum(box.convexity_number, box.convexity_at(h)))
+    # Bound A (P - P*) by Cauchy's inequality.
+    softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
+    moved = (within / np.sqrt(softest) * problem.row_norm + coupled) * (1 + SAFETY)
+    shift = _approach_error(problem, box, state, errors, moved)
+    known = state.indentation
+    indentation = Ball.around(known.mid, known.radius + (moved + shift))
+    opened = indentation.negative
+    loads = Ball.around(state.loads, np.where(opened, 0.0, errors))
+    if (loads.radius > POOR * loads.mid.high).any():
+        loads = elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
+    approach = Ball.around(state.approach.mid, shift)
+    found = Level(problem, loads, indentation, approach, opened, state, box, within, h)
+    return inside, at_first, found
 
 
-class _Missing(NamedTuple):
-    """Bounds on the effect of a difference between the prescribed total and the sum of the loads P.
+def _missing(problem: NormalProblem, state: Trial) -> tuple[Any, Any, Any]:
+    """(n,) bounds on |t| P, on |t| A P, and on the change of the residuals from P to (1 + t) P.
 
-    The loads (1 + t) P have the prescribed total: docs/theory/one-theorem.md, "Pressing".
-
-    loads, coupled, residual : (n,) bounds on |t| P, on |t| A P, and on the change of the residuals
-        from P to (1 + t) P; 0 if P has the prescribed total
+    The loads (1 + t) P have the prescribed total: docs/theory/one-theorem.md, "Pressing". The
+    bounds are 0 if P has this total.
     """
-
-    loads: Any
-    coupled: Any
-    residual: Any
-
-    @classmethod
-    def of(cls, problem: NormalProblem, state: Trial) -> _Missing:
-        if not state.missing.size.any():
-            return cls(0.0, 0.0, 0.0)
-        loads, coupled, local = state.loads.high, state.product.upper, state.local
-        part = state.missing.size / summed(loads) * (1 + SAFETY)
-        grows = coupled + 2.0 / 3.0 * local
-        middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
-        rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
-        found = part * loads, part * coupled, part * rest
-        known = part <= 0.5
-        return cls(*(found if np.all(known) else (np.where(known, x, np.inf) for x in found)))
-
-
-def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
-    """The balls of the loads, or those of (indentation / k)^(3/2) where these are smaller."""
-    if not (loads.radius > POOR * loads.mid.high).any():
-        return loads
-    return elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
+    if not state.missing.size.any():
+        return 0.0, 0.0, 0.0
+    loads, coupled, local = state.loads.high, state.product.upper, state.local
+    part = state.missing.size / summed(loads) * (1 + SAFETY)
+    grows = coupled + 2.0 / 3.0 * local
+    middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
+    rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
+    found = part * loads, part * coupled, part * rest
+    extra, coupled, bent = (np.where(part <= 0.5, each, np.inf) for each in found)
+    return extra, coupled, bent
 
 
 def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:

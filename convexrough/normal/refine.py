@@ -1,7 +1,7 @@
 """The contact law with error bounds, and loads refined to more digits than float64 has.
 
-Functions take one problem or a stack (`normal.stack`) of m problems. Arrays are (n,) for
-one problem and (m, n) for a stack, where quantities with one number per problem are (m, 1).
+Functions take one problem or a stack (`normal.stack`) of m problems, with arrays (n,) or (m, n).
+Quantities with one number per problem are numbers or (m, 1).
 
 The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0
 (symbols of `normal.problem`) is a ball, whose radius bounds the errors of the data, the product and
@@ -27,11 +27,8 @@ from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
-#: Largest number of corrections.
-CORRECTIONS = 12
-
-#: A correction aims to reduce the residual to this fraction of the residual's rounding error.
-ENOUGH = 0.1
+#: Largest number of corrections. Each aims at a residual of ENOUGH times its rounding error.
+CORRECTIONS, ENOUGH = 12, 0.1
 
 #: A function that returns A P for loads P.
 Product: TypeAlias = Callable[[Pair], Ball]
@@ -46,20 +43,14 @@ FEW_TERMS = 128
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Loads of the asperities that can touch, and residuals in the contact law, in scaled units.
-
-    loads, product : (n,) P and A P
-    gap     : (n,) k P^(2/3) + A P - d - D0
-    approach : D0: prescribed, or a weighted mean of k P^(2/3) + A P - d over loaded asperities
-    missing : prescribed total minus the sum of the loads; 0 if no total is prescribed
-    """
+    """Loads of the asperities that can touch, and residuals in the contact law, in scaled units."""
 
     problem: NormalProblem
-    loads: Pair
-    product: Ball
-    gap: Ball
-    approach: Ball
-    missing: Ball
+    loads: Pair  # (n,) P
+    product: Ball  # (n,) A P
+    gap: Ball  # (n,) k P^(2/3) + A P - d - D0
+    approach: Ball  # D0: prescribed, or a weighted mean of k P^(2/3) + A P - d where loaded
+    missing: Ball  # prescribed total minus the sum of the loads; 0 if no total is prescribed
 
     @property
     def local(self) -> Array:
@@ -98,14 +89,10 @@ class Trial:
         """This trial of a stack, with the rows chosen by `where` replaced by those of `other`."""
         if where.all():
             return other
+        names = "loads", "product", "gap", "approach", "missing"
+        both = ((getattr(other, name), getattr(self, name)) for name in names)
         select = partial(np.where, where[:, None])
-        both = zip(other.numbers, self.numbers, strict=True)
         return Trial(self.problem, *(of_rows(select, yes, no) for yes, no in both))
-
-    @property
-    def numbers(self) -> tuple[Pair | Ball | Array, ...]:
-        """All fields except the problem, in their order."""
-        return self.loads, self.product, self.gap, self.approach, self.missing
 
 
 def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> Trial:
@@ -151,16 +138,11 @@ def refined_loads(problem: NormalProblem, loads: Array, product: Product | None 
 
 
 def trial_of(
-    problem: NormalProblem,
-    loads: Array,
-    product: Product | None = None,
-    *,
-    roughly: bool = False,
+    problem: NormalProblem, loads: Array, product: Product | None = None, *, roughly: bool = False
 ) -> Trial:
-    """The trial of loads (n,) >= 0, which are changed to have the prescribed total.
+    """The trial of loads (n,) >= 0, which `completed` changes to have the prescribed total.
 
     product : function that returns A P for loads P; default `problem.product`
-    roughly : as in `completed`
     """
     pair, missing = completed(problem, Pair.exact(loads), roughly=roughly)
     return trial(problem, pair, missing, (product or problem.product)(pair))
@@ -172,25 +154,18 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
 
     enough : fraction of the residual that the step may leave: a number, or (m,) for a stack
     """
-    following, missing = completed(problem, _stepped(problem, state, enough, todo), roughly=True)
-    product = problem.moved(state.loads, state.product, following)
-    return trial(problem, following, missing, product)
-
-
-def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
-    """The loads after the step, not yet changed to have the prescribed total."""
     loads, inside, defect = state.loads, state.inside, state.defect
     slopes = np.divide(1.5 * loads.high, state.local, out=np.zeros(defect.shape), where=inside)
     size = largest(np.abs(defect))
     defect /= np.where(size > 0, size, 1.0)
     step = problem.correct(slopes, defect, enough, todo)
     step *= size
-    k = problem.coefficients
+    k, gap = problem.coefficients, state.gap.value
     if k.shape != step.shape:  # of a stack
         k = np.broadcast_to(k, step.shape)
-    gap = state.gap.value
 
-    def following(some: slice) -> Pair:
+    def stepped(some: slice) -> Pair:
+        """The loads after the step, not yet changed to have the prescribed total."""
         before = loads.at(some)
         local = hertz.indentation(before.high, k[some])
         own = np.where(inside[some], local, np.minimum(-gap[some], 0.0))
@@ -203,13 +178,15 @@ def _stepped(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[np
         after = before + Pair.exact(np.where(near, grown, ends - before.high))
         return Pair(*(part * (near | (ends > 0)) for part in after))
 
-    return following(slice(None)) if step.ndim > 1 else in_parts(len(step), following)
+    following = stepped(slice(None)) if step.ndim > 1 else in_parts(len(step), stepped)
+    following, missing = completed(problem, following, roughly=True)
+    product = problem.moved(state.loads, state.product, following)
+    return trial(problem, following, missing, product)
 
 
 def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> tuple[Pair, Ball]:
-    """The loads, scaled to the prescribed total, and a ball of the remaining difference.
-
-    The remaining difference, up to rounding, is added to the largest load.
+    """The loads, scaled to the prescribed total, and a ball of the difference that is left after it
+    is added, up to rounding, to the largest load.
 
     roughly : True to skip the scaling if the difference is less than FITS times the largest load
     """
@@ -221,8 +198,11 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
     missed = np.abs(summed(loads.high) - problem.load)
     if not roughly or (missed > FITS * largest(loads.high)).any():
         power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
-        loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-        completed = loads * (problem.control.mid / sums(loads))
+        loads = Pair(*(np.ldexp(part, power) for part in loads))
+        total = loads.total()
+        if loads.high.ndim > 1:
+            total = Pair(*(part[:, None] for part in total))
+        completed = loads * (problem.control.mid / total)
     rows = Pair(*(part.reshape(-1, n) for part in completed))  # views
     missing = _missing(rows, problem.control.mid)
     largest_ones = np.arange(len(rows.high)), rows.high.argmax(axis=1)
@@ -241,26 +221,16 @@ def _missing(loads: Pair, total: Pair) -> Pair:
     return Pair(*(np.reshape(part, -1) for part in total)) - loads.total()
 
 
-def sums(values: Pair) -> Pair:
-    """Sums along the last axis: a number, or (m, 1) for a stack."""
-    total = values.total()
-    return total if np.ndim(values.high) == 1 else Pair(*(part[:, None] for part in total))
-
-
 def defect_of(state: Trial) -> Any:
     """The 2-norm of the residual of the contact law: a number, or (m,) for a stack."""
-    return _norm(state.defect)
+    defect = state.defect
+    return np.sqrt(np.einsum("...i,...i->...", defect, defect))
 
 
 def rounding_of(state: Trial) -> Any:
-    """The 2-norm of the rounding errors of the residual: a number, or (m,) for a stack.
-
-    Errors of positive gaps are left out, because they do not change the residual.
+    """The 2-norm of the residual's rounding errors, without those of positive gaps, which do not
+    change the residual: a number, or (m,) for a stack.
     """
     counts = state.inside | (state.gap.value <= state.gap.radius)
-    return _norm(np.where(counts, state.gap.radius, 0.0))
-
-
-def _norm(values: Array) -> Any:
-    """The 2-norm along the last axis: a number, or (m,) for (m, n) values."""
-    return np.sqrt(np.einsum("...i,...i->...", values, values))
+    errors = np.where(counts, state.gap.radius, 0.0)
+    return np.sqrt(np.einsum("...i,...i->...", errors, errors))

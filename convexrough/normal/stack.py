@@ -21,14 +21,12 @@ from convexrough.normal.problem import NormalProblem
 
 @dataclass(frozen=True, eq=False)
 class Stack(NormalProblem):
-    """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal.
-
-    coupled : slices of the rows, each with a problem that has the compliance operator of these
-        rows. Scene and units are those of the first problem
-
-    `restricted`, `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work.
+    """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal. `restricted`,
+    `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work.
     """
 
+    #: slices of the rows, each with a problem that has the compliance operator of these rows; scene
+    #: and units are those of the first problem
     coupled: Sequence[tuple[slice, NormalProblem]]
 
     @classmethod
@@ -41,7 +39,7 @@ class Stack(NormalProblem):
         control: Ball,
         by_load: bool,
     ) -> Stack:
-        """The stack with coefficients, (1,) or (m, 1), and offsets (m, n) from `exact`."""
+        """The stack of these problems; `exact` has coefficients (1,) or (m, 1), offsets (m, n)."""
         first = coupled[0][1]
         given = {each.name: getattr(first, each.name) for each in fields(first)} | {
             "coefficients": exact.coefficients.value,
@@ -58,19 +56,16 @@ class Stack(NormalProblem):
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) bounds on the largest 2-norm of a row of the compliance operator A."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) bounds on the largest entry of A."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
-        values = np.empty((self.coupled[-1][0].stop, 1))
-        for rows, problem in self.coupled:
-            values[rows] = getattr(problem, name)
-        return values
+        """(m, 1) this property of the problem of each row."""
+        counts = [rows.stop - rows.start for rows, _ in self.coupled]
+        return np.repeat([getattr(each, name) for _, each in self.coupled], counts)[:, None]
 
     def only(self, rows: Indices) -> Stack:
         """The stack of the chosen rows, given in increasing order."""
@@ -82,14 +77,10 @@ class Stack(NormalProblem):
             return values[rows] if every else values
 
         k, d, scale = self.exact
-        return Stack.of(
-            [(some, problem) for some, (_, problem) in slices if some.stop > some.start],
-            Data(pick(k), pick(d), scale),
-            pick(self.shells),
-            pick(self.squares),
-            pick(self.control),
-            self.by_load,
-        )
+        coupled = [(some, problem) for some, (_, problem) in slices if some.stop > some.start]
+        shells, squares, control = map(pick, (self.shells, self.squares, self.control))
+        data = Data(pick(k), pick(d), scale)
+        return Stack.of(coupled, data, shells, squares, control, self.by_load)
 
     def apply(self, loads: Array) -> Array:
         """(m, n) A P in float64."""
@@ -103,15 +94,12 @@ class Stack(NormalProblem):
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P for P = `others`, to about thirty digits; other arguments are not used."""
         return self.product(others)
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
-        """(m, n) a Newton step of the indentations; nan in rows whose matrix is indefinite.
+        """(m, n) as `NormalProblem.correct`, to rounding; nan in rows whose matrix is indefinite.
 
-        slopes, defect : (m, n) as in `NormalProblem.correct`
-        todo   : (m,) True for rows that need a step; the step of all other rows is 0
-        enough : not used, because factorisations leave only rounding errors
+        todo : (m,) True for rows that need a step; the step of all other rows is 0
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 

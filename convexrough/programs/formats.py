@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 
 if TYPE_CHECKING:
@@ -25,13 +24,9 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
     """
     width, height = len(program.linear), len(program.lower)
     checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
-    upper = program.quadratic.toarray()
-    rows = program.constraints.toarray()
-    equal = program.lower == program.upper
-    none = np.array(None)  # what Problem.save writes for missing data
-    file = io.BytesIO()
-    np.savez_compressed(
-        file,
+    upper, rows = program.quadratic.toarray(), program.constraints.toarray()
+    equal, none = program.lower == program.upper, np.array(None)  # as Problem.save writes it
+    return _npz(
         P=upper + np.triu(upper, 1).T,
         q=program.linear,
         G=-rows[~equal],
@@ -41,6 +36,11 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
         lb=none,
         ub=none,
     )
+
+
+def _npz(**arrays: Any) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
     return file.getvalue()
 
 
@@ -51,10 +51,7 @@ def clarabel_json(program: ConeProgram) -> bytes:
         "q": program.linear.tolist(),
         "A": _columns(program.constraints),
         "b": program.constant.tolist(),
-        "cones": [
-            {"ZeroConeT": program.equalities},
-            *[{"SecondOrderConeT": 3}] * program.cones,
-        ],
+        "cones": [{"ZeroConeT": program.equalities}, *[{"SecondOrderConeT": 3}] * program.cones],
     }
     return json.dumps(data).encode()
 
@@ -79,16 +76,14 @@ def cone_npz(program: ConeProgram) -> bytes:
     """
     from scipy import sparse  # takes 0.1 s to import
 
-    upper, parts = program.quadratic, dict[str, Any]()
+    upper = program.quadratic
     whole = sparse.csc_matrix(upper + sparse.triu(upper, 1).T)
-    for name, matrix in (("P", whole), ("A", program.constraints)):
-        for part in ("data", "indices", "indptr"):
-            parts[f"{name}_{part}"] = getattr(matrix, part)
-    file = io.BytesIO()
-    np.savez_compressed(
-        file, **parts, q=program.linear, b=program.constant, equalities=program.equalities
-    )
-    return file.getvalue()
+    parts = {
+        f"{name}_{part}": getattr(matrix, part)
+        for name, matrix in (("P", whole), ("A", program.constraints))
+        for part in ("data", "indices", "indptr")
+    }
+    return _npz(**parts, q=program.linear, b=program.constant, equalities=program.equalities)
 
 
 def mps(program: QuadraticProgram) -> bytes:
@@ -126,20 +121,19 @@ def cbf(program: ConeProgram) -> bytes:
 
     and the objective is q'x + t. Constraints are affine functions of (x, t) in cones.
     """
-    width = len(program.linear)
-    factor = _factor(program.quadratic)
+    width, first = len(program.linear), len(program.constant)  # `first`: row of the cone of t
+    upper = program.quadratic.toarray()
+    used = np.flatnonzero(upper.diagonal())
+    small = upper[np.ix_(used, used)]
+    # F from eigenvalues: Cholesky's method fails if some of them are 0.
+    values, vectors = np.linalg.eigh(small + np.triu(small, 1).T)
+    factor = np.zeros((len(used), width))
+    factor[:, used] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     quadratic = len(factor) + 2
-    first = len(program.constant)  # row of the cone of t
-    entries = [
-        *_entries(-program.constraints.tocoo()),
-        (first, width, 1.0),
-        (first + 1, width, 1.0),
-    ]
-    entries += [
-        (first + 2 + i, int(j), float(factor[i, j]))
-        for i in range(len(factor))
-        for j in np.flatnonzero(factor[i])
-    ]
+    entries = [*_entries(-program.constraints.tocoo()), (first, width, 1.0)]
+    entries.append((first + 1, width, 1.0))
+    i, j = np.nonzero(factor)
+    entries += zip((first + 2 + i).tolist(), j.tolist(), factor[i, j].tolist(), strict=True)
     constant = [*program.constant.tolist(), 0.5, -0.5]
     cones = [("L=", program.equalities), *[("Q", 3)] * program.cones, ("Q", quadratic)]
     costs = [*enumerate(program.linear.tolist()), (width, 1.0)]
@@ -153,17 +147,6 @@ def cbf(program: ConeProgram) -> bytes:
         ["BCOORD", *_counted(list(enumerate(constant)))],
     ]
     return "\n\n".join("\n".join(block) for block in blocks).encode() + b"\n"
-
-
-def _factor(quadratic: csc_matrix) -> Array:
-    """F with F'F = P, from eigenvalues: Cholesky's method fails if some of them are 0."""
-    upper = quadratic.toarray()
-    used = np.flatnonzero(upper.diagonal())
-    small = upper[np.ix_(used, used)]
-    values, vectors = np.linalg.eigh(small + np.triu(small, 1).T)
-    factor = np.zeros((len(used), quadratic.shape[0]))
-    factor[:, used] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-    return factor
 
 
 def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:

@@ -262,10 +262,8 @@ def write_programs(
     reasons is raised, a ConvexroughError. Raises FileError if a file cannot be written.
     """
     problem, own = solved(scene, approach, load)
-    about: dict[str, Any] = {}
-    left_out: dict[str, str] = {}
+    about, left_out, written = dict[str, Any](), dict[str, str](), list[Path]()
     last: ConvexroughError = InputError("formats", found=formats, expected="at least one")
-    written: list[Path] = []
     for form in FORMS:
         endings = [ending for ending in WRITERS[form] if ending in formats]
         try:
@@ -316,11 +314,9 @@ def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:
 
 
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
-    """Estimated error of the loads of the bristle program, divided by the largest load.
-
-    With m bristles and the box 0 <= load <= B, the load of one asperity at a given indentation has
-    an error of at most 0.375 B / m^2. Interaction multiplies errors by up to about 1 / lambda, with
-    the smallest of the `scaled_eigenvalues` as lambda.
+    """Estimated error of the loads of the bristle program, divided by the largest load: at most
+    0.375 B / m^2 for one asperity (`solvers.bristles`), times up to about 1 / lambda by
+    interaction, with the smallest of the `scaled_eigenvalues` as lambda.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])

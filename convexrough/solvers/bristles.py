@@ -51,12 +51,7 @@ from convexrough.normal.law import on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.conic import TooDenseError
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.programs import (
-    ProgramAnswer,
-    QuadraticProgram,
-    RawAnswer,
-    run_osqp,
-)
+from convexrough.solvers.programs import ProgramAnswer, QuadraticProgram, RawAnswer, run_osqp
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
@@ -111,11 +106,7 @@ class BristleQP:
         """The name in results and messages."""
         return "bristles + Newton step" if self.newton_step else "bristles"
 
-    def solve(
-        self,
-        problem: NormalProblem,
-        start: Array | None = None,
-    ) -> Solution:
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
         """The solution in scaled units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.invert(self.run(program.apply()))
@@ -132,20 +123,14 @@ class BristleQP:
 
 @dataclass(frozen=True, eq=False)
 class BristleProgram:
-    """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row.
-
-    m       : number of cells in half a row, `BristleQP.bristles`
-    solver  : name of the solver, for error messages
-    box     : (n,) B;  cut : (n,) True where the box was cut to make the program convex
-    hessian : (n, n) A + diag(h), positive definite
-    """
+    """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row."""
 
     problem: NormalProblem
-    m: int
-    solver: str
-    box: Array
-    cut: NDArray[np.bool_]
-    hessian: Array
+    m: int  # number of cells in half a row, `BristleQP.bristles`
+    solver: str  # name of the solver, for error messages
+    box: Array  # (n,) B
+    cut: NDArray[np.bool_]  # (n,) True where the box was cut to make the program convex
+    hessian: Array  # (n, n) A + diag(h), positive definite
 
     @classmethod
     def assemble(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
@@ -211,27 +196,17 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
     approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)))
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
-    box = problem.bounds(approach_bound)
-    box = np.maximum(box, np.minimum(faces, SMALLEST_BOX * box.max()))
-    if (hessian := _positive_definite(problem, box)) is not None:
-        return box, np.zeros(len(box), dtype=bool), hessian
-    cut = faces < box
-    box = np.minimum(box, faces)
-    if (hessian := _positive_definite(problem, box)) is not None:
-        return box, cut, hessian
+    whole = problem.bounds(approach_bound)
+    whole = np.maximum(whole, np.minimum(faces, SMALLEST_BOX * whole.max()))
+    for box in (whole, np.minimum(whole, faces)):
+        h = problem.compliance(box)
+        root = np.sqrt(1.0 / h)
+        scaled = problem.influence.matrix * root * root[:, None]
+        np.fill_diagonal(scaled, 1.0 - MARGIN)
+        if is_definite(scaled):
+            return box, box < whole, problem.influence.matrix + np.diag(h)
     raise SolverError(
         f"the matrix is not positive definite by {MARGIN:g} of its diagonal at S = {LARGEST_S:g}",
         solver=solver,
         advice="try solvers.Conic(), or Newton's method",
     )
-
-
-def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
-    """A + diag(h) for B = `box`; None unless Cholesky's method finds it definite with `MARGIN`."""
-    root = np.sqrt(1.0 / problem.compliance(box))
-    scaled = problem.influence.matrix * root * root[:, None]
-    np.fill_diagonal(scaled, 1.0 - MARGIN)
-    if not is_definite(scaled):
-        return None
-    hessian: Array = problem.influence.matrix + np.diag(problem.compliance(box))
-    return hessian

@@ -34,14 +34,13 @@ from convexrough.sphere import hertz
 #: out of the program. The Newton step can still give them a load. A heuristic: loads are checked.
 NEGLIGIBLE = 1e-12
 
-#: Largest contact radius at the upper end of a box, divided by the contact radius at the a priori
-#: bound on the load. If the box ended at this bound, an isolated asperity would have a slack and a
-#: multiplier that are both 0, and interior-point methods would lose half their digits. A heuristic.
+#: Contact radius at the upper end of a box, divided by that at the a priori bound on the load: at
+#: this bound an isolated asperity would have a slack and a multiplier that are both 0, with which
+#: interior-point methods lose half their digits. A heuristic.
 WIDENED = 1.1
 
-#: With a Newton step: the largest accepted residual of the contact law, divided by |D0| + max |d_i|
-#: with the approach D0 and the offsets d. If the residual is larger after the first step, a second
-#: step follows.
+#: With a Newton step: the largest accepted residual of the contact law (|gap| at loaded asperities,
+#: -gap at others), divided by |D0| + max |d_i|. If it is larger after one step, a second follows.
 ACCURATE = 1e-13
 
 #: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
@@ -88,23 +87,14 @@ class TooDenseError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class ConeBoxes:
-    """The asperities of a cone program, their boxes, and the form of their cones.
+    """The asperities of a cone program, their boxes, and the form of their cones."""
 
-    members : (m,) the asperities in the program, as indices into `problem.candidates`
-    loads   : (m,) B_i, upper ends of the boxes
-    S       : (m,) the numbers S_i of the boxes
-    cut     : (m,) True where B_i is below the a priori bound, the load that the asperity would
-        carry alone (`NormalProblem.bounds`)
-    five    : True for the form with five cones per asperity, False for four
-    limit   : largest S for which this form is exact
-    """
-
-    members: Indices
-    loads: Array
-    S: Array
-    cut: NDArray[np.bool_]
-    five: bool
-    limit: float
+    members: Indices  # (m,) the asperities in the program, as indices into `problem.candidates`
+    loads: Array  # (m,) B_i, upper ends of the boxes
+    S: Array  # (m,) the numbers S_i of the boxes
+    cut: NDArray[np.bool_]  # (m,) True where B_i is below the bound of `NormalProblem.bounds`
+    five: bool  # True for the form with five cones per asperity, False for four
+    limit: float  # largest S for which this form is exact
 
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
@@ -131,10 +121,7 @@ class ConeBoxes:
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The `TooDenseError` for the members with `pressed` > 0.
-
-        pressed : (m,) the `ratios` of these members, and 0 for all others
-        """
+        """The error for the members with `pressed` > 0, which are its `ratios`."""
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -148,12 +135,9 @@ class ConeSolver(ABC):
     newton_step : True to end with a step of Newton's method, which reduces errors of about 1e-8 of
         the largest load to rounding errors; a second step follows if the first is too inaccurate
 
-    With the loads P, gaps g, approach D0, offsets d and D = D0 + d, the checks are as follows. With
-    `newton_step`, |g_i| at loaded asperities and -g_i at all others must be at most 1e-13
-    (|D0| + max |d_i|). Without it, |P_i - P(D_i - (A P)_i)| must be at most 10 sqrt(tolerance)
-    times the largest load, where P(delta) is Hertz's load at the indentation delta. If a check
-    fails, SolverError is raised. If the cut boxes do not contain the solution, TooDenseError is
-    raised.
+    SolverError is raised if loads violate the contact law: with `newton_step` by more than
+    `ACCURATE`, without it by more than `ROOTS` allows. TooDenseError is raised if the cut boxes do
+    not contain the solution.
     """
 
     tolerance: float = 1e-9
@@ -176,11 +160,7 @@ class ConeSolver(ABC):
         """The name in results and messages."""
         return f"{self.formulation} + Newton step" if self.newton_step else self.formulation
 
-    def solve(
-        self,
-        problem: NormalProblem,
-        start: Array | None = None,
-    ) -> Solution:
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
         """The solution in scaled units, by four cones or, if a cut box limits a load, by five.
 
         start : not used
@@ -218,7 +198,12 @@ def judged(
         )
     loads, approach = boxes.to_candidates(problem, answer.loads), answer.approach
     indentation = approach + problem.offsets - problem.influence.apply(loads)  # D - A P
-    if (pressed := _pressed_on(problem, boxes, loads, indentation)).any():
+    wanted = indentation[boxes.members] / hertz.indentation(
+        boxes.loads, problem.coefficients[boxes.members]
+    )
+    limited = boxes.cut & (wanted - 1.0 > 1.0 - loads[boxes.members] / boxes.loads)
+    if limited.any():
+        pressed = np.where(limited, boxes.S * np.sqrt(np.maximum(wanted, 1.0)), 0.0)
         raise boxes.too_dense(problem, solver.name, pressed)
     alone = hertz.load(indentation, problem.coefficients)  # P(D - A P)
     loads = np.where(indentation > 0, loads, 0.0)
@@ -240,26 +225,11 @@ def judged(
     return Solution.of(problem, loads, approach, answer.iterations)
 
 
-def _pressed_on(
-    problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
-) -> Array:
-    """(m,) `TooDenseError.ratios` of members whose load is limited by a cut box; 0 for the others.
-
-    indentation : (n,) D - A P for P = `loads`
-    """
-    k = problem.coefficients[boxes.members]
-    wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
-    room = 1.0 - loads[boxes.members] / boxes.loads
-    stopped = boxes.cut & (wanted - 1.0 > room)
-    return np.where(stopped, boxes.S * np.sqrt(np.maximum(wanted, 1.0)), 0.0)
-
-
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps from `loads`.
-
-    alone : (n,) Hertz's loads at the indentations D - A P for P = `loads`
+    """The solution after one or two Newton steps from P = `loads`, or where better from `alone`,
+    Hertz's loads at the indentations D - A P.
 
     An error e of the loads changes k_i P_i^(2/3) by h_i e_i, with the compliance h_i, and D - A P
     by -A e. So the load `alone` of asperity i is more accurate if h_i exceeds the sum of row i of
@@ -283,9 +253,8 @@ def _after_newton_step(
 
 @dataclass(frozen=True)
 class Conic(ConeSolver):
-    """A solver of the cone program with Clarabel, an interior-point method.
-
-    docs/theory/exact-cones.md derives the program.
+    """A solver of the cone program (docs/theory/exact-cones.md) with Clarabel, an interior-point
+    method.
 
     tolerance      : tolerance of the duality gap and of feasibility, in scaled units
     newton_step    : True to end with one or two Newton steps
@@ -332,9 +301,9 @@ class Conic(ConeSolver):
 class LiftedProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are, in blocks of n, the loads p, then y2 to y5 and z. For each asperity, let
-    t = (p / B)^(1/3), where B is the upper end of the box. Then y2 to y5 stand for t^2 to t^5, and
-    z for t^5 - t^6. The form with five cones, for larger boxes, also has y1 for t, before y2.
+    The variables are, in blocks of n, the loads p, then y2 to y5 for the powers t^2 to t^5 of
+    t = (p / B)^(1/3), with the upper ends B of the boxes, and z for t^5 - t^6. The form with five
+    cones also has y1 for t, before y2.
     """
 
     problem: NormalProblem
@@ -342,8 +311,7 @@ class LiftedProgram:
 
     @classmethod
     def assemble(cls, problem: NormalProblem, boxes: ConeBoxes) -> LiftedProgram:
-        n = len(boxes.members)
-        checks.fits_in_memory("asperities of the cone program", n, 100, power=2)
+        checks.fits_in_memory("asperities of the cone program", len(boxes.members), 100, power=2)
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:

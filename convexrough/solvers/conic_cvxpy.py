@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,38 +22,20 @@ from convexrough.solvers.conic import ConeBoxes, ConeSolver, judged
 from convexrough.solvers.programs import ProgramAnswer, load_library
 from convexrough.solvers.solution import Solution
 
-
-class _Options(NamedTuple):
-    """Names of a solver's options for tolerances and the limit on iterations, and this limit."""
-
-    tolerances: tuple[str, ...]
-    limit: str
-    steps: int
-
-
-#: Options of some of CVXPY's solvers; others keep their own tolerances and limits. Tolerances are
-#: those of primal and dual feasibility and of the duality gap. SCS, a first-order method, needs
-#: thousands of iterations; interior-point methods need about twenty.
+#: Options of some of CVXPY's solvers: names of tolerances of feasibility and of the duality gap,
+#: the name of the limit on iterations, and this limit. Others keep their own. SCS, a first-order
+#: method, needs thousands of iterations; interior-point methods need about twenty.
 OPTIONS = {
-    "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
-    "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
-    "QOCO": _Options(("abstol", "reltol"), "max_iters", 200),
-    "SCS": _Options(("eps_abs", "eps_rel"), "max_iters", 20_000),
+    "CLARABEL": (("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
+    "ECOS": (("abstol", "reltol", "feastol"), "max_iters", 200),
+    "QOCO": (("abstol", "reltol"), "max_iters", 200),
+    "SCS": (("eps_abs", "eps_rel"), "max_iters", 20_000),
 }
 
 
 #: Package names, for `pip`, of CVXPY's solvers with second-order cones.
-PACKAGES = {
-    "CLARABEL": "clarabel",
-    "ECOS": "ecos",
-    "QOCO": "qoco",
-    "SCS": "scs",
-    "CVXOPT": "cvxopt",
-    "MOSEK": "Mosek",
-    "GUROBI": "gurobipy",
-    "COPT": "coptpy",
-    "CPLEX": "cplex",
-}
+PACKAGES = {name: name.lower() for name in (*OPTIONS, "CVXOPT", "CPLEX")}
+PACKAGES |= {"MOSEK": "Mosek", "GUROBI": "gurobipy", "COPT": "coptpy"}
 
 
 @dataclass(frozen=True)
@@ -107,9 +89,10 @@ class ConicCVXPY(ConeSolver):
         """Solve a cvxpy.Problem; return the same object, which then contains the solution."""
         cp = load_library("cvxpy", self.name)
         options: dict[str, float] = {}
-        if names := OPTIONS.get(self.solver):
-            steps = names.steps if self.max_iterations is None else self.max_iterations
-            options = dict.fromkeys(names.tolerances, self.tolerance) | {names.limit: steps}
+        if self.solver in OPTIONS:
+            tolerances, limit, steps = OPTIONS[self.solver]
+            options = dict.fromkeys(tolerances, self.tolerance)
+            options[limit] = steps if self.max_iterations is None else self.max_iterations
         advice = "try more max_iterations, a larger tolerance, or another solver"
         try:
             with warnings.catch_warnings():  # loads are checked in the contact law later
@@ -137,10 +120,8 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
     if solver in able:
         package = PACKAGES.get(solver)
         get = f"pip install {package}" if package else "install it as its documentation says"
-        return (
-            f"{solver} is not installed; CVXPY finds {', '.join(installed)}",
-            f"{get}, or {choice}",
-        )
+        what = f"{solver} is not installed; CVXPY finds {', '.join(installed)}"
+        return what, f"{get}, or {choice}"
     if solver in conic or solver in defines.SOLVER_MAP_QP:
         return f"{solver} has no second-order cones", f"{choice}, or solvers.BristleQP()"
     return f"CVXPY has no solver {solver}", checks.nearest(solver, installed)
@@ -193,23 +174,29 @@ class LiftedModel:
         D0 = cp.Parameter(name="D0")
         D0.value = normal.approach_bound if normal.approach is None else normal.approach
 
-        p, *lift = (cp.Variable(n, name=name) for name in ("p", *_LIFT))
-        _, _, y3, _, y5, z = lift
+        names = ("p", "y1", "y2", "y3", "y4", "y5", "z")
+        p, y1, y2, y3, y4, y5, z = (cp.Variable(n, name=name) for name in names)
         energy = (
             (e * (3 / 5 - S / 3)) @ y5
             + (e * S / 3) @ z
             + cp.quad_form(p, cp.psd_wrap(M)) / 2  # CVXPY's own check fails on some valid M
             - (D0 + d) @ p
         )
+
+        def cone(x: Any, y: Any, w: Any) -> Any:
+            """x y >= w^2"""
+            return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
+
+        cones = [cone(y2 - y3, y4 - y5, y3 - y4), cone(y3, y5, y4), cone(y3 - y4, z, y4 - y5)]
+        if boxes.five:
+            cones += [cone(1 - y1, y2 - y3, y1 - y2), cone(y1 - y2, y3 - y4, y2 - y3)]
+        else:
+            cones.append(cone(np.ones(n), y4, y2))
         link = p == cp.multiply(B, y3)
         total = None if normal.load is None else cp.sum(p) == normal.load
-        constraints = [link, *_cones(cp, *lift, five=boxes.five)]
-        program = cp.Problem(cp.Minimize(energy), constraints + ([] if total is None else [total]))
+        constraints = [link, *cones, *([] if total is None else [total])]
+        program = cp.Problem(cp.Minimize(energy), constraints)
         return cls(settings, normal, boxes, program, D0, p, link, total)
-
-    def invert(self, raw: Any) -> ProgramAnswer:
-        """The loads, from the variable p, and the approach, from D0 or the multiplier."""
-        return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     def solve(self, approach: float | None = None) -> Solution:
         """The solution of the program, which is compiled only once.
@@ -234,6 +221,10 @@ class LiftedModel:
         """The loads and the approach that the solver returns for the current program."""
         return self.invert(self.settings.run(self.program))
 
+    def invert(self, raw: Any) -> ProgramAnswer:
+        """The loads, from the variable p, and the approach, from D0 or the multiplier."""
+        return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
+
     @property
     def variables(self) -> dict[str, Any]:
         """The variables by name: p, y2 to y5 and z; with five cones also y1."""
@@ -254,20 +245,3 @@ class LiftedModel:
         """(m,) gaps of the latest solution in scaled units, from the multipliers of `link`."""
         gaps: Array = np.maximum(-self.link.dual_value, 0.0)
         return gaps
-
-
-_LIFT = ("y1", "y2", "y3", "y4", "y5", "z")
-
-
-def _cones(cp: Any, y1: Any, y2: Any, y3: Any, y4: Any, y5: Any, z: Any, *, five: bool) -> Any:
-    def rotated(x: Any, y: Any, w: Any) -> Any:
-        return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
-
-    cones = [
-        rotated(y2 - y3, y4 - y5, y3 - y4),
-        rotated(y3, y5, y4),
-        rotated(y3 - y4, z, y4 - y5),
-    ]
-    if five:
-        return [*cones, rotated(1 - y1, y2 - y3, y1 - y2), rotated(y1 - y2, y3 - y4, y2 - y3)]
-    return [*cones, rotated(np.ones(y4.size), y4, y2)]

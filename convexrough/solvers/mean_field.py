@@ -46,7 +46,7 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
 def _mean_field(problem: NormalProblem) -> Array:
     count = max(4, min(RINGS, len(problem) // LEAST))
     # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
-    squares = problem.squares
+    squares = problem.scene.asperities.distances[problem.candidates] ** 2  # not kept in memory
     limits = float(squares.max()) * np.linspace(0.0, 1.0, count + 1)
     edges, middle = np.sqrt(limits), np.sqrt((limits[1:] + limits[:-1]) / 2.0)
     some = slice(None, None, max(1, len(problem) // SAMPLE))

@@ -9,7 +9,7 @@ found to be open.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -45,24 +45,16 @@ MARGIN = 0.03
 
 @dataclass(frozen=True)
 class Pressing:
-    """The contact law, in the form of `convex.newton`: docs/theory/newton.md, "The normal map".
-
-    problem  : the asperities of the iteration, perhaps only those near the contact
-    farthest : max |d_i| over all asperities that could touch
-    """
+    """The contact law of the asperities of an iteration, in the form of `convex.newton`."""
 
     problem: NormalProblem
-    farthest: float
+    farthest: float  # max |d_i| over all asperities that could touch
 
     solver: ClassVar[str] = "newton"
     unit: ClassVar[str] = "the approach"
 
     def evaluate(self, unknown: Array) -> newton.Iterate | None:
-        """The state at `unknown`, by `Pressed.at`.
-
-        If a total load is prescribed, the loads are scaled to it. The state is then None if no
-        indentation is positive.
-        """
+        """The state by `Pressed.at`; None under a prescribed load if no indentation is positive."""
         problem, total = self.problem, 0.0
         if problem.approach is not None:
             unknown = np.minimum(unknown, problem.approach + problem.offsets)
@@ -73,27 +65,23 @@ class Pressing:
             total = at.approach * problem.load
         energy = float(at.loads @ (at.gap - 0.4 * at.own - 0.5 * at.displacement)) + total
         residual, scale = float(np.abs(at.defect).max()), float(abs(at.approach)) + self.farthest
-        return newton.Iterate(at.unknown, at.loads, at.defect, energy, residual, scale, at)
-
-    def direction(self, state: newton.Iterate, left: float) -> Array:
-        return correct(
-            self.problem.influence,
-            self.problem.shells,
-            np.sqrt(state.at.slopes),  # the diagonal of W in (1) of docs/theory/newton.md
-            state.defect,
-            balanced=self.problem.by_load,
-            tolerance=left,
+        return newton.Iterate(
+            unknown=at.unknown,
+            forces=at.loads,
+            defect=at.defect,
+            gradient=at.gap,
+            energy=energy,
+            rounding=SAFETY * float(at.loads.sum()) * scale,
+            residual=residual,
+            scale=scale,
+            noise=problem.influence.rounding(at.loads).negligible(at.displacement),
+            at=at,
         )
 
-    def gradient(self, state: newton.Iterate) -> Array:
-        """The gradient of the energy: the gap."""
-        return np.asarray(state.at.gap)
-
-    def energy_rounding(self, state: newton.Iterate) -> float:
-        return SAFETY * float(state.forces.sum()) * state.scale
-
-    def noise(self, state: newton.Iterate) -> float:
-        return self.problem.influence.rounding(state.forces).negligible(state.at.displacement)
+    def direction(self, state: newton.Iterate, left: float) -> Array:
+        problem, root = self.problem, np.sqrt(state.at.slopes)
+        matrices = problem.influence, problem.shells
+        return correct(*matrices, root, state.defect, balanced=problem.by_load, tolerance=left)
 
     def advice(self, state: newton.Iterate) -> str:
         """What to try, which depends on the convexity number where the method stopped."""
@@ -135,11 +123,7 @@ class Newton:
         checks.non_negative("tolerance", self.tolerance)
         checks.whole("max_iterations", self.max_iterations)
 
-    def solve(
-        self,
-        problem: NormalProblem,
-        start: Array | None = None,
-    ) -> Solution:
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
         """The solution in scaled units; `start` (n,) are initial loads >= 0, or None.
 
         Raises SolverError after `max_iterations`, and if no step lowers the energy.
@@ -149,8 +133,7 @@ class Newton:
             trial = refined(problem, trial).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
-        refine = not self.tolerance > 0
-        return Solution.of(problem, loads, approach, iterations, refine=refine)
+        return Solution.of(problem, loads, approach, iterations, refine=self.tolerance <= 0)
 
     def _found(
         self, problem: NormalProblem, start: Array | None
@@ -169,8 +152,9 @@ class Newton:
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            refines = self._refines(problem)
-            trial = trial_of(problem, loads, problem.pressed_product) if refines else None
+            trial = None
+            if self._refines(problem):
+                trial = trial_of(problem, loads, problem.pressed_product)
             if len(near) == len(problem):
                 return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
@@ -188,23 +172,17 @@ class Newton:
         return problem.influence.cheap_sums and not self.tolerance > 0
 
     def _iterate(
-        self,
-        problem: NormalProblem,
-        near: Indices,
-        indentation: Array,
+        self, problem: NormalProblem, near: Indices, indentation: Array
     ) -> tuple[newton.Iterate, int]:
         """The solution in which only the asperities `near` carry loads, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
-        law = Pressing(part, float(np.abs(problem.offsets).max()))
-
-        stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
+        law, left = Pressing(part, float(np.abs(problem.offsets).max())), 0.0
+        if self._refines(problem):  # refinement makes the remaining linear correction
+            left = NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
         try:
             state = law.evaluate(indentation)
             assert state is not None  # an asperity is loaded at the start
-            if self._refines(problem):  # refinement makes the remaining linear correction
-                size = float(np.linalg.norm(np.maximum(indentation, 0.0)))
-                stopping = replace(stopping, linear=NEGLIGIBLE * size)
-            return newton.solve(law, state, stopping)
+            return newton.solve(law, state, ACCURATE, self.tolerance, self.max_iterations, left)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))

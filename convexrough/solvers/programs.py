@@ -1,8 +1,8 @@
 """Optimisation programs in standard form, their solution by libraries, and the answers.
 
-`apply` of a reduction such as `conic.LiftedProgram` converts a contact problem to a program, and
-`invert` converts the answer back, as in cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control
-Decis. 5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
+A reduction such as `conic.LiftedProgram` converts a contact problem to a program by `apply`, and
+the answer back by `invert`, as in cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis.
+5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ class ConeProgram(NamedTuple):
     """minimise (1/2) x'P x + q'x  subject to  A x + s = b,  over x and s.
 
     The first `equalities` entries of s are 0. Each further group of three entries lies in a
-    second-order cone, s_1 >= || (s_2, s_3) ||. P is symmetric, and only its upper triangle is
-    stored.
+    second-order cone, s_1 >= || (s_2, s_3) ||.
     """
 
     quadratic: csc_matrix  # P, upper triangle
@@ -56,12 +55,11 @@ class ConeProgram(NamedTuple):
         nothing = sparse.csr_array((rows - self.equalities, len(used)))
         quadratic = sparse.block_diag((upper[used][:, used], sparse.csc_array((rows, rows))))
         stationary = sparse.hstack((whole, self.constraints.T))
+        constraints = sparse.vstack((stationary, sparse.hstack((nothing, -in_cones))))
         return ConeProgram(
             quadratic=sparse.csc_matrix(quadratic),
             linear=np.concatenate((np.zeros(len(used)), self.constant)),
-            constraints=sparse.csc_matrix(
-                sparse.vstack((stationary, sparse.hstack((nothing, -in_cones))))
-            ),
+            constraints=sparse.csc_matrix(constraints),
             constant=np.concatenate((-self.linear, np.zeros(rows - self.equalities))),
             equalities=len(self.linear),
         )
@@ -81,8 +79,7 @@ class QuadraticProgram(NamedTuple):
     upper: Array
 
     def __repr__(self) -> str:
-        size = f"{len(self.linear):,} variables, {len(self.lower):,} rows"
-        return f"QuadraticProgram: {size}"
+        return f"QuadraticProgram: {len(self.linear):,} variables, {len(self.lower):,} rows"
 
 
 class RawAnswer(NamedTuple):
@@ -127,25 +124,20 @@ def run_clarabel(
     *data, equalities = program
     cones = [clarabel.ZeroConeT(equalities), *[clarabel.SecondOrderConeT(3)] * program.cones]
     method = clarabel.DefaultSolver(*data, cones, chosen)
-    method.set_termination_callback(_goes_on)
+
+    def logged(info: Any) -> bool:
+        residual = max(info.res_primal, info.res_dual, info.gap_rel)
+        log_step("clarabel", info.iterations, info.cost_primal, residual)
+        return False  # tells Clarabel to continue
+
+    method.set_termination_callback(logged)
     found = method.solve()
     raw = RawAnswer(np.array(found.x), np.array(found.z), int(found.iterations), str(found.status))
     return _of_numbers(raw, "Clarabel", solver)
 
 
-def _goes_on(info: Any) -> bool:
-    """Log a step of Clarabel. The result, False, tells Clarabel to continue."""
-    residual = max(info.res_primal, info.res_dual, info.gap_rel)
-    log_step("clarabel", info.iterations, info.cost_primal, residual)
-    return False
-
-
 def run_osqp(
-    program: QuadraticProgram,
-    solver: str,
-    tolerance: float,
-    max_iterations: int,
-    verbose: bool = False,
+    program: QuadraticProgram, solver: str, tolerance: float, max_iterations: int, verbose: bool
 ) -> RawAnswer:
     """The answer of OSQP, a first-order method with a final solution on the active set."""
     osqp = load_library("osqp", solver)
@@ -154,14 +146,8 @@ def run_osqp(
         raise SolverError(what, solver=solver, advice='pip install "osqp>=1.0"')
     method = osqp.OSQP()
     try:
-        method.setup(
-            *program,
-            verbose=verbose,
-            polishing=True,
-            eps_abs=tolerance,
-            eps_rel=tolerance,
-            max_iter=max_iterations,
-        )
+        limits = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": max_iterations}
+        method.setup(*program, verbose=verbose, polishing=True, **limits)
         found = method.solve(raise_error=True)
     except osqp.OSQPException as error:
         reasons = {int(status): status.name for status in osqp.SolverStatus}

@@ -70,15 +70,9 @@ class Solver(Protocol):
     @property
     def name(self) -> str:
         """The name in results and messages."""
-        ...
 
-    def solve(
-        self,
-        problem: NormalProblem,
-        start: Array | None = None,
-    ) -> Solution:
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
         """The solution of `problem`, in its scaled units (docs/how-to/solvers.md).
 
         start : (n,) initial loads of the asperities of `problem`, not negative; None: no estimate
         """
-        ...

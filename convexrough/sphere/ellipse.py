@@ -11,15 +11,13 @@ import numpy as np
 
 from convexrough.arrays import Number
 
-#: Number of steps of the secant method.
+#: Number of steps of the secant method, which reach the accuracy of float64.
 STEPS = 5
 
 
 def slenderness(ratio: Number) -> Number:
-    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1.
-
-    The logarithm of Rx / Ry is nearly linear in that of b / a, so `STEPS` steps of the secant
-    method reach the accuracy of float64.
+    """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1, by the
+    secant method in logarithms, in which Rx / Ry and b / a are nearly linear.
     """
     from scipy.special import elliprd
 

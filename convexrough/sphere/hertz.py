@@ -60,9 +60,8 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
 def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
     """The sum of both surfaces' normal displacements at a distance r from the axis (Johnson, 3.42).
 
-    The sum is a^2/R - r^2/(2R) inside the contact. Outside, the sum is
-    (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)], which equals
-    r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
+    It is a^2/R - r^2/(2R) inside the contact. Outside it is (1/(pi R)) [(2 a^2 - r^2) asin(a/r) +
+    a sqrt(r^2 - a^2)], which equals r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
     a, r = contact_radius, np.asarray(distance, dtype=np.float64)
     outer = np.maximum(r, a)

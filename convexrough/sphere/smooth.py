@@ -1,9 +1,8 @@
 """`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
-The smooth sphere is the scene's sphere, pressed with the same load on a plane without asperities.
-The theory is that of Hertz for the normal load, and that of Cattaneo, Mindlin and Deresiewicz for
-shear. Displacements and losses are sums over both bodies. Source: Johnson, Contact Mechanics
-(1985), chapters 4 and 7; and Dini and Hills (2009), equations 12 to 16, for one of the bodies.
+It is the scene's sphere, pressed with the same load on a plane without asperities. Displacements
+and losses are sums over both bodies. Source: Johnson, Contact Mechanics (1985), chapters 4 and 7;
+and Dini and Hills (2009), equations 12 to 16, for one of the bodies.
 """
 
 from __future__ import annotations
@@ -124,10 +123,8 @@ class SmoothSphere(Record):
         For Q >= 0 it is f p0 [sqrt(1 - r^2/a_H^2) - (c/a_H) sqrt(1 - r^2/c^2)], where the last root
         counts as 0 for r > c. The force -Q gives the opposite traction.
         """
-        peak = self._friction * self.peak_pressure
-        return surface_shear.traction(
-            distance, self.contact_radius, self._share("force", force), peak
-        )
+        share, peak = self._share("force", force), self._friction * self.peak_pressure
+        return surface_shear.traction(distance, self.contact_radius, share, peak)
 
     def displacement(self, force: ArrayLike) -> Any:
         """[length] displacement along the shear after loading from rest.
@@ -147,11 +144,8 @@ class SmoothSphere(Record):
         first = self.displacement(turning)
         given = np.asarray(force, dtype=np.float64)
         if not (np.abs(given) <= abs(turning)).all():
-            raise InputError(
-                "force",
-                found=given.flat[np.abs(given).argmax()],
-                expected=f"at most the turning force {abs(turning):.17g} in size",
-            )
+            expected = f"at most the turning force {abs(turning):.17g} in size"
+            raise InputError("force", found=given.flat[np.abs(given).argmax()], expected=expected)
         return first - 2.0 * self.displacement((turning - given) / 2.0)
 
     def energy(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Any:

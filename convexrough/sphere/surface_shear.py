@@ -58,9 +58,8 @@ def surface_displacement(
     bracket is computed from the angle phi_a - phi_c by the addition theorems of sine and cosine.
     """
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
-    slip_area = a_squared * np.abs(
-        mindlin.deflection(share)
-    )  # a^2 - c^2; all areas here are divided by pi
+    # a^2 - c^2; all areas here are divided by pi
+    slip_area = a_squared * np.abs(mindlin.deflection(share))
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
     sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a)

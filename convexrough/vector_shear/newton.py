@@ -62,8 +62,7 @@ class FrictionNewton:
                 solver=law.solver,
                 advice=advice(problem, size),
             )
-        stopping = newton.Stopping(self.tolerance, 0.0, self.max_iterations)
-        state, iterations = newton.solve(law, start, stopping)
+        state, iterations = newton.solve(law, start, self.tolerance, 0.0, self.max_iterations)
         size_of = np.hypot(*state.unknown.T)
         beyond = np.maximum(size_of - problem.thresholds, 0.0)
         slips = along(beyond, state.unknown, size_of)
@@ -73,7 +72,6 @@ class FrictionNewton:
 class _At(NamedTuple):
     """Values at a state that are not among the fields of `newton.Iterate`."""
 
-    coupling: Array  # (n, 2) B q
     roots: Array  # (n, 2, 2) W
     displacement: Array  # (2,) the best estimate of X; its size is the scale of residuals
 
@@ -104,27 +102,26 @@ class _Friction:
         displacement = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
         defect = moved - displacement
         residual = float(np.hypot(*defect.T).max())
-        energy = problem.energy(q, coupling)
-        scale, at = float(np.hypot(*displacement)), _At(coupling, roots, displacement)
-        return newton.Iterate(shifted, q, defect, energy, residual, scale, at)
+        energy, scale = problem.energy(q, coupling), float(np.hypot(*displacement))
+        size = np.hypot(*shifted.T)
+        own = along(np.minimum(size, problem.thresholds), shifted, size)
+        return newton.Iterate(
+            unknown=shifted,
+            forces=q,
+            defect=defect,
+            gradient=np.asarray(own + coupling - displacement),
+            energy=energy,
+            # Near gross sliding X is large, and so is the effect of rounding in the total.
+            rounding=SAFETY * energy + 1e-14 * float(np.hypot(*self.total)) * scale,
+            residual=residual,
+            scale=scale,
+            noise=ROUNDOFF * scale,  # ends the iteration on symmetric layouts
+            at=_At(roots, displacement),
+        )
 
     def direction(self, state: newton.Iterate, left: float) -> Array:
         """The Newton step. The linear system is solved directly, so `left` is not used."""
         return _direction(self.problem, state)
-
-    def gradient(self, state: newton.Iterate) -> Array:
-        size = np.hypot(*state.unknown.T)
-        bearable = np.minimum(size, self.problem.thresholds)
-        own = along(bearable, state.unknown, size)
-        return np.asarray(own + state.at.coupling - state.at.displacement)
-
-    def energy_rounding(self, state: newton.Iterate) -> float:
-        # Near gross sliding X is large, and so is the effect of rounding in the total.
-        return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
-
-    def noise(self, state: newton.Iterate) -> float:
-        """A lower bound on the rounding error of F. It ends the iteration on symmetric layouts."""
-        return ROUNDOFF * state.scale
 
     def advice(self, state: newton.Iterate) -> str:
         return advice(self.problem, float(np.hypot(*self.total)))

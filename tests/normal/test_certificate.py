@@ -158,11 +158,10 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
     radii[touching] = 1e-3 * rng.uniform(0.6, 0.75, len(touching))
     problem = NormalProblem.assemble(scene, approach=1e-3, influence=operator)
     loads = 4 / 3 * radii**3 / scene.relative_radii / problem.units.force
-    boxes = list(tried(problem, loads, problem.plain_product(Pair.exact(loads))))
+    boxes = [tried(problem, loads, problem.plain_product(Pair.exact(loads)))]
     for room in (0.0, 0.1):
-        touching = box_of_touching(problem, loads, loads > 0, room * loads)
-        boxes += [] if touching is None else [touching]
-    for box in boxes:
+        boxes.append(box_of_touching(problem, loads, loads > 0, room * loads))
+    for box in filter(None, boxes):
         root = 1 / np.sqrt(box.compliance)  # 0 where fixed open
         hessian = np.eye(len(scene)) + root[:, None] * problem.influence.matrix * root
         assert np.linalg.eigvalsh(hessian)[0] >= 1 - box.convexity_number - 1e-12

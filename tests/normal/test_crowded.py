@@ -165,12 +165,13 @@ def test_overlapping_shells(seed: int, count: int, width: float) -> None:
     pairs = overlaps(points, lengths, radii)
     if pairs is None:
         return
+    indices, values, _ = pairs
     apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
     meet = np.triu(np.add.outer(radii, radii) > apart, 1)
-    assert len(pairs.first) == len(pairs.second) == meet.sum()
-    assert (meet | meet.T)[pairs.first, pairs.second].all()
+    assert len(indices[0]) == len(indices[1]) == meet.sum()
+    assert (meet | meet.T)[indices].all()
     S = np.diag(1 - lengths / radii)
-    S[pairs.first, pairs.second] = S[pairs.second, pairs.first] = pairs.values
+    S[indices] = S[indices[::-1]] = values
     hessian = scaled(lengths, points)
     assert np.linalg.eigvalsh(hessian - S)[0] >= -1e-12 * hessian.max()
     least = float(np.linalg.eigvalsh(hessian)[0])
