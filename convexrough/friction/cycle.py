@@ -13,35 +13,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Point
-from convexrough.friction.levels import FrictionLevels, rounded
-from convexrough.friction.loop import Loop, loop_through
-from convexrough.friction.loss import losses, shared, trapezoid_loss
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.loss import shared
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.state import (
-    LevelSums,
-    by_status,
-    displacements_of,
-    stick_radii,
-)
-from convexrough.friction.walk import Closed
+from convexrough.friction.state import states_of
+from convexrough.friction.walk import Closed, Walk
 from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
-from convexrough.sphere import mindlin
-from convexrough.sphere.smooth import smooth_reference
 
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
@@ -240,89 +231,40 @@ class Cycle(Table, Plottable):
         return loops([self], points, asperities)[0]
 
 
-def steady_cycles(
-    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]]
-) -> list[Cycle]:
-    """The steady cycles of several closed paths (P, T) that begin from the same memory curve."""
-    levels = contact.cached(FrictionLevels)
-    closed = [Closed.around(levels, start, points) for points in paths]
-    levels.prepare(load for each in closed for load in each.needed)
-    for needed in sorted((each.needed for each in closed), key=min):
-        levels.order(needed)  # a proof for the widest range of loads holds for the others
-    spent = losses(levels, [pieces for each in closed for pieces in each.cycles]) * levels.loss_unit
-    moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
-    ends = np.cumsum([0, *map(len, paths)]).tolist()
-    return [
-        _cycle(contact, closed[k], spent[2 * k : 2 * k + 2], moved[start:stop])
-        for k, (start, stop) in enumerate(pairwise(ends))
-    ]
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Table):
+    """Points of a closed loop, from the largest shear force to the smallest and back.
 
+    asperities    : (k,) indices of the asperities whose own loops are given
+    forces        : (m,) [force] shear force
+    displacements : (m,) [length] relative tangential displacement of distant points of the two
+        bodies
+    asperity_forces : (m, k) [force] shear force on each of these asperities
+    asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
+        own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md
 
-def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
-    """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
-    levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
-    (first, loss), (first_error, error) = rounded(spent)
-    half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
-    amplitude, amplitude_error = (float(part) for part in rounded(half))
-    rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
-    lost, kept = top.touching & bottom.open, bottom.touching
-    statuses = {
-        "intermittent": lost,
-        "sliding": kept & rest.open,
-        "partial" if closed.cycles[1] else "stuck": rest.touching & top.touching,
+    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
+    >>> len(loop.forces), loop.asperity_forces.shape
+    (101, (101, 61))
+    """
+
+    _shown = ("area",)
+    _along: ClassVar[Along] = {
+        ("point",): ("forces", "displacements"),
+        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+        ("asperity",): ("asperities",),
     }
-    doubtful = levels.to_scene((kept & rest.open) | ~(rest.touching | rest.open))
-    slips, slip_errors = rounded(
-        (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
-    )
-    slip_errors = np.where(doubtful, slip_errors, 0.0)
-    radii, radius_errors = stick_radii(levels, rest)
-    loaded, heights = zip(*closed.points[: closed.once], strict=True)
-    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    defect = smooth = np.nan
-    if set(loaded) == {levels.load}:
-        other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
-        defect = abs(float(other.value) - loss) / (loss or 1.0)
-        if reference:
-            smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
-    if order != "proved":
-        error = first_error = np.inf
-    if order == "fails":
-        amplitude_error, statuses = np.inf, {}
-        slip_errors, radius_errors = (np.full(len(slips), np.inf) for _ in range(2))
-    if closed.general is not None:
-        first, both = closed.general.losses[[closed.once, -1]]
-        loss, defect = both - first, np.nan
-        amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
-    found = Cycle(
-        contact=contact,
-        loads=frozen(np.array([float(load) for load in loaded])),
-        forces=closed.forces[: closed.once],
-        loss=float(loss),
-        loss_error=float(error),
-        loss_first=float(first),
-        loss_first_error=float(first_error),
-        status=by_status(levels, top, **statuses),
-        slips=frozen(
-            np.where(levels.to_scene(lost), np.nan, np.where(levels.to_scene(kept), slips, 0.0))
-        ),
-        slip_errors=frozen(slip_errors),
-        stick_radii=radii,
-        stick_radius_errors=frozen(radius_errors),
-        level=float(stuck),
-        force_level=float(levels.coefficient.value) * float(stuck_height),
-        balance_defect=defect,
-        loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
-        smooth_normalised=smooth,
-        displacement_amplitude=amplitude,
-        displacement_error=amplitude_error,
-        order=order,
-        presses=levels.presses,
-        start=float(closed.start.load),
-        heights=heights,
-    )
-    found.__dict__["_walk"] = closed  # the cached property would follow the path again
-    return found
+
+    asperities: Indices
+    forces: Array
+    displacements: Array
+    asperity_forces: Array
+    asperity_displacements: Array
+
+    @property
+    def area(self) -> float:
+        """[force length] area of the polygon through the points, a little less than the loss."""
+        return float(np.trapezoid(self.forces, self.displacements))
 
 
 def loops(
@@ -347,17 +289,31 @@ def loops(
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
     chosen = indices("asperities", asperities, len(contact.scene))
+    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    loaded = levels.to_scene(levels.top.loads.value > 0)[chosen]
     widest = max(each.force_amplitude for each in cycles)
     way = (widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:]).tolist()
-    levels = contact.cached(FrictionLevels)
-    return [
-        loop_through(
-            levels,
-            max(each.heights),
-            min(each.heights),
-            [w for w in way if w < each.force_amplitude],
-            chosen,
-            by_steps=each.order == "fails" and levels.proved,
+    found = list[Loop]()
+    for each in cycles:
+        top, bottom = max(each.heights), min(each.heights)
+        drops = [min(2 * Fraction(w) / f, top - bottom) for w in way if w < each.force_amplitude]
+        drops.append(top - bottom)
+        LOGGER.info(f"computing {len(drops)} levels of a loop")
+        heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]
+        path = [(levels.load, height) for height in (top, bottom, *heights)]
+        walk = Walk(levels, MemoryCurve.pressed(levels.load), path, steps=1)
+        if each.order == "fails" and levels.proved:
+            states, some = walk.states(), chosen
+        else:
+            states, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
+        forces, displacements = states.forces.value, states.asperity_displacements.value
+        found.append(
+            Loop(
+                chosen,
+                walk.forces[2:],
+                frozen(states.displacements.value[2:]),
+                frozen(np.where(loaded, forces[2:, some], 0.0)),
+                frozen(np.where(loaded, displacements[2:, some], 0.0)),
+            )
         )
-        for each in cycles
-    ]
+    return found
