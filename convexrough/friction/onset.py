@@ -1,9 +1,9 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
-P is the load, Q the shear force and f the coefficient of friction. The onset of asperity i is the
-total load L at which its indentation n_i(L) rises to 0. On first loading the asperity slides once
-P - Q / f is below its onset. Newton's method computes the onset. Two proofs enclose it: the
-asperity is open at a slightly smaller load, and it touches at a slightly larger load.
+The onset of an asperity is the load at which its indentation rises to 0. On first loading it slides
+once P - Q / f is below its onset (load P, shear force Q, coefficient of friction f). Newton's method
+computes the onset; proofs that the asperity is open at a slightly smaller load and touches at a
+slightly larger load enclose it.
 """
 
 from __future__ import annotations
@@ -36,12 +36,9 @@ STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """The load at which an asperity first touches, and two loads [force] below and above it.
+    """Loads [force] between which an asperity first touches, if no indentation falls on the way."""
 
-    If no indentation falls as the load rises, the first touch is proved to be between the two.
-    """
-
-    load: Fraction
+    load: Fraction  # at which it first touches, as computed
     lower: Fraction  # proved open at this load; 0 if none is proved
     upper: Fraction  # proved to touch at this load; P if no lower load is proved
 
@@ -69,8 +66,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     checks.instance("contact", contact, Contact)
     f = Fraction(checks.friction(contact.scene.friction))
     asked = indices("which", which, len(contact.scene))
-    onsets = np.full(len(asked), np.nan)
-    loaded = np.flatnonzero(contact.loads[asked])
+    onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(contact.loads[asked])
     if len(loaded) == 0:
         return frozen(onsets)
     levels = contact.cached(FrictionLevels)
@@ -81,11 +77,11 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
             expected=f"at most {MOST_ONSETS}: for each, several normal problems are solved",
         )
     found = enclosed(levels, asked[loaded].tolist())
-    lowest = min(each.load for each in found.values())
-    ordered = levels.order([lowest]) != "fails"
-    for k, i in zip(loaded.tolist(), asked[loaded].tolist(), strict=True):
-        if ordered or levels.order([found[i].load]) != "fails":
-            onsets[k] = float(f * (levels.load - found[i].load))
+    ordered = levels.order([min(each.load for each in found.values())]) != "fails"
+    for k in loaded.tolist():
+        load = found[int(asked[k])].load
+        if ordered or levels.order([load]) != "fails":
+            onsets[k] = float(f * (levels.load - load))
     return frozen(onsets)
 
 
@@ -116,15 +112,12 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
     if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
-    known = [load for load in levels.known if depth(load) > 0]
-    low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)
+    high = min(load for load in levels.known if depth(load) > 0)
+    low = max((load for load in levels.known if depth(load) <= 0), default=Fraction(0))
     here = min((low, high), key=lambda s: abs(depth(s))) if low else high
     for _ in range(STEPS):
         value = depth(here)
-        if value > 0:
-            high = min(high, here)
-        else:
-            low = max(low, here)
+        low, high = (low, min(high, here)) if value > 0 else (max(low, here), high)
         try:
             rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
             step = Fraction(value / rate)

@@ -1,7 +1,6 @@
-"""`load_path` computes friction states along a path of load P and shear force Q.
+"""Friction states along a path of load P and shear force Q: `load_path`; at constant P: `history`.
 
-`history` does so at constant P. With the coefficient of friction f, the points of a path are
-(P, T) with T = Q / f; `walk.Walk` follows them.
+With the coefficient of friction f, `walk.Walk` follows the points (P, T), where T = Q / f.
 """
 
 from __future__ import annotations
@@ -171,7 +170,9 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, general_steps)
+    if general_steps is not None:
+        checks.whole("general_steps", general_steps)
+    return path_of(*walk_of(scene, loads, forces, start, influence, general_steps))
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
@@ -194,23 +195,20 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     checks.some("forces", Q)
     levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
-    return _path(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
+    return path_of(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
 
 
-def walk(
+def walk_of(
     scene: Scene,
     loads: ArrayLike,
     forces: ArrayLike,
-    start: Contact | None = None,
-    influence: Kind | None = None,
-    general_steps: int | None = None,
+    start: Contact | None,
+    influence: Kind | None,
+    steps: int | None,
     stepper: type[Stepper] = Stepper,
-) -> LoadPath:
-    """The result of `load_path`; `stepper` is the solver of the general steps."""
-    points = points_of(scene, loads, forces)
-    if general_steps is not None:
-        checks.whole("general_steps", general_steps)
-    curve = MemoryCurve()
+) -> tuple[Contact, Walk]:
+    """The contact at the highest load of a path, and the path; arguments as in `load_path`."""
+    points, curve = points_of(scene, loads, forces), MemoryCurve()
     if start is not None:
         checks.instance("start", start, Contact)
         if start.scene is not scene:
@@ -218,8 +216,7 @@ def walk(
             raise InputError("start", found="a contact of another scene", expected=expected)
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
-    levels = contact.cached(FrictionLevels)
-    return _path(contact, Walk(levels, curve, points, general_steps, stepper))
+    return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
 
 
 def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
@@ -236,26 +233,24 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
     """The checked points (P, T = Q / f), as exact fractions."""
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
-    P = checks.array("loads", loads, sign="not negative")
-    Q = checks.array("forces", forces)
+    P, Q = checks.array("loads", loads, sign="not negative"), checks.array("forces", forces)
     if len(P) == 0 or len(P) != len(Q):
         found = f"{len(P)} loads and {len(Q)} forces"
         raise InputError("loads, forces", found=found, expected="equal numbers, at least one")
-    bare = (P == 0) & (Q != 0)
-    if bare.any():
-        k = int(np.argmax(bare))
+    if len(bare := np.flatnonzero((P == 0) & (Q != 0))):
         expected = "0 at a load of 0: shear must end before contact is lost"
-        raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
+        raise InputError(f"forces[{bare[0]}]", found=Q[bare[0]], expected=expected)
     checks.bearable("forces", Q, f * P)
     pairs = zip(map(Fraction, P.tolist()), Q.tolist(), strict=True)
     return [(load, height_at(load, force, scene)) for load, force in pairs]
 
 
-def _path(contact: Contact, walk: Walk) -> LoadPath:
+def path_of(contact: Contact, walk: Walk) -> LoadPath:
+    """The result for a path whose highest load is that of the contact."""
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
     (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
-    (displacements, displacement_errors), (asperity_forces, force_errors), *others = found
+    (displacements, displacement_errors), (asperity_forces, force_errors), own, drifts = found
     rows = levels.rows(points)
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
     return LoadPath(
@@ -270,8 +265,8 @@ def _path(contact: Contact, walk: Walk) -> LoadPath:
         asperity_forces=asperity_forces,
         asperity_force_errors=force_errors,
         asperity_loads=frozen(levels.to_scene(rows.loads.value * levels.units.force)),
-        asperity_displacements=others[0][0],
-        drifts=others[1][0],
+        asperity_displacements=own[0],
+        drifts=drifts[0],
         fronts=frozen(np.array(fronts)),
         status=walk.status(),
         curves=tuple(walk.curves),

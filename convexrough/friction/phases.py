@@ -1,14 +1,11 @@
-"""Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude.
-
-A smooth path is replaced by chords between some of its points. Among these points are the extremes
-of P, P + Q/f and P - Q/f, with the load P, the shear force Q and the coefficient of friction f.
-"""
+"""Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise, product
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,22 +58,20 @@ def elliptic_path(
     (12, 1.5)
     """
     checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200)
-    p, q = (
-        checks.finite("load_amplitude", load_amplitude),
-        checks.finite("force_amplitude", force_amplitude),
-    )
-    t = q / checks.positive("friction", friction)
-    phase = checks.phase("phase", phase)
+    p = checks.finite("load_amplitude", load_amplitude)
+    q = checks.finite("force_amplitude", force_amplitude)
+    t, phase = q / checks.positive("friction", friction), checks.phase("phase", phase)
     across, along = t * np.cos(phase), t * np.sin(phase)
     corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
     halves = np.sort(np.mod(corners, np.pi))
     ends = np.append(np.concatenate((halves, halves + np.pi)), halves[0] + 2 * np.pi)
-    arcs = [
-        np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
-        for a, b in pairwise(ends)
-        if b - a > 1e-9
-    ]
-    angles = np.concatenate(arcs)
+    angles = np.concatenate(
+        [
+            np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
+            for a, b in pairwise(ends)
+            if b - a > 1e-9
+        ]
+    )
     loads = checks.finite("load", load) + p * np.cos(angles)
     forces = checks.finite("force", force) + q * np.sin(angles + phase)
     return frozen(loads), frozen(forces)
@@ -163,51 +158,43 @@ def phase_losses(
     """
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
-    load_amplitude = checks.finite("load_amplitude", load_amplitude)
-    force_amplitude = checks.finite("force_amplitude", force_amplitude)
+    swing = checks.finite("load_amplitude", load_amplitude)
+    shear = checks.finite("force_amplitude", force_amplitude)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     checks.some("phases", turns)
     checks.some("factors", sizes)
     for i, turn in enumerate(turns):
         checks.phase(f"phases[{i}]", turn)
-    alone = _smooth_alone(scene, load)
-    rough, smooth = list[Cycle](), list[float]()
+    alone, rough, smooth = None, list[Cycle](), list[float]()
+    if (reference := smooth_reference(scene, load)) is not None:  # as a scene with one asperity
+        twice = 2.0 * reference.radius
+        alone = Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)
     ellipses = list(product(sizes.tolist(), turns.tolist()))
     for k, (size, phase) in enumerate(ellipses):
         LOGGER.info(f"ellipse {k + 1} of {len(ellipses)}")
         with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
-            P, Q = elliptic_path(
-                load=load,
-                load_amplitude=size * load_amplitude,
-                force=force,
-                force_amplitude=size * force_amplitude,
-                phase=phase,
-                friction=f,
-                chords=chords,
-            )
+            given = {"load": load, "force": force, "phase": phase, "friction": f}
+            amplitudes = {"load_amplitude": size * swing, "force_amplitude": size * shear}
+            P, Q = elliptic_path(**given, **amplitudes, chords=chords)
             rough.append(steady(scene, loads=P, forces=Q, influence=influence))
         smooth.append(steady(alone, loads=P, forces=Q).loss if alone else np.nan)
+
+    def column(values: Iterable[Any]) -> Array:
+        return frozen(np.array([*values]))
+
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
     return PhaseLosses(
         scene=scene,
         load=float(load),
-        load_amplitude=float(load_amplitude),
+        load_amplitude=swing,
         force=float(force),
-        force_amplitude=float(force_amplitude),
-        phases=frozen(np.array([phase for _, phase in ellipses])),
-        factors=frozen(np.array([size for size, _ in ellipses])),
-        losses=frozen(np.array([each.loss for each in rough])),
-        loss_errors=frozen(np.array([each.loss_error for each in rough])),
-        smooth=frozen(np.array(smooth)),
-        levels=frozen(np.array([each.level for each in rough])),
+        force_amplitude=shear,
+        phases=column(phase for _, phase in ellipses),
+        factors=column(size for size, _ in ellipses),
+        losses=column(each.loss for each in rough),
+        loss_errors=column(each.loss_error for each in rough),
+        smooth=column(smooth),
+        levels=column(each.level for each in rough),
         sliding=frozen(np.array(sliding, dtype=np.int64)),
         order=min((each.order for each in rough), key=UNSURE_FIRST.index, default="proved"),
     )
-
-
-def _smooth_alone(scene: Scene, load: float) -> Scene | None:
-    """The smooth contact as a scene with one asperity; None if its solution is not known."""
-    if (reference := smooth_reference(scene, load)) is None:
-        return None
-    twice = 2.0 * reference.radius
-    return Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)

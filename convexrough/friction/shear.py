@@ -32,9 +32,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearCertificate(Proved):
-    """What is proved about a friction state, independently of how it was computed.
-
-    Arrays are (n,), in the order of the scene's asperities.
+    """What is proved about a friction state, however it was computed. Arrays are (n,), in the
+    order of the scene's asperities.
 
     scope  : as in `Certificate`, for the pressed contact; "none" if nothing is proved
     order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
@@ -196,7 +195,7 @@ def shear(
     checks.exactly_one("force", force, "displacement", displacement)
     LOGGER.info("pressing at the load P - Q / f")
     levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
-    start = MemoryCurve.pressed(levels.load)
+    P, start = levels.load, MemoryCurve.pressed(levels.load)
     if displacement is None:
         assert force is not None  # exactly_one
         if shape := np.shape(force):
@@ -206,23 +205,22 @@ def shear(
         height = levels.height(force)
     else:
         displacement = checks.finite("displacement", displacement)
-        height = levels.load - levels.displaced(abs(displacement))
+        height = P - levels.displaced(abs(displacement))
         height = height if displacement >= 0 else -height
-    walk = Walk(levels, start, [(levels.load, height)])
+    walk = Walk(levels, start, [(P, height)])
     if walk.general is not None and displacement is not None:
-        walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
-    found, order = walk.states(), walk.order
-    moved, carried, asperities, drifts = (each[0] for each in found)
+        walk = Walk(levels, start, [(P, _by_steps(levels, displacement))])
+    order, (moved, carried, asperities, drifts) = walk.order, (each[0] for each in walk.states())
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
         total = Ball.exact(walk.points[0][1]) * levels.coefficient
     else:
-        level = levels.at(levels.load - abs(height))
+        level = levels.at(P - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         total = (levels.top.load - level.load) * levels.force_unit
         total = total if height >= 0 else -total
-    if abs(height) == levels.load:  # the given value may differ from gross sliding by rounding
+    if abs(height) == P:  # the given value may differ from gross sliding by rounding
         force = displacement = None
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
@@ -258,7 +256,7 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
     def beyond(part: float) -> float:
         points = [(levels.load, Fraction(part) * levels.load)]
-        found = followed(levels, MemoryCurve.pressed(levels.load), points)
-        return float(found.states.displacements.value[0] - displacement)
+        states = followed(levels, MemoryCurve.pressed(levels.load), points).states
+        return float(states.displacements.value[0] - displacement)
 
     return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load

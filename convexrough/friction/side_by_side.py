@@ -1,14 +1,13 @@
 """Comparison of three methods for a load path: agreement and time.
 
-The memory curve holds only if no indentation falls as the load rises. The general step
-(docs/theory/without-order.md), computed by Newton's method, needs no such condition. The conic step
-minimises the energy of the same step as a cone program. General and conic step are taken once per
-segment, which is exact if no indentation falls as the load rises.
+The memory curve holds only if no indentation falls as the load rises. The general step, and the
+conic step, which minimises the energy of the same step, need no such condition. They are taken once
+per segment, which is exact if no indentation falls as the load rises.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Literal
@@ -21,8 +20,9 @@ from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.frames import Variables
 from convexrough.friction.conic_step import ConicStepper
+from convexrough.friction.general_step import Stepper
 from convexrough.friction.order import Order
-from convexrough.friction.path import LoadPath, walk
+from convexrough.friction.path import LoadPath, path_of, walk_of
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -89,10 +89,8 @@ class PathComparison(Table, Plottable):
             yield each.way, found[:LINE]
 
     def _variables(self) -> Variables:
-        names = (
-            *("way", "outcome", "message", "seconds"),
-            *("force_disagreement", "displacement_disagreement"),
-        )
+        names = ["way", "outcome", "message", "seconds"]
+        names += ["force_disagreement", "displacement_disagreement"]
         arrays: Variables = {
             name: (("entry",), np.array([getattr(each, name) for each in self.entries]))
             for name in names
@@ -127,47 +125,42 @@ def compare_paths(
     >>> [each.way for each in found.entries if each.force_disagreement < 1e-4]
     ['general step', 'memory curve', 'conic step']
     """
-    given, entries, path = (scene, loads, forces, start, influence), list[PathEntry](), None
-    ways: dict[Way, Callable[[], LoadPath]] = {
-        "general step": lambda: walk(*given, general_steps=1),
-        "memory curve": lambda: walk(*given),
-        "conic step": lambda: walk(*given, general_steps=1, stepper=ConicStepper),
+    ways: dict[Way, tuple[int | None, type[Stepper]]] = {
+        "general step": (1, Stepper),
+        "memory curve": (None, Stepper),
+        "conic step": (1, ConicStepper),
     }
-    for way, found in ways.items():
+    entries, reference = list[PathEntry](), None
+    for way, (steps, stepper) in ways.items():
         LOGGER.info(way)
-        entries.append(_entry(way, found, path))
-        path = path or entries[-1].path
-    if path is None:
-        raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
-    return PathComparison(scene, path.loads, path.forces, path.order, tuple(entries))
-
-
-def _entry(way: Way, found: Callable[[], LoadPath], reference: LoadPath | None) -> PathEntry:
-    refused = PathEntry(
-        "memory curve", "refused", "it is not proved that indentations rise with the load"
-    )
-    if way == refused.way and reference is not None and reference.order == "fails":
-        return refused
-    began = perf_counter()
-    try:
-        path = found()
-    except SolverError as error:
-        return PathEntry(way, "failed", str(error))
-    seconds = perf_counter() - began
-    if way == refused.way and path.order == "fails":
-        return refused
+        began = perf_counter()
+        try:
+            contact, walk = walk_of(scene, loads, forces, start, influence, steps, stepper)
+            if steps is None and walk.order == "fails":
+                message = "it is not proved that indentations rise with the load"
+                entries.append(PathEntry(way, "refused", message))
+                continue
+            path = path_of(contact, walk)
+        except SolverError as error:
+            entries.append(PathEntry(way, "failed", str(error)))
+            continue
+        seconds = perf_counter() - began
+        reference = reference or path
+        apart = np.abs(path.asperity_forces - reference.asperity_forces).max()
+        largest = (scene.friction or 1.0) * float(path.asperity_loads.max()) or 1.0
+        off = np.abs(path.displacements - reference.displacements).max()
+        farthest = float(np.abs(reference.displacements).max()) or 1.0
+        entries.append(
+            PathEntry(
+                way=way,
+                outcome="answered",
+                path=path,
+                force_disagreement=float(apart) / largest,
+                displacement_disagreement=float(off / farthest),
+                seconds=seconds,
+            )
+        )
     if reference is None:
-        reference = path
-    apart = path.asperity_forces - reference.asperity_forces
-    largest = (path.scene.friction or 1.0) * float(path.asperity_loads.max()) or 1.0
-    farthest = float(np.abs(reference.displacements).max()) or 1.0
-    return PathEntry(
-        way=way,
-        outcome="answered",
-        path=path,
-        force_disagreement=float(np.abs(apart).max()) / largest,
-        displacement_disagreement=float(
-            np.abs(path.displacements - reference.displacements).max() / farthest
-        ),
-        seconds=seconds,
-    )
+        raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
+    found = reference.loads, reference.forces, reference.order, tuple(entries)
+    return PathComparison(scene, *found)

@@ -19,52 +19,33 @@ from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.normal.level import Level
 
 
 class States(NamedTuple):
-    """m states of N asperities in the scene's units.
+    """m states of N asperities in the scene's units, with errors; infinite without a proof."""
 
-    Each array is a `Ball`: values, and radii that bound their errors (infinite without a proof).
-
-    displacements : (m,) X, tangential displacement of one body relative to the other
-    forces        : (m, N) Q_i, shear forces of the asperities
-    asperity_displacements : (m, N) own deflection plus drift
-    drifts        : (m, N) displacements of asperities, open ones too, along the opposite surface
-    """
-
-    displacements: Ball
-    forces: Ball
-    asperity_displacements: Ball
-    drifts: Ball
-
-    def unproved(self) -> States:
-        """The same states with infinite error bounds."""
-        return States(*(Ball.around(each.mid, np.inf) for each in self))
+    displacements: Ball  # (m,) X, tangential displacement of one body relative to the other
+    forces: Ball  # (m, N) Q_i, shear forces of the asperities
+    asperity_displacements: Ball  # (m, N) own deflection plus drift
+    drifts: Ball  # (m, N) displacements of asperities, open ones too, along the opposite surface
 
 
 class LevelSums(NamedTuple):
-    """Sums over the levels of each of m memory curves, weighted by changes of slope.
+    """Sums over the levels of each of m memory curves, weighted by changes of slope."""
 
-    used    : the k total loads of the levels of all curves, sorted
-    places  : (m, j) the levels of each curve, as indices into `used`
-    weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above.
-        If a curve has fewer than j levels, its row ends with zeros
-    """
-
-    used: list[Fraction]
-    places: Indices
-    weights: Ball
+    used: list[Fraction]  # the k total loads of the levels of all curves, sorted
+    places: Indices  # (m, j) the levels of each curve, as indices into `used`
+    weights: Ball  # (m, j) slope below minus slope above; rows of curves with fewer levels: 0
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
         place = {load: k for k, load in enumerate(used)}
-        most = max((len(each) for each in bends), default=0)
-        places = np.zeros((len(bends), most), dtype=np.intp)
+        places = np.zeros((len(bends), max((len(each) for each in bends), default=0)), np.intp)
         high, low = np.zeros(places.shape), np.zeros(places.shape)
         for row, each in enumerate(bends):
             for column, (load, bend) in enumerate(each):
@@ -93,10 +74,9 @@ def states_of(
     """The states of these curves, for the asperities `which` in this order; default all."""
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
-    solved = [levels.at(load) for load in sums.used]
+    solved, travel = [levels.at(load) for load in sums.used], levels.travel_unit
     loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[some] for level in solved])
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
-    travel = levels.travel_unit
     return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,
@@ -118,9 +98,8 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) for each asperity the last status in `proved` whose mask is true for this asperity.
-
-    If no mask is true, the status is "open" if the asperity is proved to be open, else "undecided".
+    """(N,) for each asperity the last status in `proved` whose mask is true for this asperity, or
+    "open" if it is proved to be open, or "undecided".
     """
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
@@ -136,6 +115,4 @@ def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
     modulus = Ball.exact(levels.scene.material.contact_modulus)
     root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
     radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus
-    radii = radii * (0.75 * root * levels.units.local)
-    values, errors = (levels.to_scene(np.array(part)) for part in (radii.value, radii.error))
-    return frozen(values), frozen(errors)
+    return rounded(of_rows(levels.to_scene, radii * (0.75 * root * levels.units.local)))

@@ -30,16 +30,7 @@ CLAIMS_SLIDING = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """Comparison of claimed shear forces with what is proved about the state on first loading.
-
-    contact : the pressed contact
-    forces  : (n,) [force] the claimed shear forces
-    total_prescribed : [force] the prescribed sum Q of the shear forces
-    claimed : (n,) true where the asperity is claimed to slide
-    within  : largest error allowed, as a fraction of the largest force
-    certificate : certificate of the claimed forces
-    solution : the computed solution, with a certificate of its own
-    """
+    """Comparison of claimed shear forces with the state on first loading, as `Claim` explains."""
 
     one = "force"
     many = "shear forces"
@@ -51,7 +42,7 @@ class ShearVerdict(Claim, Record):
     claims = ("sliding", "sticking")
 
     contact: Contact
-    forces: Array
+    forces: Array  # (n,) [force] as claimed
     total_prescribed: float | None
     claimed: NDArray[np.bool_]
     within: float
@@ -116,15 +107,9 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Comparison of shear forces from any source with the proved state on first loading.
+    """The verdict on shear forces (n,) with the prescribed sum `force`.
 
-    forces  : (n,) [force] shear forces in the order of the scene's asperities
-    force   : [force] the prescribed sum Q of the shear forces
-    within  : largest error allowed, as a fraction of the largest force
-    sliding : (n,) true where an asperity is claimed to slide; default: where |force| is at least
-        (1 - 1e-4) f P_i
-
-    Raises InputError for the same reasons as `certify_shear`.
+    sliding : (n,) true where an asperity is claimed to slide; default: `claims_sliding`
     """
     checks.instance("contact", contact, Contact)
     within = tolerance("within", within)
@@ -143,17 +128,14 @@ def verify_shear(
     limits = checks.friction(contact.scene.friction) * contact.loads
     left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
     implied = (errors < left) | (state.status == "open")
+    status = np.where(implied, state.status, "undecided")
     return ShearVerdict(
         contact=contact,
         forces=given,
         total_prescribed=float(force),
         claimed=frozen(np.array(np.broadcast_to(claimed, given.shape))),
         within=within,
-        certificate=replace(
-            proved,
-            status=frozen(np.where(implied, state.status, "undecided")),
-            force_errors=frozen(errors),
-        ),
+        certificate=replace(proved, status=frozen(status), force_errors=frozen(errors)),
         solution=state,
     )
 
