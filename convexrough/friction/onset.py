@@ -1,9 +1,9 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
 The onset of an asperity is the load at which its indentation rises to 0. On first loading it slides
-once P - Q / f is below its onset (load P, shear force Q, coefficient of friction f). Newton's method
-computes the onset; proofs that the asperity is open at a slightly smaller load and touches at a
-slightly larger load enclose it.
+once P - Q / f is below its onset (load P, shear force Q, coefficient of friction f). The onset
+comes from Newton's method; proofs that the asperity is open at a slightly smaller load and touches
+at a slightly larger load enclose it.
 """
 
 from __future__ import annotations
