@@ -23,9 +23,9 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
 from convexrough.friction.order import Order
 from convexrough.influence import Kind
-from convexrough.melan.program import Limit, solve
+from convexrough.melan.program import solve
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table, singular
+from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.vector_shear.problem import FrictionProblem
@@ -114,10 +114,9 @@ class Shakedown(Table, Plottable):
             for name, along in (
                 ("witness", ("asperity", "direction")),
                 ("mechanism", ("vertex", "asperity", "direction")),
-                ("force_amplitudes", ("vertex", "direction")),
+                ("force_amplitude", ("vertex", "direction")),
             ):
-                column = singular(name)
-                found[column] = along, found[column][1]
+                found[name] = along, found[name][1]
         return found
 
 
@@ -182,11 +181,13 @@ def shakedown(
         limit = _exact(contact, t0, p, t)
     else:
         limit = _elastic(contact, t0, t) if kind == "elastic" else solve(contact, t0, t)
-    arrays = {"factors": limit.factors, "witness": f * limit.witness, "mechanism": limit.mechanism}
+    limit["witness"] = f * limit["witness"]
+    for name in ("factors", "witness", "mechanism"):
+        limit[name] = frozen(limit[name])
     return Shakedown(
         scene=scene,
         kind=kind,
-        **limit._asdict() | {name: frozen(values) for name, values in arrays.items()},
+        **limit,
         load=P0,
         force=frozen(Q0) if kind == "vector" else float(Q0),
         load_amplitudes=frozen(np.asarray(p, dtype=np.float64)),
@@ -199,8 +200,8 @@ def _fractions(values: Array) -> Any:
     return np.array([Fraction(each) for each in values.tolist()], dtype=object)
 
 
-def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
-    """The limit with partial slip; t0, t : the mean shear force and amplitudes, divided by f."""
+def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
+    """Fields of the result with partial slip; the shear forces t0 and t are divided by f."""
     levels = contact.cached(FrictionLevels)
     P0 = levels.load
     plus, minus = (-(p + t)).max(), (-(p - t)).max()
@@ -229,42 +230,33 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
     height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
     rest = levels.to_scene(sure.loads.value * levels.units.force)
-    return Limit(
-        factor=float(factors[last]),
-        lower=lower * (1 - SAFETY) if proved else 0.0,
-        upper=upper * (1 + SAFETY) if proved else np.inf,
-        factors=factors,
-        gross=float(gross),
-        witness=height / (float(worst.upper) or 1.0) * rest,
-        mechanism=gaps / (gaps.max() or 1.0),
-        order=order,
-    )
+    return {
+        "factor": float(factors[last]),
+        "lower": lower * (1 - SAFETY) if proved else 0.0,
+        "upper": upper * (1 + SAFETY) if proved else np.inf,
+        "factors": factors,
+        "gross": float(gross),
+        "witness": height / (float(worst.upper) or 1.0) * rest,
+        "mechanism": gaps / (gaps.max() or 1.0),
+        "order": order,
+    }
 
 
 def _fall(p: Any, t: Any) -> Any:
-    """The decrease of the load L* of `_exact` per unit of the factor.
-
-    It is the mean of the maxima of -(p + t) and -(p - t), with t = q / f.
-    """
+    """The decrease of the load L* of `_exact` per unit of the factor, with t = q / f."""
     return ((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
-def _elastic(contact: Contact, t0: Fraction, t: Any) -> Limit:
-    """Melan's limit with the scalar kernel: the least factor of all asperities and gross sliding.
-
-    t0, t : the mean shear force and its (m,) amplitudes, divided by f. The elastic shares q are the
-    derivatives of the normal loads by the total load.
+def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
+    """Fields of the result with the scalar kernel: the least factor of asperities and of gross
+    sliding. The elastic shares q are the derivatives of the normal loads by the total load.
     """
     problem, high, low = contact.cached(FrictionProblem), t.max(), t.min()
     unit, total = problem.units.force, problem.levels.load
     P, q = problem.levels.top.loads[problem.places], problem.elastic
     each = P / q * (2.0 * unit / float(high - low))  # where the range of a shear force is 2 P_i
-    gross = float(
-        min(
-            (total - t0) / high if high > 0 else np.inf,
-            (total + t0) / -low if low < 0 else np.inf,
-        )
-    )
+    ends = (total - t0, high), (total + t0, -low)
+    gross = float(min(room / run if run > 0 else np.inf for room, run in ends))
     limits = np.abs(each.value)
     factor = min(float(limits.min()), gross)
     proved = bool(q.positive.all())  # the solution holds for positive shares only
@@ -276,15 +268,15 @@ def _elastic(contact: Contact, t0: Fraction, t: Any) -> Limit:
     part = (float(t0) / unit - room_low.sum()) / (width.sum() or 1.0)
     factors = np.full(len(contact.scene), np.nan)
     factors[problem.touching] = limits
-    return Limit(
-        factor=factor,
-        lower=max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
-        upper=min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
-        factors=factors,
-        gross=gross,
-        witness=problem.to_scene(unit * (room_low + part * width)),
-        mechanism=problem.to_scene(np.asarray(critical, dtype=np.float64)),
-    )
+    return {
+        "factor": factor,
+        "lower": max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
+        "upper": min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
+        "factors": factors,
+        "gross": gross,
+        "witness": problem.to_scene(unit * (room_low + part * width)),
+        "mechanism": problem.to_scene(np.asarray(critical, dtype=np.float64)),
+    }
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
