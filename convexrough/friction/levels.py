@@ -1,8 +1,8 @@
 """The levels of a contact (normal solutions at given loads), and the units of friction results.
 
 Levels are in the scaled units of the normal problem (`normal.problem`). The unit of shear forces is
-f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
-coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
+f times that of loads, the unit of displacements c_t f times that of lengths, with the coefficient
+of friction f and c_t = (2 - nu) / (2 (1 - nu)).
 
 A rational number [force] identifies each level. If the load of the contact is prescribed, this
 number is the total load of the level. If the approach is prescribed, the load P of the contact is a
@@ -102,10 +102,9 @@ class FrictionLevels:
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
-        """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 from rest.
+        """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 [length].
 
-        The approach at this load is D0(P) - X / (c_t f). Raises InputError if X = `displacement`
-        [length] exceeds the displacement at the onset of gross sliding.
+        The approach at this load is D0(P) - X / (c_t f). Raises InputError in gross sliding.
         """
         room = self.top.approach - self.at(Fraction(0)).approach
         farthest = float((room * self.travel_unit).value)
@@ -119,10 +118,8 @@ class FrictionLevels:
         if displacement == 0.0:
             return self.load
         level = self._levels.at_approach(self.top.approach - lowered)
-        drop = (self.top.load - level.load).mid
-        load = self.load - (Fraction(float(drop.high)) + Fraction(float(drop.low))) * Fraction(
-            self.units.force
-        )
+        drop = sum(Fraction(float(part)) for part in (self.top.load - level.load).mid)
+        load = self.load - drop * Fraction(self.units.force)
         self._named[load] = level
         return load
 
@@ -131,9 +128,8 @@ class FrictionLevels:
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
-        if (asked, most) not in self._orders:
-            self._orders[asked, most] = order_between(self.at, asked, most)
-        found = self._orders[asked, most]
+        if (found := self._orders.get((asked, most))) is None:
+            found = self._orders[asked, most] = order_between(self.at, asked, most)
         if found == "proved":
             self._ordered = min(asked)
         return found
@@ -145,22 +141,21 @@ class FrictionLevels:
     def indentations(self, level: Level) -> Ball:
         """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
-        others = self._others
+        others, unit = self._others, self.units.length
         if len(others) == 0:
             return known
-        (high, low), radius = known.mid, known.radius
         approach = float(level.approach.value)
-        high[others] = approach + self.scene.offsets[others] / self.units.length
-        radius[others] = self.scene.offset_errors[others] / self.units.length
-        radius[others] += 4 * ROUNDOFF * (np.abs(high[others]) + abs(approach))
-        radius[others] += float(level.approach.error)
+        n = approach + self.scene.offsets[others] / unit
+        off = self.scene.offset_errors[others] / unit + float(level.approach.error)
+        off += 4 * ROUNDOFF * (np.abs(n) + abs(approach))
         if level.trial is not None:
             loads = level.trial.loads.high
             coupled = self._beyond.apply(loads)
-            high[others] -= coupled
-            radius[others] += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
-            radius[others] += level.moves(self._beyond)
-        return Ball(Pair(high, low), radius * (1 + SAFETY))
+            n -= coupled
+            off += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
+            off += level.moves(self._beyond)
+        known.mid.high[others], known.radius[others] = n, off
+        return Ball(known.mid, known.radius * (1 + SAFETY))
 
     @cached_property
     def _others(self) -> Indices:
@@ -169,8 +164,7 @@ class FrictionLevels:
 
     @cached_property
     def _beyond(self) -> Coupling:
-        points = self.scene.contact_points[self._others]
-        return self._levels.problem.influence.onto(points)
+        return self._levels.problem.influence.onto(self.scene.contact_points[self._others])
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""

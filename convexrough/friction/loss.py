@@ -1,10 +1,9 @@
 """The energy that slip dissipates: at each asperity, in the whole contact, and along a path.
 
-docs/theory/losses.md derives the formulas. Losses are divided by c_t f^2, with the coefficient of
-friction f and Mindlin's ratio c_t. While the total load is P and the slip front falls through the
-level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th is the slope of the memory curve at
-L, and c the direction of slip, 1 or -1. B is the sum of the B_i(P, L) of (2) on that page. All of
-this assumes order (docs/theory/states.md, "Order").
+docs/theory/losses.md derives the formulas, which assume order. Losses are divided by c_t f^2, with
+the coefficient of friction f and Mindlin's ratio c_t. While the total load is P and the slip front
+falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL), with the slope th of the
+memory curve at L and the direction c of slip, 1 or -1. B is the sum of the B_i(P, L) of (2).
 """
 
 from __future__ import annotations
@@ -97,27 +96,22 @@ def _at_moments(levels: FrictionLevels, moments: Sequence[Moment]) -> tuple[Ball
 
 
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) integrals I of -dB/dL over pieces on which the load changes.
-
-    The formula is (4) of docs/theory/losses.md. The page also gives the intervals for D, m and M.
-    """
+    """(k,) integrals I of -dB/dL, (4) of docs/theory/losses.md, over pieces with a varying load."""
     if not pieces:
         return Ball.exact(np.zeros(0))
     ends = list(zip(*(piece[2:] for piece in pieces), strict=True))  # L0, L1, P0, P1
     over, run, fall = (
-        exactly([a - b for a, b in zip(ends[i], ends[j], strict=True)]).scaled(
-            1.0 / levels.units.force
-        )
-        for i, j in ((2, 0), (0, 1), (2, 3))
+        exactly([a - b for a, b in zip(*both, strict=True)]).scaled(1.0 / levels.units.force)
+        for both in ((ends[2], ends[0]), ends[:2], ends[2:])
     )
     loads = sorted({load for end in ends for load in end})
     known, place = [levels.at(load) for load in loads], {x: k for k, x in enumerate(loads)}
     every, approach = energies(known), Ball.stacked([level.approach for level in known])
     which = [[place[load] for load in end] for end in ends]
     (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
-    softest = np.array([_stiffest(known[k]) for k in which[1]])
+    stiffness = np.array([_stiffest(known[k]) for k in which[1]])
     with np.errstate(divide="ignore"):
-        most = run.upper / softest * (1 + SAFETY)
+        most = run.upper / stiffness * (1 + SAFETY)
     D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), most))
     m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
     first, last = D2 - D1, D3 - D1
@@ -149,12 +143,9 @@ def _sharper(a: Ball, b: Ball) -> Ball:
 def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
     """(N,) [force length] losses at each asperity, due to partial slip and to sliding.
 
-    cells : total number of cells into which the pieces with a varying load are cut
-
-    The loss in a cell lies between the losses at two constant loads: those at the ends of the cell
-    (docs/theory/losses.md, "A front while the load changes"). The results are sums of the means of
-    these two. Their relative errors are about cells^-2, the proved bounds on these errors about
-    1 / cells.
+    Pieces with a varying load are cut into `cells` cells. The loss in one lies between the losses
+    at the loads of its ends (docs/theory/losses.md, "A front while the load changes"); the results
+    are sums of the means. Their relative errors are about cells^-2, the bounds about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Ends, Ends]]()  # weight; P and front at both ends of a cell

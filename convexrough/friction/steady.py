@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Point
@@ -77,7 +77,7 @@ def cycles(
     """
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
-    limit, levels = f * contact.load, contact.cached(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
@@ -89,21 +89,36 @@ def cycles(
         heights = [(T, -T) for T in tops]
     else:
         assert maximum is not None  # exactly_one
-        upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
-        checks.some("maximum", upper)
-        lower = -upper
-        if minimum is not None:
-            lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
-            lower = checks.bearable("minimum", lower, limit)
-        if (upper < lower).any():
-            i = int(np.argmax(upper < lower))
-            expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
-            raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
-        ends = zip(upper.tolist(), lower.tolist(), strict=True)
+        ranges = force_ranges(maximum, minimum, f * contact.load)
+        checks.some("maximum", ranges[0])
+        ends = zip(*(each.tolist() for each in ranges), strict=True)
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]
         LOGGER.info("pressing at the load P - T of each cycle")
     paths = [[(levels.load, T) for T in each] for each in heights]
     return steady_cycles(contact, MemoryCurve.pressed(levels.load), paths)
+
+
+def force_ranges(
+    maximum: ArrayLike,
+    minimum: ArrayLike | None,
+    limit: float | Array,
+    length: int | None = None,
+    one: str = "",
+) -> tuple[Array, Array]:
+    """(m,) the checked largest and smallest shear forces; `length` and `one` as in
+    `checks.array`."""
+    upper = checks.array("maximum", maximum, length=length, one=one)
+    upper = checks.bearable("maximum", upper, limit)
+    lower = -upper
+    if minimum is not None:
+        each = one or "maximum"
+        lower = checks.array("minimum", minimum, length=len(upper), one=each)
+        lower = checks.bearable("minimum", lower, limit)
+    if len(wrong := np.flatnonzero(upper < lower)):
+        k = wrong[0]
+        expected = f"at least the minimum, {lower[k]:g} (-maximum by default)"
+        raise InputError(f"maximum[{k}]", found=upper[k], expected=expected)
+    return upper, lower
 
 
 def steady(
