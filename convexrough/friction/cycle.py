@@ -1,10 +1,7 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
-The path is a closed curve of the load P and the shear force Q; f is the coefficient of friction,
-and T = Q / f. The memory curve stores the friction state as a function of the load.
-docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from the second
-cycle on the part of the curve below L* no longer changes, and the part above repeats in each cycle.
-docs/theory/losses.md derives the loss.
+docs/theory/paths.md, "Closed paths", proves that from the second cycle on the memory curve no
+longer changes below the point (L*, T*), and repeats above. docs/theory/losses.md derives the loss.
 """
 
 from __future__ import annotations
@@ -19,11 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import of_rows
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import shared
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
@@ -55,16 +53,15 @@ class Cycle(Table, Plottable):
     loss_first       : [force length] energy lost from the start without shear to the end of cycle 1
     loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
-        (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
-        lost in the cycle), "open" (never loaded) or "undecided"
+        (as a whole, once in each direction per cycle), "intermittent" (contact is lost in the
+        cycle), "open" (never loaded) or "undecided"
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
-    level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
-        L* is the same at every moment from the second cycle on
-    balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
-        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps give the
-        results
+    level, force_level : [force] L* and f T*: from the second cycle on the memory curve
+        (docs/theory/paths.md) is the same at every moment up to the load L*
+    balance_defect   : relative difference between `loss` and the loss by (1) of
+        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps are used
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
     smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
@@ -75,9 +72,9 @@ class Cycle(Table, Plottable):
     order            : what is proved about order between the lowest and the highest load at which
         normal solutions are used (docs/theory/states.md, "Order"). "proved": losses and statuses
         are proved; "proved for one step": statuses hold for the solution with one general step
-        (docs/theory/without-order.md) per straight segment of the path, and no loss is proved;
-        "fails": nothing is proved, and general steps give the results if the normal solution at the
-        highest P is proved
+        (docs/theory/without-order.md) per straight segment, and no loss is proved; "fails": nothing
+        is proved, and general steps give the results if the normal solution at the highest P is
+        proved
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding
@@ -150,10 +147,9 @@ class Cycle(Table, Plottable):
         """(n,) [force length] energy lost at each asperity per cycle.
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
-        the ranges of load through which the slip fronts move are cut into cells, about 64 in total.
-        The losses are sums over the cells, computed from the normal solutions at the ends of each
-        cell. Their relative errors are about 0.1 %, except where a front hardly moves while the
-        load changes much. The proved bounds on the relative errors are some per cent.
+        they are sums over about 64 cells of the ranges of load through which slip fronts move.
+        Their relative errors are about 0.1 %, except where a front hardly moves while the load
+        changes much. The proved bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -168,11 +164,11 @@ class Cycle(Table, Plottable):
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, unknown, frozen(np.full(n, np.inf))
-        slip, slide = shared(levels, self._walk.cycles[1], CELLS)
-        both = slip + slide
-        partial, gross, lost = (frozen(levels.to_scene(it.value)) for it in (slip, slide, both))
-        uncertainty = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, lost, frozen(levels.to_scene(both.error) + uncertainty)
+        parts = shared(levels, self._walk.cycles[1], CELLS)
+        (slip, _), (slide, _), (both, errors) = (
+            rounded(of_rows(levels.to_scene, it)) for it in (*parts, parts[0] + parts[1])
+        )
+        return slip, slide, both, errors if self.order == "proved" else frozen(errors + np.inf)
 
     @cached_property
     def _walk(self) -> Closed:
@@ -206,8 +202,7 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if several asperities start to slide last, at the same force.
+        Raises InputError if there is no derivative, with the cases of `ShearState.gradient`.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -236,9 +231,8 @@ class Loop(Table):
     """Points of a closed loop, from the largest shear force to the smallest and back.
 
     asperities    : (k,) indices of the asperities whose own loops are given
-    forces        : (m,) [force] shear force
-    displacements : (m,) [length] relative tangential displacement of distant points of the two
-        bodies
+    forces, displacements : (m,) shear force [force], and relative tangential displacement [length]
+        of distant points of the two bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
     asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
         own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md

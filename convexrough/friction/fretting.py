@@ -22,9 +22,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: The largest traction in a contact disc is sought at these distances from its centre: the contact
-#: radii of the asperity at the vertices of the memory curve, and about this number of others. At
-#: constant load it lies at one of the a(s_k); else its error is about 0.1 %.
+#: The largest traction in a contact disc is sought at the contact radii at the vertices of the
+#: memory curve (exact at constant load), and at about this number of other distances (to 0.1 %).
 DISTANCES = 64
 
 
@@ -36,10 +35,8 @@ class Fretting(Table, Plottable):
     maximum, minimum : [force] the largest and the smallest shear force of the cycle
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
-        load of the cycle; nan where contact is lost in the cycle ("intermittent"), because slip of
-        an open asperity is not known
-    gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
-        sticks, nan where "intermittent"
+        load of the cycle; nan where contact is lost in the cycle ("intermittent")
+    gross_slip_amplitudes : [length] the same of the whole disc; 0 if some of it sticks
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
         bounds on their errors. If the load varies, their sum is less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |shear force of the asperity / area of its

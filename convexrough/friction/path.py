@@ -45,19 +45,16 @@ class LoadPath(Table, Plottable):
     approaches     : (m,) [length] approach D0; at the load 0, the approach at the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] for each asperity, its drift (next field) plus its own
-        deflection, the tangential displacement that its own shear force causes
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
+    asperity_displacements : (m, n) [length] drift plus the displacement that the own force causes
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
     fronts         : (m,) [force] load down to which the contact slips on arrival at the point; nan
-        if nothing slips then, for example if the load has fallen below the front. A segment along
-        which P and Q do not change does not change fronts and status. Not valid if `order` is
-        "fails"
-    status : (m, n) status of each asperity on arrival at the point: "stuck" (no slip),
-        "partial" (a disc sticks), "sliding" (the whole asperity slides), "open" (no contact) or
-        "undecided"
+        if nothing slips then. A segment along which P and Q do not change does not change fronts
+        and status. Not valid if `order` is "fails"
+    status : (m, n) status on arrival at the point: "stuck" (no slip), "partial" (a disc sticks),
+        "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
     order          : "proved" if order (docs/theory/states.md) is proved between the lowest and the
         highest load of all normal solutions used; other values as in `Cycle`
@@ -157,10 +154,9 @@ def load_path(
         separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
-    general_steps : number of general steps per segment (docs/theory/without-order.md). They also
-        apply if an indentation falls as the load rises (order fails), but nothing is proved about
-        their results. With None, the states come from the memory curve; if order fails and the
-        normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
+    general_steps : number of general steps per segment (docs/theory/without-order.md), whose
+        results are not proved. With None, the states come from the memory curve; if order fails and
+        the normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem is not solved.

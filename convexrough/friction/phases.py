@@ -42,8 +42,7 @@ def elliptic_path(
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase  : [rad] from -pi to pi. At 0 the axes of the ellipse are parallel to those of P and Q; at
-        pi/2 the ellipse is a straight line, as P and Q are in phase
+    phase  : [rad] from -pi to pi; at pi/2 P and Q are in phase, and the ellipse is a straight line
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so `Cycle.level` is that of the ellipse
     chords : approximate number of chords that replace the ellipse. In tests the loss along the
@@ -83,8 +82,8 @@ class PhaseLosses(Table, Plottable):
 
         P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    An ellipse has one phase and one factor. In all arrays the ellipses with the first factor come
-    first, one for each phase, then those with the second factor, and so on.
+    In all arrays the ellipses with the first factor come first, one for each phase, then those with
+    the second factor, and so on.
 
     scene   : the scene
     phases, factors : (c,) phase [rad], and factor of both amplitudes

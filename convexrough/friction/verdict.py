@@ -146,11 +146,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     forces : (n,) [force] shear forces in the order of the scene's asperities
     force  : [force] the prescribed sum of the shear forces
 
-    `force_errors` are bounds on the differences between the given forces and the exact ones. An
-    asperity that is open in the solution has the status "open". "sliding" and "partial" are taken
-    from the solution if the entry of `force_errors` is small enough: below 1 % of the friction
-    limit f P_i for "sliding", below f P_i - |Q_i| with the force Q_i of the solution for "partial".
-    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
+    `force_errors` are bounds on the differences between the given forces and the exact ones. The
+    status is that of the solution if this is "open", or if `force_errors` is below 1 % of the
+    friction limit f P_i for "sliding", below f P_i - |Q_i| with the force Q_i of the solution for
+    "partial"; else "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.
