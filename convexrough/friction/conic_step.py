@@ -62,10 +62,7 @@ class ConicStepper(Stepper):
         unit = float(energies.max())
 
         # The own curves: indentations s and deflections xi, loads and forces at the vertices.
-        s, xi = (
-            each[which] / own[:, None]
-            for each in (step.curves.indentations, step.curves.deflections)
-        )
+        s, xi = step.curves.vertices[:, which] / own[:, None]
         loads, forces, slopes = (each[which] for each in step.curves.layers)
         loads, forces = loads / N[:, None], forces / N[:, None]
         # Where the load rises, an asperity sticks for |T - T_B| <= half; its deflection is that

@@ -10,12 +10,12 @@ docs/theory/paths.md, "Changes of the curve".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,48 +51,43 @@ COUNTS = (4, 8, 16, 32, 64)
 #: the largest displacement.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
-#: A point on each of n curves: index of the next vertex, indentation and deflection, (n,) each.
-Front: TypeAlias = tuple[Indices, Array, Array]
-
 
 @dataclass(frozen=True, eq=False)
 class OwnCurves:
     """The memory curves of n asperities, as lines of m vertices; the last may be repeated."""
 
     coefficients: Array  # (n,) k of Hertz's law
-    indentations: Array  # (n, m) at the vertices
-    deflections: Array  # (n, m) at the vertices
+    vertices: Array  # (2, n, m) indentations and deflections
 
     @cached_property
     def layers(self) -> tuple[Array, Array, Array]:
         """(n, m) loads and shear forces at the vertices; (n, m - 1) slopes of the layers."""
-        run, added = np.diff(self.indentations), np.diff(self.deflections)
+        run, added = np.diff(self.vertices)
         slopes = np.divide(added, run, out=np.zeros(run.shape), where=run > 0)
-        loads = hertz.load(self.indentations, self.coefficients[:, None])
+        loads = hertz.load(self.vertices[0], self.coefficients[:, None])
         forces = np.cumsum(slopes * np.diff(loads), axis=1)
         return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
 
     def cut(self, indentations: Array) -> OwnCurves:
         """The curves up to these indentations (n,); curves that end below these are unchanged."""
-        front = self._front(np.zeros(len(indentations)), indentations)
-        return self.ended(front, front[1:])
+        after, front = self._front(np.zeros(len(indentations)), indentations)
+        return self.ended(after, front, front)
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
         """The step to these indentations and deflections; the curves are cut at `indentations`."""
-        base, moved = self.indentations[:, -1], deflections - self.deflections[:, -1]
+        base, moved = self.vertices[0, :, -1], deflections - self.vertices[1, :, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
-        front = self._front(sign, np.where(sign == 0, base, indentations - sign * deflections))
-        (after, depth, _), k = front, self.coefficients
+        wanted = np.where(sign == 0, base, indentations - sign * deflections)
+        (after, front), k = self._front(sign, wanted), self.coefficients
+        depth = front[0]
         loads, forces, slopes = (each[np.arange(len(k)), after - 1] for each in self.layers)
         low, high = hertz.load(depth, k), hertz.load(indentations, k)
         grown = np.where(sticks, indentations - base, 1.0)
         slope = np.where(sticks, moved / grown, sign)
         stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(depth / k**3))
         return OwnStep(
-            self,
-            front,
-            (indentations, deflections),
+            partial(self.ended, after, front, np.stack((indentations, deflections))),
             fronts=np.where(sign != 0, depth, indentations),
             forces=forces + slopes * (low - loads) + slope * (high - low),
             stiffness=np.where(np.abs(deflections) < indentations, stiffness, 0.0),
@@ -101,53 +96,38 @@ class OwnCurves:
     def energies(self) -> Array:
         """(n,) elastic energies of the own deflections, divided by c_t f^2."""
         loads, forces, slope = self.layers
-        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.indentations)
-        power = np.diff(loads * self.indentations)
+        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.vertices[0])
+        power = np.diff(loads * self.vertices[0])
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
-    def _front(self, sign: Array, wanted: Array) -> Front:
-        """The point on each curve where  indentation - sign * deflection  reaches `wanted` (n,)."""
-        keys, rows = self.indentations - sign[:, None] * self.deflections, np.arange(len(sign))
-        below = (keys < wanted[:, None]).sum(axis=1)
+    def _front(self, sign: Array, wanted: Array) -> tuple[Indices, Array]:
+        """The points (2, n) of the curves where  indentation - sign * deflection  reaches `wanted`
+        (n,), and the indices of the next vertices.
+        """
+        keys = self.vertices[0] - sign[:, None] * self.vertices[1]
+        below, rows = (keys < wanted[:, None]).sum(axis=1), np.arange(len(sign))
         after = np.clip(below, 1, keys.shape[1] - 1)
-        here, there = (rows, after - 1), (rows, after)
-        width = keys[there] - keys[here]
+        width = keys[rows, after] - keys[rows, after - 1]
         part = np.where(below > after, 1.0, 0.0)
-        np.divide(wanted - keys[here], width, out=part, where=width > 0)
-        part = np.clip(part, 0.0, 1.0)
-        depth, moved = (
-            each[here] + part * (each[there] - each[here])
-            for each in (self.indentations, self.deflections)
-        )
-        return after, depth, moved
+        np.divide(wanted - keys[rows, after - 1], width, out=part, where=width > 0)
+        here, there = self.vertices[:, rows, after - 1], self.vertices[:, rows, after]
+        return after, here + np.clip(part, 0.0, 1.0) * (there - here)
 
-    def ended(self, front: Front, end: tuple[Array, Array]) -> OwnCurves:
-        """The curves up to their fronts, then a line to `end`: indentations and deflections."""
-        columns, after = np.arange(int(front[0].max()) + 2), front[0][:, None]
-        kept = np.minimum(columns, self.indentations.shape[1] - 1)
-
-        def line(old: Array, here: Array, last: Array) -> Array:
-            following = np.where(columns == after, here[:, None], last[:, None])
-            return np.where(columns < after, old[:, kept], following)
-
-        depths = line(self.indentations, front[1], end[0])
-        return OwnCurves(self.coefficients, depths, line(self.deflections, front[2], end[1]))
+    def ended(self, after: Indices, front: Array, end: Array) -> OwnCurves:
+        """The curves up to their fronts (2, n) before the vertices `after`, then lines to `end`."""
+        columns, after = np.arange(int(after.max()) + 2), after[:, None]
+        kept = self.vertices[:, :, np.minimum(columns, self.vertices.shape[2] - 1)]
+        following = np.where(columns == after, front[:, :, None], end[:, :, None])
+        return OwnCurves(self.coefficients, np.where(columns < after, kept, following))
 
 
 class OwnStep(NamedTuple):
-    """A straight step of n asperities from their curves `old`; arrays are (n,)."""
+    """A straight step of n asperities; arrays are (n,)."""
 
-    old: OwnCurves
-    front: Front  # the points up to which the old curves are kept; lines lead from there to `end`
-    end: tuple[Array, Array]  # indentations and deflections after the step
+    curves: Callable[[], OwnCurves]  # the curves after the step, which few steps need
     fronts: Array  # indentation at the slip front; the whole indentation where an asperity sticks
     forces: Array  # shear forces T_i
     stiffness: Array  # derivatives of the forces with respect to the deflections
-
-    @property
-    def curves(self) -> OwnCurves:
-        """The curves after the step."""
-        return self.old.ended(self.front, self.end)
 
 
 class Bundle(NamedTuple):
@@ -165,7 +145,7 @@ class Bundle(NamedTuple):
 
     @property
     def deflections(self) -> Array:
-        return self.curves.deflections[:, -1]
+        return self.curves.vertices[1, :, -1]
 
 
 class Step(NamedTuple):
@@ -213,8 +193,7 @@ class Stepper:
         """The state without shear at a load."""
         found = self.levels.depths(load)
         own, zero = np.maximum(found, 0.0), np.zeros(len(found))
-        ends = np.column_stack((zero, own))
-        curves = OwnCurves(self.coefficients, ends, np.zeros(ends.shape))
+        curves = OwnCurves(self.coefficients, np.stack(((zero, own), (zero, zero))).mT)
         return Bundle(load, Fraction(0), found, curves, own, zero, zero)
 
     def along(self, start: MemoryCurve, points: Sequence[Point], steps: int) -> list[Bundle]:
@@ -246,10 +225,17 @@ class Stepper:
                 raise
             middle = (now.load + load) / 2, (now.height + height) / 2
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
-        work = now.work + float(now.height + height) / 2 * x
-        moved, displacement = now.positions + eta, now.displacement + x
-        known = step.indentations, own.curves, own.fronts, own.forces
-        return Bundle(load, height, *known, moved, displacement, work)
+        return Bundle(
+            load,
+            height,
+            step.indentations,
+            own.curves(),
+            own.fronts,
+            own.forces,
+            positions=now.positions + eta,
+            displacement=now.displacement + x,
+            work=now.work + float(now.height + height) / 2 * x,
+        )
 
     def _gross(self, step: Step) -> tuple[Array, float, OwnStep]:
         """eta, x and the own steps at the smallest displacement at which all asperities slide."""
