@@ -22,10 +22,9 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, rounded
-from convexrough.friction.loss import shared
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.state import states_of
+from convexrough.friction.state import shared, states_of
 from convexrough.friction.walk import Closed, Walk
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER

@@ -16,9 +16,15 @@ from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.loss import losses, trapezoid_loss
 from convexrough.friction.path import points_of, pressed_for
-from convexrough.friction.state import LevelSums, by_status, displacements_of, stick_radii
+from convexrough.friction.state import (
+    LevelSums,
+    by_status,
+    displacements_of,
+    losses,
+    stick_radii,
+    trapezoid_loss,
+)
 from convexrough.friction.walk import Closed
 from convexrough.influence import Kind
 from convexrough.progress import LOGGER

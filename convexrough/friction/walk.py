@@ -24,9 +24,8 @@ from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece, Point
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
-from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import States, states_of, statuses_of
+from convexrough.friction.state import States, losses, states_of, statuses_of
 
 #: Largest total number of vertices of the memory curves along a path. A vertex takes 300 bytes.
 MOST_VERTICES = 2 * 10**7
