@@ -43,12 +43,10 @@ ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 #: not fall in each step, because slopes jump where an asperity begins or ceases to slide.
 RECENT = 10
 
-#: The numbers of steps per segment that are tried.
+#: The numbers of steps per segment that are tried, until each loss changes by at most SETTLED times
+#: the sum of this loss and NEGLIGIBLE times the largest loss, and each displacement by at most
+#: SETTLED_MOTION times the largest displacement.
 COUNTS = (4, 8, 16, 32, 64)
-
-#: The number of steps is doubled until each loss changes by at most SETTLED times the sum of this
-#: loss and NEGLIGIBLE times the largest loss, and each displacement by at most SETTLED_MOTION times
-#: the largest displacement.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
 
@@ -202,9 +200,8 @@ class Stepper:
         for (load, height), (target, shear) in pairwise([(start.load, start.height), *points]):
             grading = 1 if load else 3  # indentations grow as L^(2/3)
             parts = [Fraction(k + 1, steps) ** grading for k in range(steps)]
-            segments.append(
-                [(load + x * (target - load), height + x * (shear - height)) for x in parts]
-            )
+            added, moved = target - load, shear - height
+            segments.append([(load + x * added, height + x * moved) for x in parts])
         self.levels.prepare(load for each in segments for load, _ in each)
         for segment in segments:
             for load, height in segment:

@@ -4,10 +4,9 @@ Levels are in the scaled units of the normal problem (`normal.problem`). The uni
 f times that of loads, the unit of displacements c_t f times that of lengths, with the coefficient
 of friction f and c_t = (2 - nu) / (2 (1 - nu)).
 
-A rational number [force] identifies each level. If the load of the contact is prescribed, this
-number is the total load of the level. If the approach is prescribed, the load P of the contact is a
-result, known to about thirty digits. Then a float64 number p close to P identifies the level at P,
-and p - x identifies the level at P - x. The number 0 always identifies the level at the load 0.
+A rational number [force] identifies each level: its total load or, if the approach of the contact
+is prescribed and its load P known to about thirty digits only, p - x for the level at P - x, with a
+float64 number p close to P. The number 0 always identifies the level at the load 0.
 """
 
 from __future__ import annotations
@@ -34,16 +33,7 @@ from convexrough.scene.scene import Scene
 
 
 class FrictionLevels:
-    """The levels of a contact, by rational numbers; use `contact.cached(FrictionLevels)`.
-
-    scene : the scene, with N asperities and friction
-    top   : the level at the load P of the contact
-    load  : [force] the number that identifies `top`: P or, if the approach is prescribed, p
-    candidates : (n,) indices of the asperities that may touch at loads up to P
-    coefficient, ratio : f and c_t
-    force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces,
-        tangential displacements and energy losses
-    """
+    """The levels of a contact, by rational numbers; use `contact.cached(FrictionLevels)`."""
 
     def __init__(self, contact: Contact) -> None:
         self._levels, self.scene = contact.cached(levels_of), contact.scene
@@ -51,10 +41,10 @@ class FrictionLevels:
         self._orders: dict[tuple[frozenset[Fraction], int], Order] = {}
         self._ordered: Fraction | None = None  # order is proved from this load up to P
         self.top, problem = self._levels.top, self._levels.problem
-        self.candidates, self.units = problem.candidates, problem.units
+        self.candidates, self.units = problem.candidates, problem.units  # may touch up to P
         self._prescribed = contact.prescribed_load
         found = float(self.top.load.value) * self.units.force
-        self.load = Fraction(found if self._prescribed is None else self._prescribed)
+        self.load = Fraction(found if self._prescribed is None else self._prescribed)  # of `top`
         nu = Ball.exact(self.scene.material.poisson_ratio)
         self.coefficient = Ball.exact(checks.friction(self.scene.friction))
         self.ratio = (2.0 - nu) / ((1.0 - nu) * 2.0)

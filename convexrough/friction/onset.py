@@ -25,11 +25,9 @@ from convexrough.friction.levels import FrictionLevels
 MOST_ONSETS = 256
 
 #: Relative distances of loads from the computed onset at which proofs are tried, smallest first.
-TRIED = tuple(10.0**-k for k in range(13, 3, -1))
-
-#: Levels (normal solutions) that are known already are tried first if the relative distance of
-#: their load from the onset is between TRIED[0] and TRIED[ENOUGH].
-ENOUGH = 2
+#: Levels that are known already are tried first if their distance is from TRIED[0] to
+#: TRIED[ENOUGH].
+TRIED, ENOUGH = tuple(10.0**-k for k in range(13, 3, -1)), 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, at which they end.
 STEPS, SETTLED = 60, 2.0**-54

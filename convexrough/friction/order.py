@@ -28,8 +28,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
 #: falls from a level in use to the next higher one, and no rate at the tested levels is negative;
-#: each friction state solves one step of `general_step`. "fails": a computed rate is negative, or
-#: it is not proved that no load P_i falls from one level to the next.
+#: each friction state solves one step of `general_step`. "fails": neither is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
 #: A computed rate below -RATE_ROUNDING counts as negative. Rates are solved for to the relative
@@ -40,14 +39,9 @@ RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 #: number for which a proof is tried. `cr.prove_order` has a limit of its own.
 SWEPT, INVERTED, MOST = 400, 800, 20_000
 
-#: Largest number of intermediate levels of the bisection, with an inverse and without one.
-BETWEEN, FEW_BETWEEN = 7, 1
-
-#: Largest number of asperities of which rates are bounded by an inverse.
-MOST_BOUNDED = 4 * INVERTED
-
-#: Number of times that (4) decreases m. A heuristic.
-IMPROVEMENTS = 4
+#: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
+#: number of asperities of which an inverse bounds rates; number of times that (4) decreases m.
+BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
 
 
 def order_between(

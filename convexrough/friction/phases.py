@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise, product
-from typing import Any, ClassVar
+from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,13 +63,9 @@ def elliptic_path(
     corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
     halves = np.sort(np.mod(corners, np.pi))
     ends = np.append(np.concatenate((halves, halves + np.pi)), halves[0] + 2 * np.pi)
-    angles = np.concatenate(
-        [
-            np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
-            for a, b in pairwise(ends)
-            if b - a > 1e-9
-        ]
-    )
+    each = ((a, b, chords * (b - a) / (2 * np.pi)) for a, b in pairwise(ends) if b - a > 1e-9)
+    arcs = (np.linspace(a, b, max(1, int(np.ceil(part))), endpoint=False) for a, b, part in each)
+    angles = np.concatenate([*arcs])
     loads = checks.finite("load", load) + p * np.cos(angles)
     forces = checks.finite("force", force) + q * np.sin(angles + phase)
     return frozen(loads), frozen(forces)
@@ -162,25 +157,21 @@ def phase_losses(
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     checks.some("phases", turns)
     checks.some("factors", sizes)
-    for i, turn in enumerate(turns):
-        checks.phase(f"phases[{i}]", turn)
+    for i, phase in enumerate(turns):
+        checks.phase(f"phases[{i}]", phase)
     alone, rough, smooth = None, list[Cycle](), list[float]()
     if (reference := smooth_reference(scene, load)) is not None:  # as a scene with one asperity
         twice = 2.0 * reference.radius
         alone = Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)
-    ellipses = list(product(sizes.tolist(), turns.tolist()))
-    for k, (size, phase) in enumerate(ellipses):
-        LOGGER.info(f"ellipse {k + 1} of {len(ellipses)}")
+    turn, size_of = np.tile(turns, len(sizes)), np.repeat(sizes, len(turns))
+    for k, (phase, size) in enumerate(zip(turn.tolist(), size_of.tolist(), strict=True)):
+        LOGGER.info(f"ellipse {k + 1} of {len(turn)}")
         with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
             given = {"load": load, "force": force, "phase": phase, "friction": f}
             amplitudes = {"load_amplitude": size * swing, "force_amplitude": size * shear}
             P, Q = elliptic_path(**given, **amplitudes, chords=chords)
             rough.append(steady(scene, loads=P, forces=Q, influence=influence))
         smooth.append(steady(alone, loads=P, forces=Q).loss if alone else np.nan)
-
-    def column(values: Iterable[Any]) -> Array:
-        return frozen(np.array([*values]))
-
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
     return PhaseLosses(
         scene=scene,
@@ -188,12 +179,12 @@ def phase_losses(
         load_amplitude=swing,
         force=float(force),
         force_amplitude=shear,
-        phases=column(phase for _, phase in ellipses),
-        factors=column(size for size, _ in ellipses),
-        losses=column(each.loss for each in rough),
-        loss_errors=column(each.loss_error for each in rough),
-        smooth=column(smooth),
-        levels=column(each.level for each in rough),
+        phases=frozen(turn),
+        factors=frozen(size_of),
+        losses=frozen(np.array([each.loss for each in rough])),
+        loss_errors=frozen(np.array([each.loss_error for each in rough])),
+        smooth=frozen(np.array(smooth)),
+        levels=frozen(np.array([each.level for each in rough])),
         sliding=frozen(np.array(sliding, dtype=np.int64)),
         order=min((each.order for each in rough), key=UNSURE_FIRST.index, default="proved"),
     )

@@ -20,12 +20,9 @@ from convexrough.record import Record
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
-#: An asperity keeps the status "sliding" of the solution if the error bound of its claimed force is
-#: smaller than this fraction of the friction limit f P_i.
-NEAR_SLIDING = 1e-2
-
-#: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
-CLAIMS_SLIDING = 1e-4
+#: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i. It
+#: keeps this status of the solution if the error bound of its force is below NEAR_SLIDING f P_i.
+CLAIMS_SLIDING, NEAR_SLIDING = 1e-4, 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)

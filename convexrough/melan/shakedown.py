@@ -1,8 +1,7 @@
 """`shakedown`: the largest factor by which a load path may be scaled so that sliding dies out.
 
-In this module, sliding dies out if after some cycles no asperity that touches at the mean load
-slides as a whole or opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
-derives the limit with partial slip, and Melan's limit for asperities that stick until they slide.
+Slip at the edges of contacts goes on. docs/theory/shakedown.md derives the limit with partial slip,
+and Melan's limit for asperities that stick until they slide as a whole.
 """
 
 from __future__ import annotations
@@ -31,6 +30,9 @@ from convexrough.scene.scene import Scene
 from convexrough.vector_shear.problem import FrictionProblem
 
 Theory = Literal["exact", "elastic", "vector"]
+
+#: The numbers of an array as exact fractions.
+fractions: Any = np.frompyfunc(Fraction, 1, 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,10 +93,7 @@ class Shakedown(Table, Plottable):
 
     @property
     def limited_by(self) -> Literal["sliding", "opening"] | None:
-        """What the critical asperities do above `factor`: slide as a whole, or open in every cycle.
-
-        It is None if there is no limit.
-        """
+        """What critical asperities do above `factor`: slide as a whole, or open in every cycle."""
         if self.factor == np.inf:
             return None
         if not self.load_amplitudes.any() or self.factor == self.gross:
@@ -166,7 +165,7 @@ def shakedown(
     p = _alike("load_amplitudes", load_amplitudes, len(q))
     t0, t = Q0 / f, q / f
     if kind != "vector":  # exactly, as the factor can depend on small differences
-        t0, t, p = Fraction(Q0) / Fraction(f), _fractions(q) / Fraction(f), _fractions(p)
+        t0, t, p = Fraction(Q0) / Fraction(f), fractions(q) / Fraction(f), fractions(p)
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("force", found=force, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
@@ -180,7 +179,7 @@ def shakedown(
     if kind == "exact":
         limit = _exact(contact, t0, p, t)
     else:
-        limit = _elastic(contact, t0, t) if kind == "elastic" else solve(contact, t0, t)
+        limit = (_elastic if kind == "elastic" else solve)(contact, t0, t)
     limit["witness"] = f * limit["witness"]
     for name in ("factors", "witness", "mechanism"):
         limit[name] = frozen(limit[name])
@@ -195,11 +194,6 @@ def shakedown(
     )
 
 
-def _fractions(values: Array) -> Any:
-    """The values as an array of exact fractions."""
-    return np.array([Fraction(each) for each in values.tolist()], dtype=object)
-
-
 def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     """Fields of the result with partial slip; the shear forces t0 and t are divided by f."""
     levels = contact.cached(FrictionLevels)
@@ -209,17 +203,15 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
-    found = {last: worst}
+    found = {last: worst} | (
+        enclosed(levels, touching.tolist()) if len(touching) <= MOST_ONSETS else {}
+    )
 
     def factor(onset: Fraction) -> float:
-        """The factor at which L* = `onset`, or that of gross sliding if that is smaller.
-
-        L* is defined in docs/theory/shakedown.md; an asperity that touches at L* sticks in part.
-        """
+        """The factor at which L* (docs/theory/shakedown.md) is `onset`, or that of gross
+        sliding."""
         return float(min((P0 - onset) / fall if fall > 0 else np.inf, gross))
 
-    if len(touching) <= MOST_ONSETS:
-        found |= enclosed(levels, touching.tolist())
     factors = np.full(len(contact.scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
