@@ -65,15 +65,13 @@ class Cycle(Table, Plottable):
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
     smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
         if no asperity is loaded, or if the solution for the smooth shape is not known
-    displacement_amplitude : [length] half the range of the displacement of one body relative to the
-        other, at the points of the path
-    displacement_error : [length] proved bound on the error of the displacement amplitude
+    displacement_amplitude, displacement_error : [length] half the range of the displacement of one
+        body relative to the other, at the points of the path, and proved bound on its error
     order            : what is proved about order between the lowest and the highest load at which
         normal solutions are used (docs/theory/states.md, "Order"). "proved": losses and statuses
         are proved; "proved for one step": statuses hold for the solution with one general step
         (docs/theory/without-order.md) per straight segment, and no loss is proved; "fails": nothing
-        is proved, and general steps give the results if the normal solution at the highest P is
-        proved
+        is proved; if the normal solution at the highest P is, general steps give the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding

@@ -5,7 +5,6 @@ With the coefficient of friction f, `walk.Walk` follows the points (P, T), where
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
@@ -17,7 +16,7 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import Stepper
 from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.order import Order
@@ -198,35 +197,15 @@ def walk_of(
     scene: Scene,
     loads: ArrayLike,
     forces: ArrayLike,
-    start: Contact | None,
-    influence: Kind | None,
-    steps: int | None,
+    start: Contact | None = None,
+    influence: Kind | None = None,
+    steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> tuple[Contact, Walk]:
-    """The contact at the highest load of a path, and the path; arguments as in `load_path`."""
-    points, curve = points_of(scene, loads, forces), MemoryCurve()
-    if start is not None:
-        checks.instance("start", start, Contact)
-        if start.scene is not scene:
-            expected = "a contact whose scene is this very object: pass start.scene"
-            raise InputError("start", found="a contact of another scene", expected=expected)
-        curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
-    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
-    return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
+    """The contact at the highest load of a path, and the path; arguments as in `load_path`.
 
-
-def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
-    """The contact at the highest of these loads; at the first touch if all loads are 0."""
-    if highest := float(max(loads)):
-        if (least := float(min(load for load in loads if load))) < LEAST_PART * highest:
-            expected = f"0, or at least {LEAST_PART:g} of the largest load, {highest:g}"
-            raise InputError("loads", found=least, expected=expected)
-        return press(scene, load=highest, influence=influence)
-    return press(scene, approach=-float(scene.offsets.max()))
-
-
-def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
-    """The checked points (P, T = Q / f), as exact fractions."""
+    If all loads are 0, the contact is at the first touch.
+    """
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     P, Q = checks.array("loads", loads, sign="not negative"), checks.array("forces", forces)
@@ -238,7 +217,21 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
         raise InputError(f"forces[{bare[0]}]", found=Q[bare[0]], expected=expected)
     checks.bearable("forces", Q, f * P)
     pairs = zip(map(Fraction, P.tolist()), Q.tolist(), strict=True)
-    return [(load, height_at(load, force, scene)) for load, force in pairs]
+    points, curve = [(load, height_at(load, force, scene)) for load, force in pairs], MemoryCurve()
+    if start is not None:
+        checks.instance("start", start, Contact)
+        if start.scene is not scene:
+            expected = "a contact whose scene is this very object: pass start.scene"
+            raise InputError("start", found="a contact of another scene", expected=expected)
+        curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
+    if positive := [float(load) for load in (curve.load, *(load for load, _ in points)) if load]:
+        if min(positive) < LEAST_PART * max(positive):
+            expected = f"0, or at least {LEAST_PART:g} of the largest load, {max(positive):g}"
+            raise InputError("loads", found=min(positive), expected=expected)
+        contact = press(scene, load=max(positive), influence=influence)
+    else:
+        contact = press(scene, approach=-float(scene.offsets.max()))
+    return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
 
 
 def path_of(contact: Contact, walk: Walk) -> LoadPath:

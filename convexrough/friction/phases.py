@@ -82,15 +82,11 @@ class PhaseLosses(Table, Plottable):
 
     scene   : the scene
     phases, factors : (c,) phase [rad], and factor of both amplitudes
-    losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
-        replace the ellipse
-    loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
-        the chords
-    smooth  : (c,) [force length] losses of the shape without roughness; nan if the solution of the
-        smooth contact is not known
+    losses, loss_errors : (c,) [force length] energy lost by both bodies per steady cycle along the
+        chords that replace the ellipse, and proved bounds on the errors for these chords
+    smooth  : (c,) [force length] losses of the shape without roughness; nan if not known
     levels  : (c,) [force] `Cycle.level`, the load L* up to which the memory curve no longer changes
-    sliding : (c,) number of asperities that, on this ellipse, slide as a whole or lose contact in
-        the steady cycle
+    sliding : (c,) number of asperities that slide as a whole or lose contact in the steady cycle
     order   : the weakest `Cycle.order` of all cycles
 
     >>> losses = cr.phase_losses(

@@ -13,14 +13,15 @@ direction c of slip, 1 or -1. B is the sum of the B_i(P, L) of (2).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
@@ -32,13 +33,8 @@ from convexrough.normal.levels import NUMBERS
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import mindlin
 
-#: The load P and the level L of the front at one moment of a path [force].
-Moment: TypeAlias = tuple[Fraction, Fraction]
-
-#: The values of a load [force] at the beginning and the end of a part of a path.
-Ends: TypeAlias = tuple[Fraction, Fraction]
-
-T = TypeVar("T")
+#: The load P and the level L of the front at one moment, or one of them at two moments [force].
+Loads: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):
@@ -177,20 +173,14 @@ def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     moments = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
     slipped = [each for each in dict.fromkeys(moments) if each[0] != each[1]]  # B(P, P) = 0
     place, found = {each: k for k, each in enumerate(slipped)}, list[Ball]()
-    for some in _some([*place], 1 + len(levels.candidates)):
-        slip, slide = _at_moments(levels, some)
+    for some in threads.chunks(len(slipped), max(1, NUMBERS // (1 + len(levels.candidates)))):
+        slip, slide = _at_moments(levels, slipped[some])
         found.append((slip + slide).sum())
     lost = joined([*found, Ball.exact(np.zeros(1))])[[place.get(each, -1) for each in moments]]
     return lost[1::2] - lost[0::2]
 
 
-def _some(values: Sequence[T], size: int) -> Iterator[Sequence[T]]:
-    """The values in parts, each with about NUMBERS numbers in memory, `size` for each value."""
-    step = max(1, NUMBERS // size)
-    return (values[start : start + step] for start in range(0, len(values), step))
-
-
-def _at_moments(levels: FrictionLevels, moments: Sequence[Moment]) -> tuple[Ball, Ball]:
+def _at_moments(levels: FrictionLevels, moments: Sequence[Loads]) -> tuple[Ball, Ball]:
     """`asperity_losses` at k moments."""
     loads = sorted({load for each in moments for load in each})
     rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
@@ -251,7 +241,7 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     are sums of the means. Their relative errors are about cells^-2, the bounds about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
-    parts = list[tuple[Fraction, Ends, Ends]]()  # weight; P and front at both ends of a cell
+    parts = list[tuple[Fraction, Loads, Loads]]()  # weight; P and front at both ends of a cell
     for piece in pieces:
         part = 0.0 if piece.load_constant else float((piece.top - piece.bottom) / run)
         cut = max(1, round(cells * part))
@@ -264,7 +254,8 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
         parts += [(weight, *both) for both in zip(pairwise(loads), pairwise(fronts), strict=True)]
     levels.prepare(load for _, *both in parts for ends in both for load in ends)
     totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
-    for some in _some(parts, 4 + 4 * len(levels.candidates)):
+    for chunk in threads.chunks(len(parts), max(1, NUMBERS // (4 + 4 * len(levels.candidates)))):
+        some = parts[chunk]
         moments = [(P, min(L, P)) for _, loads, fronts in some for P in loads for L in fronts]
         weights = exactly([weight for weight, _, _ in some])
         same = np.array([P == R for _, (P, R), _ in some])[:, None]

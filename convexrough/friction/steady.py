@@ -16,7 +16,7 @@ from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.path import points_of, pressed_for
+from convexrough.friction.path import walk_of
 from convexrough.friction.state import (
     LevelSums,
     by_status,
@@ -146,13 +146,12 @@ def steady(
     >>> f"{settled.level / P:.4f}", int((settled.status == "sliding").sum())
     ('0.3500', 12)
     """
-    points = points_of(scene, loads, forces)
-    contact = pressed_for(scene, [load for load, _ in points], influence)
-    return steady_cycles(contact, MemoryCurve(), [points])[0]
+    contact, walk = walk_of(scene, loads, forces, influence=influence)
+    return steady_cycles(contact, walk.start, [walk.points])[0]
 
 
 def steady_cycles(
-    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]]
+    contact: Contact, start: MemoryCurve, paths: Sequence[Sequence[Point]]
 ) -> list[Cycle]:
     """The steady cycles of several closed paths (P, T) that begin from the same memory curve."""
     levels = contact.cached(FrictionLevels)

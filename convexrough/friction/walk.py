@@ -123,7 +123,7 @@ class Closed(Walk):
     """A closed path of m points, followed twice; the second cycle is the steady one."""
 
     @classmethod
-    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> Closed:
+    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: Sequence[Point]) -> Closed:
         return cls(levels, start, [*points, *points, points[0]])
 
     @property
