@@ -33,15 +33,12 @@ from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding prevents
-#: this accuracy, a residual up to a thousand times as large is accepted.
-ACCURATE = 1e-14
+#: this accuracy, a residual up to a thousand times as large is accepted. The residual must be below
+#: the largest of the RECENT latest ones; slopes jump where an asperity begins or ceases to slide.
+ACCURATE, RECENT = 1e-14, 10
 
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
-
-#: The residual after a Newton step must be below the largest of this many latest residuals. It need
-#: not fall in each step, because slopes jump where an asperity begins or ceases to slide.
-RECENT = 10
 
 #: The numbers of steps per segment that are tried, until each loss changes by at most SETTLED times
 #: the sum of this loss and NEGLIGIBLE times the largest loss, and each displacement by at most
@@ -222,17 +219,10 @@ class Stepper:
                 raise
             middle = (now.load + load) / 2, (now.height + height) / 2
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
-        return Bundle(
-            load,
-            height,
-            step.indentations,
-            own.curves(),
-            own.fronts,
-            own.forces,
-            positions=now.positions + eta,
-            displacement=now.displacement + x,
-            work=now.work + float(now.height + height) / 2 * x,
-        )
+        moved, displacement = now.positions + eta, now.displacement + x
+        work = now.work + float(now.height + height) / 2 * x
+        known = step.indentations, own.curves(), own.fronts, own.forces
+        return Bundle(load, height, *known, moved, displacement, work)
 
     def _gross(self, step: Step) -> tuple[Array, float, OwnStep]:
         """eta, x and the own steps at the smallest displacement at which all asperities slide."""

@@ -230,16 +230,9 @@ class ConicStepper(Stepper):
         T, slope = forces[:, None, :-1], slopes[:, None]
         low, high, rate = np.broadcast_arrays(loads[:, None, :-1], loads[:, None, 1:], sign - slope)
         kept = (high - low > THIN) & (np.abs(rate) > THIN)
-        owner, low, high, rate, force, moved = (
-            np.nonzero(kept)[0],
-            *(
-                each[kept]
-                for each in (
-                    *(low, high, rate, sign + T - slope * low),
-                    sign + xi[:, None, :-1] - slope * s[:, None, :-1],
-                )
-            ),
-        )
+        force, moved = sign + T - slope * low, sign + xi[:, None, :-1] - slope * s[:, None, :-1]
+        slipped = (low, high, rate, force, moved)
+        owner, (low, high, rate, force, moved) = np.nonzero(kept)[0], (it[kept] for it in slipped)
 
         # The columns y1 (with five cones only), y2, ..., y5 and z of each piece of slip.
         m, names = len(owner), 6 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 5
@@ -258,9 +251,7 @@ class ConicStepper(Stepper):
         bent = np.zeros(width - n)
         bent[:n] = np.where(half > 0, scale * (softness - shifts), 0.0)
         A = self.A[np.ix_(which, which)] + np.diag(wells)
-        quadratic = sparse.block_diag(
-            (np.triu(A * N * (N[:, None] / unit)), sparse.diags_array(bent))
-        )
+        blocks = np.triu(A * N * (N[:, None] / unit)), sparse.diags_array(bent)
 
         # T_i = T_B + the part that sticks + sum of rate (high - y3);  the sum of all T_i.
         rows = np.arange(n)
@@ -276,12 +267,10 @@ class ConicStepper(Stepper):
         limits[:, 0] = np.concatenate((half, (high - low) / 2.0))
         limits[n:, 1] = -(high + low) / 2.0
         program = ConeProgram(
-            quadratic=sparse.csc_matrix(quadratic),
+            quadratic=sparse.csc_matrix(sparse.block_diag(blocks)),
             linear=linear,
             constraints=sparse.csc_matrix(sparse.vstack((sums, bounds, powers.matrix))),
-            constant=np.concatenate(
-                ([step.total / N.sum()], total, limits.ravel(), powers.constant)
-            ),
+            constant=np.hstack((step.total / N.sum(), total, limits.ravel(), powers.constant)),
             equalities=1 + n,
         )
         return program, unit

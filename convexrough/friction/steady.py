@@ -179,6 +179,8 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     lost = top.touching & bottom.open
     slips = (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
     doubtful = levels.to_scene(slides | ~(rest.touching | rest.open))
+    gross = np.where(levels.to_scene(kept), slips.value, 0.0)
+    gross[levels.to_scene(lost)] = np.nan
     radii, radius_errors = stick_radii(levels, rest)
     loaded, heights = zip(*closed.points[: closed.once], strict=True)
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
@@ -208,11 +210,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         loss_first=float(first),
         loss_first_error=float(first_error + unproved),
         status=by_status(levels, top, **({} if unknown else statuses)),
-        slips=frozen(
-            np.where(
-                levels.to_scene(lost), np.nan, np.where(levels.to_scene(kept), slips.value, 0.0)
-            )
-        ),
+        slips=frozen(gross),
         slip_errors=frozen(np.where(doubtful, slips.error, 0.0) + unknown),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors + unknown),

@@ -52,32 +52,20 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 #: Numbers of neighbours, moments of the weights (None for the linear program), and whether the mean
 #: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
-#: also uses the asperities that determined q_i in earlier tries. Tries with more than MORE
-#: neighbours are made only if at most FEW asperities remain.
+#: also uses the asperities that determined q_i in earlier tries.
 TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
     (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
     (32, around, False), (32, edge, False), (32, edge, True),
     (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
 )  # fmt: skip
-MORE, FEW = 32, 300
 
-#: Number of nearest neighbours of an asperity outside the contact that are tried, each alone.
-ALONE = 14
-
-#: If (7) proves (6) for all far asperities, (6) is computed only for the nearest ones: NEAR times
-#: as many as the weights have neighbours.
-NEAR = 9
-
-#: Largest number of systems that are solved for weights; each leaves out the neighbours whose
-#: weights were negative in an earlier one.
-SEARCHES = 15
-
-#: The linear program considers about twice as many asperities as this.
-SAMPLE = 300
-
-#: DIRECTIONS: number of directions in which the extent of the support is computed. ROWS: number of
-#: asperities that are treated together. NUMBERS: about the number of float64 numbers in an array.
-DIRECTIONS, ROWS, NUMBERS = 256, 2**14, 2**20
+MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
+ALONE = 14  # neighbours of an asperity outside the contact that are tried, each alone
+NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
+SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
+SAMPLE = 300  # the linear program considers about twice as many asperities
+DIRECTIONS = 256  # directions in which the extent of the support is computed
+ROWS, NUMBERS = 2**14, 2**20  # asperities treated together, and float64 numbers in an array
 
 
 def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> Array:
