@@ -174,9 +174,8 @@ class Cycles(Table):
 
     def __getitem__(self, k: int) -> Cycle:
         """The cycle of contact k."""
-        return cycle(
-            self.contacts[k], maximum=float(self.maximum[k]), minimum=float(self.minimum[k])
-        )
+        ends = {"maximum": float(self.maximum[k]), "minimum": float(self.minimum[k])}
+        return cycle(self.contacts[k], **ends)
 
 
 def press_many(
@@ -223,8 +222,8 @@ def press_many(
             raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
-        own: tuple[Any, ...] = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
-        own += one.loads, proof.load_errors, proof.status
+        totals = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
+        own: tuple[Any, ...] = (*totals, one.loads, proof.load_errors, proof.status)
         for values, value in zip(fields.values(), own, strict=True):
             values[k] = value
     contacts = Contacts(

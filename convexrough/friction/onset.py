@@ -21,8 +21,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.levels import FrictionLevels
 
-#: The largest number of onsets in one call if no compliance matrix is stored.
-MOST_ONSETS = 256
+MOST_ONSETS = 256  # in one call, if no compliance matrix is stored
 
 #: Relative distances of loads from the computed onset at which proofs are tried, smallest first.
 #: Levels that are known already are tried first if their distance is from TRIED[0] to
@@ -44,12 +43,10 @@ class Onset(NamedTuple):
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
-    It is f (P - the load of the first touch): docs/theory/states.md, "First loading".
-
-    In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
-    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load, and
-    if order (docs/theory/states.md) "fails" between the load of the asperity's first touch and the
-    load of the contact: the asperity may then start to slide at another force.
+    It is f (P - the load of the first touch): docs/theory/states.md, "First loading". In a steady
+    cycle at constant load, the asperity slides if the amplitude of the shear force exceeds it. The
+    result is nan for an asperity without load, and if order (docs/theory/states.md) "fails" between
+    its first touch and the load of the contact: it may then start to slide at another force.
 
     which : indices of asperities, in the order of the result; default: all. Several normal problems
         are solved for each
@@ -65,17 +62,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     f = Fraction(checks.friction(contact.scene.friction))
     asked = indices("which", which, len(contact.scene))
     onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(contact.loads[asked])
-    if len(loaded) == 0:
-        return frozen(onsets)
     levels = contact.cached(FrictionLevels)
     if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
-        raise InputError(
-            "which",
-            found=f"{len(loaded):,} loaded asperities",
-            expected=f"at most {MOST_ONSETS}: for each, several normal problems are solved",
-        )
+        expected = f"at most {MOST_ONSETS}: for each, several normal problems are solved"
+        raise InputError("which", found=f"{len(loaded):,} loaded asperities", expected=expected)
     found = enclosed(levels, asked[loaded].tolist())
-    ordered = levels.order([min(each.load for each in found.values())]) != "fails"
+    lowest = min((each.load for each in found.values()), default=levels.load)
+    ordered = levels.order([lowest]) != "fails"
     for k in loaded.tolist():
         load = found[int(asked[k])].load
         if ordered or levels.order([load]) != "fails":

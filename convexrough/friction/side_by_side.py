@@ -33,12 +33,9 @@ from convexrough.solvers.programs import ConeProgram, run_clarabel
 
 Way = Literal["general step", "memory curve", "conic step"]
 
-#: Tolerance of the solver Clarabel, and the largest fraction of the distance to the boundary of the
-#: cones by which one of its steps moves.
-TOLERANCE, STEP = 1e-11, 0.9
-
-#: Layers thinner than this fraction of the load are omitted; the errors of the solver are larger.
-THIN = 1e-9
+TOLERANCE = 1e-11  # of the solver Clarabel
+STEP = 0.9  # the largest part of the way to the boundary of the cones that one of its steps moves
+THIN = 1e-9  # thinner layers, as a part of the load, are omitted; errors of the solver are larger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,10 +46,8 @@ class PathEntry(Record):
     outcome : "answered", "refused" (the method does not apply to the path) or "failed"
     message : the reason why there is no result, or ""
     path    : the result; None if there is none
-    force_disagreement : largest difference of a shear force Q_i from the result of the first method
-        that answered, divided by the largest friction limit f P_i
-    displacement_disagreement : largest difference of the displacement X from the same result,
-        divided by the largest |X| of that result
+    force_disagreement, displacement_disagreement : largest differences of a shear force Q_i and of
+        the displacement X from the first result, over the largest friction limit f P_i and |X|
     seconds : [s] time, including the normal solutions that were not cached
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
@@ -200,8 +195,7 @@ class ConicStepper(Stepper):
 
         The variables are T_i / N_i of the n asperities `which`, which touch after the step with the
         loads N_i; their n parts on the pieces where they stick; and the powers of N^(1/3) on each
-        piece where they slip. Raises SolverError if the diagonal that makes the compliance matrix
-        positive semidefinite (`shells`) is too large for the cones.
+        piece where they slip. The `shells` make the compliance matrix positive semidefinite.
         """
         from scipy import sparse  # 0.1 s to import: only when solving
 

@@ -1,14 +1,12 @@
 """Friction states and energy losses, from solutions under normal load; both assume order.
 
-States are sums of solutions, weighted by the changes of slope of the memory curve. Equation (1) of
-docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of the
-bodies. The sum for X, with the indentations of an asperity in place of the approach, gives the own
-deflection plus drift of this asperity. docs/theory/states.md, (1), is the case of first loading.
+States are sums of solutions, weighted by the changes of slope of the memory curve: (1) of
+docs/theory/paths.md. The sum for the displacement X of the bodies, with the indentations of an
+asperity in place of the approach, gives the own deflection plus drift of this asperity.
 
-Losses (docs/theory/losses.md) are divided by c_t f^2, with the coefficient of friction f and
-Mindlin's ratio c_t. While the total load is P and the slip front falls through the level L, the
-loss per unit of L is (1 - c th) (-dB/dL), with the slope th of the memory curve at L and the
-direction c of slip, 1 or -1. B is the sum of the B_i(P, L) of (2).
+Losses (docs/theory/losses.md) are divided by c_t f^2. While the total load is P and the slip front
+falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL), with the slope th of the
+memory curve at L and the direction c of slip, 1 or -1. B is the sum of the B_i(P, L) of (2).
 """
 
 from __future__ import annotations

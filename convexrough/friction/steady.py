@@ -13,18 +13,11 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.friction import state
 from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.path import walk_of
-from convexrough.friction.state import (
-    LevelSums,
-    by_status,
-    displacements_of,
-    losses,
-    stick_radii,
-    trapezoid_loss,
-)
 from convexrough.friction.walk import Closed
 from convexrough.influence import Kind
 from convexrough.progress import LOGGER
@@ -159,8 +152,10 @@ def steady_cycles(
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
         levels.order(needed)  # a proof for the widest range of loads holds for the others
-    spent = losses(levels, [pieces for each in closed for pieces in each.cycles]) * levels.loss_unit
-    moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
+    costs = [pieces for each in closed for pieces in each.cycles]
+    spent = state.losses(levels, costs) * levels.loss_unit
+    sums = state.LevelSums.of([curve for each in closed for curve in each.steady])
+    moved = state.displacements_of(levels, sums)
     ends = np.cumsum([0, *map(len, paths)]).tolist()
     return [
         _cycle(contact, closed[k], spent[2 * k : 2 * k + 2], moved[start:stop])
@@ -181,12 +176,12 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     doubtful = levels.to_scene(slides | ~(rest.touching | rest.open))
     gross = np.where(levels.to_scene(kept), slips.value, 0.0)
     gross[levels.to_scene(lost)] = np.nan
-    radii, radius_errors = stick_radii(levels, rest)
+    radii, radius_errors = state.stick_radii(levels, rest)
     loaded, heights = zip(*closed.points[: closed.once], strict=True)
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     defect = smooth = np.nan
     if set(loaded) == {levels.load}:
-        other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
+        other = state.trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
         defect = abs(float(other.value) - loss) / (loss or 1.0)
         if reference:
             smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
@@ -209,7 +204,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         loss_error=float(error + unproved),
         loss_first=float(first),
         loss_first_error=float(first_error + unproved),
-        status=by_status(levels, top, **({} if unknown else statuses)),
+        status=state.by_status(levels, top, **({} if unknown else statuses)),
         slips=frozen(gross),
         slip_errors=frozen(np.where(doubtful, slips.error, 0.0) + unknown),
         stick_radii=radii,

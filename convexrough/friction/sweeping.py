@@ -189,10 +189,7 @@ class _Swept:
         return np.where(found, self.lost / 2, -np.inf)
 
     def weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
-        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found.
-
-        by_near : True if outward is the direction from the mean of the neighbours
-        """
+        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
         (m, s), here = near.shape, self.places[which]
         middle = self.places[near].mean(axis=1) if by_near else self.middle
         outwards = np.where(here == middle, 1.0, here - middle)

@@ -21,12 +21,9 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.problem import FrictionProblem
 
-#: The solver's tolerance, and the fraction by which residual forces are moved away from the
-#: friction limits.
-TOLERANCE, MARGIN = 1e-10, 1e-9
-
-#: Slips are rounded to multiples of the largest slip / STEPS, so that sums of slips are exact.
-STEPS = 2.0**30
+TOLERANCE = 1e-10  # of the solver
+MARGIN = 1e-9  # fraction by which residual forces are moved away from the friction limits
+STEPS = 2.0**30  # slips are multiples of the largest / STEPS, so that their sums are exact
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> dict[str, Any]:
@@ -136,10 +133,7 @@ def _lower(
 
 
 def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
-    """The least and the largest lambda with |fixed + lambda scaled| <= limits; (inf, 0) if none.
-
-    fixed, scaled, limits : (n, 2), (m, n, 2) and (n,)
-    """
+    """The least and the largest lambda with |fixed + lambda scaled| <= limits; (inf, 0) if none."""
     a, b = (scaled**2).sum(axis=-1), (fixed * scaled).sum(axis=-1)
     c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
     moving = a > 0

@@ -52,8 +52,7 @@ class Shakedown(Table, Plottable):
     factors : (n,) the same limit for each asperity alone; nan if it is not computed or the asperity
         does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
-    witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
-        path scaled by `lower`
+    witness : (n,) or (n, 2) [force] residual shear forces; with them, none slides at `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
     order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
@@ -132,8 +131,7 @@ def shakedown(
     """The largest factor by which a closed path may be scaled so that sliding dies out.
 
     The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
-    Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
-    docs/theory/shakedown.md derives the limits.
+    `Shakedown.factor` says when sliding dies out; docs/theory/shakedown.md derives the limits.
 
     load, force : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
     load_amplitudes : [force] (m,) or one number for all points; must be 0 unless `kind` is "exact"
