@@ -199,7 +199,7 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if there is no derivative, with the cases of `ShearState.gradient`.
+        Raises InputError if there is no derivative, in the cases of `ShearState.gradient`.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -298,13 +298,6 @@ def loops(
         else:
             states, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
         forces, displacements = states.forces.value, states.asperity_displacements.value
-        found.append(
-            Loop(
-                chosen,
-                walk.forces[2:],
-                frozen(states.displacements.value[2:]),
-                frozen(np.where(loaded, forces[2:, some], 0.0)),
-                frozen(np.where(loaded, displacements[2:, some], 0.0)),
-            )
-        )
+        own = (frozen(np.where(loaded, it[2:, some], 0.0)) for it in (forces, displacements))
+        found.append(Loop(chosen, walk.forces[2:], frozen(states.displacements.value[2:]), *own))
     return found

@@ -36,7 +36,7 @@ class Fretting(Table, Plottable):
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
         load of the cycle; nan where contact is lost in the cycle ("intermittent")
-    gross_slip_amplitudes : [length] the same of the whole disc; 0 if some of it sticks
+    gross_slip_amplitudes : [length] the same for the whole disc; 0 if some of it sticks
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
         bounds on their errors. If the load varies, their sum is less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |shear force of the asperity / area of its

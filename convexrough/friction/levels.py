@@ -94,7 +94,8 @@ class FrictionLevels:
     def displaced(self, displacement: float) -> Fraction:
         """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 [length].
 
-        The approach at this load is D0(P) - X / (c_t f). Raises InputError in gross sliding.
+        The approach at this load is D0(P) - X / (c_t f). Raises InputError beyond the X at which
+        gross sliding starts.
         """
         room = self.top.approach - self.at(Fraction(0)).approach
         farthest = float((room * self.travel_unit).value)

@@ -154,16 +154,8 @@ def compare_paths(
         largest = (scene.friction or 1.0) * float(path.asperity_loads.max()) or 1.0
         off = np.abs(path.displacements - reference.displacements).max()
         farthest = float(np.abs(reference.displacements).max()) or 1.0
-        entries.append(
-            PathEntry(
-                way=way,
-                outcome="answered",
-                path=path,
-                force_disagreement=float(apart) / largest,
-                displacement_disagreement=float(off / farthest),
-                seconds=seconds,
-            )
-        )
+        disagreements = float(apart) / largest, float(off / farthest)
+        entries.append(PathEntry(way, "answered", "", path, *disagreements, seconds))
     if reference is None:
         raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
     found = reference.loads, reference.forces, reference.order, tuple(entries)

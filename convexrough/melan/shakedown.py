@@ -52,7 +52,7 @@ class Shakedown(Table, Plottable):
     factors : (n,) the same limit for each asperity alone; nan if it is not computed or the asperity
         does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
-    witness : (n,) or (n, 2) [force] residual shear forces; with them, none slides at `lower`
+    witness : (n,) or (n, 2) [force] residual shear forces with which none slides at `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
     order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
@@ -201,9 +201,8 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
-    found = {last: worst} | (
-        enclosed(levels, touching.tolist()) if len(touching) <= MOST_ONSETS else {}
-    )
+    few = touching.tolist() if len(touching) <= MOST_ONSETS else []
+    found = {last: worst} | enclosed(levels, few)
 
     def factor(onset: Fraction) -> float:
         """The factor at which L* (docs/theory/shakedown.md) is `onset`, or that of gross
