@@ -17,11 +17,11 @@ from .errors import SolverError as SolverError
 from .errors import WorkerError as WorkerError
 from .friction.curve import MemoryCurve as MemoryCurve
 from .friction.cycle import Cycle as Cycle
+from .friction.cycle import Loop as Loop
 from .friction.cycle import loops as loops
 from .friction.fretting import Fretting as Fretting
 from .friction.fretting import fretting as fretting
 from .friction.levels import prove_order as prove_order
-from .friction.loop import Loop as Loop
 from .friction.onset import onset_of_sliding as onset_of_sliding
 from .friction.path import LoadPath as LoadPath
 from .friction.path import history as history

@@ -21,7 +21,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.steady import cycle
+from convexrough.friction.steady import cycle, force_ranges
 from convexrough.plausibility import cautions_about
 from convexrough.record import Along, Table, in_text, singular
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -96,25 +96,16 @@ class Contacts(Table):
         >>> print([f"{loss:.4g}" for loss in found.losses], found.order.tolist())
         ['1.364e-13', '6.542e-15'] ['proved', 'proved']
         """
-        m, n = self.status.shape
-        upper = checks.array("maximum", maximum, length=m, one="scene")
-        lower = -upper
-        if minimum is not None:
-            lower = checks.array("minimum", minimum, length=m, one="scene")
-        f = np.array([checks.friction(scene.friction) for scene in self.scenes])
-        for name, forces in (("maximum", upper), ("minimum", lower)):
-            checks.bearable(name, forces, f * self.loads)
-        if (upper < lower).any():
-            k = int(np.argmax(upper < lower))
-            expected = f"at least the minimum, {lower[k]:g} (-maximum by default)"
-            raise InputError(f"maximum[{k}]", found=upper[k], expected=expected)
+        (m, n), f = self.status.shape, [checks.friction(scene.friction) for scene in self.scenes]
+        limits = np.array(f) * self.loads
+        upper, lower = force_ranges(maximum, minimum, limits, length=m, one="scene")
         fields: dict[str, NDArray[Any]] = {name: np.zeros(m) for name in CYCLE}
         fields["order"] = np.full(m, "proved", dtype="<U19")
         fields["status"], alone = np.full((m, n), "open", dtype="<U12"), np.ones(m, dtype=bool)
         with threads.one_where(MATRICES):
             for rows in self._together:
                 at = rows.places
-                good, found = rows.cycles(upper[at], lower[at], f[at])
+                good, found = rows.cycles(upper[at], lower[at], np.array(f)[at])
                 places = at[good]
                 alone[places] = False
                 for name, values in found.items():
@@ -130,10 +121,7 @@ class Contacts(Table):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """The warnings of the contacts: a line for each kind, with the first scene that has it.
-
-        The kind of a warning is its text without numbers.
-        """
+        """The warnings: a line for each kind (its text without numbers), with the first scene."""
         kinds = dict[str, list[str]]()
         for k, (scene, loads) in enumerate(zip(self.scenes, self.asperity_loads, strict=True)):
             pressed = "undecided" in self.status[k]
@@ -186,9 +174,8 @@ class Cycles(Table):
 
     def __getitem__(self, k: int) -> Cycle:
         """The cycle of contact k."""
-        return cycle(
-            self.contacts[k], maximum=float(self.maximum[k]), minimum=float(self.minimum[k])
-        )
+        ends = {"maximum": float(self.maximum[k]), "minimum": float(self.minimum[k])}
+        return cycle(self.contacts[k], **ends)
 
 
 def press_many(
@@ -215,10 +202,9 @@ def press_many(
             expected = f"{len(scenes[0])}, as in scenes[0]: all scenes need as many asperities"
             raise InputError(f"scenes[{k}]", found=f"{len(scene)} asperities", expected=expected)
     m, n = len(scenes), len(scenes[0]) if scenes else 0
-    name = "approach" if load is None else "load"
-    given = cast("ArrayLike", approach if load is None else load)
+    name, given = ("approach", approach) if load is None else ("load", load)
     sign = "positive" if by_load else ""
-    controls = checks.array(name, given, length=m, sign=sign, one="scene")
+    controls = checks.array(name, cast("ArrayLike", given), length=m, sign=sign, one="scene")
     fields: dict[str, NDArray[Any]] = {each: np.zeros(m) for each in TOTALS}
     fields |= {each: np.zeros((m, n)) for each in ("asperity_loads", "asperity_load_errors")}
     fields["status"], alone = np.full((m, n), "undecided"), np.ones(m, dtype=bool)
@@ -236,14 +222,10 @@ def press_many(
             raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
-        own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
-        for total, value in zip(TOTALS, own, strict=True):
-            fields[total][k] = value
-        fields["asperity_loads"][k], fields["asperity_load_errors"][k] = (
-            one.loads,
-            proof.load_errors,
-        )
-        fields["status"][k] = proof.status
+        totals = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
+        own: tuple[Any, ...] = (*totals, one.loads, proof.load_errors, proof.status)
+        for values, value in zip(fields.values(), own, strict=True):
+            values[k] = value
     contacts = Contacts(
         scenes=scenes,
         by_load=by_load,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arrays import Array, Indices
-from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
+from convexrough.friction.state import asperity_losses
 from convexrough.normal.boxes import Box
 from convexrough.normal.exact import Data, twofold_offsets
 from convexrough.normal.level import Rows

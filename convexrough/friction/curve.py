@@ -1,11 +1,10 @@
 """The memory curve: the friction state under varying normal load, as plane geometry.
 
-P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
-after any path of (P, T) is a polygonal line: the heights Th(s) at load levels 0 <= s <= P. It leads
-from (0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path
-changes this line by the rules in docs/theory/paths.md, "Changes of the curve". The slip front is
-the level above which the segment has changed the line. The rules do not depend on elasticity. All
-numbers are exact fractions, so no rule rounds.
+With the load P, the shear force Q and the coefficient of friction f, the state after any path of
+(P, T = Q / f) is a polygonal line: the heights Th(s) at load levels 0 <= s <= P. It leads from
+(0, 0) to the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes
+it by the rules in docs/theory/paths.md, "Changes of the curve", above a level, the slip front. The
+rules do not depend on elasticity. All numbers are exact fractions, so no rule rounds.
 """
 
 from __future__ import annotations
@@ -30,19 +29,15 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 class Piece(NamedTuple):
     """A part of a path's segment on which the slip front falls through one layer of the curve.
 
-    sign   : the direction c of slip, 1 or -1
-    slope  : slope th of the layer; the loss is proportional to 1 - c th
-    top, bottom : [force] levels of the front at the beginning and the end of the part
-    load_before, load_after : [force] P at the beginning and the end; P is linear in the level of
-        the front
+    In this part, the load P is a linear function of the level of the front.
     """
 
-    sign: int
-    slope: Fraction
-    top: Fraction
-    bottom: Fraction
-    load_before: Fraction
-    load_after: Fraction
+    sign: int  # the direction c of slip, 1 or -1
+    slope: Fraction  # slope th of the layer; the loss is proportional to 1 - c th
+    top: Fraction  # [force] level of the front at the beginning
+    bottom: Fraction  # [force] level of the front at the end
+    load_before: Fraction  # [force] P at the beginning
+    load_after: Fraction  # [force] P at the end
 
     @property
     def load_constant(self) -> bool:
@@ -143,9 +138,8 @@ class MemoryCurve(Table, Plottable):
 
         The line of slope `sign` through the moving point (P, T) meets the old curve at the front.
         The front reaches the lower end of a layer when the point has passed the fraction `reach` of
-        the segment. Within a layer, the level of the front is linear in this fraction. The front
-        passes a layer of slope `sign` at once. If the load falls, the point may meet the curve
-        again. Then slip ends.
+        the segment; its level is linear in this fraction. It passes a layer of slope `sign` at
+        once. If the load falls, the point may meet the curve again. Then slip ends.
         """
         added, shear = load - self.load, height - self.height
         rate, done, front, k = shear - sign * added, Fraction(0), Fraction(0), 0

@@ -1,10 +1,7 @@
 """Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
-The path is a closed curve of the load P and the shear force Q; f is the coefficient of friction,
-and T = Q / f. The memory curve stores the friction state as a function of the load.
-docs/theory/paths.md, "Closed paths", defines the point (L*, T*) and proves that from the second
-cycle on the part of the curve below L* no longer changes, and the part above repeats in each cycle.
-docs/theory/losses.md derives the loss.
+docs/theory/paths.md, "Closed paths", proves that from the second cycle on the memory curve no
+longer changes below the point (L*, T*), and repeats above. docs/theory/losses.md derives the loss.
 """
 
 from __future__ import annotations
@@ -13,35 +10,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arithmetic.balls import of_rows
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, rounded
-from convexrough.friction.loop import Loop, loop_through
-from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.state import (
-    LevelSums,
-    by_status,
-    displacements_of,
-    stick_radii,
-)
-from convexrough.friction.walk import Closed
+from convexrough.friction.state import shared, states_of
+from convexrough.friction.walk import Closed, Walk
 from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
-from convexrough.sphere import mindlin
-from convexrough.sphere.smooth import smooth_reference
 
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
@@ -64,29 +52,26 @@ class Cycle(Table, Plottable):
     loss_first       : [force length] energy lost from the start without shear to the end of cycle 1
     loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
-        (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
-        lost in the cycle), "open" (never loaded) or "undecided"
+        (as a whole, once in each direction per cycle), "intermittent" (contact is lost in the
+        cycle), "open" (never loaded) or "undecided"
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
-    level, force_level : [force] L* and f T*: the memory curve (docs/theory/paths.md) up to the load
-        L* is the same at every moment from the second cycle on
-    balance_defect   : relative difference between `loss` and the loss by a second formula, (1) of
-        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps give the
-        results
+    level, force_level : [force] L* and f T*: from the second cycle on the memory curve
+        (docs/theory/paths.md) is the same at every moment up to the load L*
+    balance_defect   : relative difference between `loss` and the loss by (1) of
+        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps are used
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
     smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
         if no asperity is loaded, or if the solution for the smooth shape is not known
-    displacement_amplitude : [length] half the range of the displacement of one body relative to the
-        other, at the points of the path
-    displacement_error : [length] proved bound on the error of the displacement amplitude
+    displacement_amplitude, displacement_error : [length] half the range of the displacement of one
+        body relative to the other, at the points of the path, and proved bound on its error
     order            : what is proved about order between the lowest and the highest load at which
         normal solutions are used (docs/theory/states.md, "Order"). "proved": losses and statuses
         are proved; "proved for one step": statuses hold for the solution with one general step
-        (docs/theory/without-order.md) per straight segment of the path, and no loss is proved;
-        "fails": nothing is proved, and general steps give the results if the normal solution at the
-        highest P is proved
+        (docs/theory/without-order.md) per straight segment, and no loss is proved; "fails": nothing
+        is proved; if the normal solution at the highest P is, general steps give the results
     presses          : number of normal problems that were solved
     start            : [force] load at the start of the path, without shear; 0 if unloaded
     heights          : (m,) [force] Q / f at the points of the path, without rounding
@@ -159,10 +144,9 @@ class Cycle(Table, Plottable):
         """(n,) [force length] energy lost at each asperity per cycle.
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
-        the ranges of load through which the slip fronts move are cut into cells, about 64 in total.
-        The losses are sums over the cells, computed from the normal solutions at the ends of each
-        cell. Their relative errors are about 0.1 %, except where a front hardly moves while the
-        load changes much. The proved bounds on the relative errors are some per cent.
+        they are sums over about 64 cells of the ranges of load through which slip fronts move.
+        Their relative errors are about 0.1 %, except where a front hardly moves while the load
+        changes much. The proved bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -177,11 +161,11 @@ class Cycle(Table, Plottable):
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, unknown, frozen(np.full(n, np.inf))
-        slip, slide = shared(levels, self._walk.cycles[1], CELLS)
-        both = slip + slide
-        partial, gross, lost = (frozen(levels.to_scene(it.value)) for it in (slip, slide, both))
-        uncertainty = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, lost, frozen(levels.to_scene(both.error) + uncertainty)
+        parts = shared(levels, self._walk.cycles[1], CELLS)
+        (slip, _), (slide, _), (both, errors) = (
+            rounded(of_rows(levels.to_scene, it)) for it in (*parts, parts[0] + parts[1])
+        )
+        return slip, slide, both, errors if self.order == "proved" else frozen(errors + np.inf)
 
     @cached_property
     def _walk(self) -> Closed:
@@ -215,8 +199,7 @@ class Cycle(Table, Plottable):
         holding : quantity kept constant, as in `Contact.gradient`; "load" keeps the loads of all
             points. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError if the loss has no derivative. In gross sliding it has none if the
-        approach is kept constant, or if several asperities start to slide last, at the same force.
+        Raises InputError if there is no derivative, in the cases of `ShearState.gradient`.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -240,89 +223,39 @@ class Cycle(Table, Plottable):
         return loops([self], points, asperities)[0]
 
 
-def steady_cycles(
-    contact: Contact, start: MemoryCurve, paths: Sequence[list[Point]]
-) -> list[Cycle]:
-    """The steady cycles of several closed paths (P, T) that begin from the same memory curve."""
-    levels = contact.cached(FrictionLevels)
-    closed = [Closed.around(levels, start, points) for points in paths]
-    levels.prepare(load for each in closed for load in each.needed)
-    for needed in sorted((each.needed for each in closed), key=min):
-        levels.order(needed)  # a proof for the widest range of loads holds for the others
-    spent = losses(levels, [pieces for each in closed for pieces in each.cycles]) * levels.loss_unit
-    moved = displacements_of(levels, LevelSums.of([c for each in closed for c in each.steady]))
-    ends = np.cumsum([0, *map(len, paths)]).tolist()
-    return [
-        _cycle(contact, closed[k], spent[2 * k : 2 * k + 2], moved[start:stop])
-        for k, (start, stop) in enumerate(pairwise(ends))
-    ]
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Table):
+    """Points of a closed loop, from the largest shear force to the smallest and back.
 
+    asperities    : (k,) indices of the asperities whose own loops are given
+    forces, displacements : (m,) shear force [force], and relative tangential displacement [length]
+        of distant points of the two bodies
+    asperity_forces : (m, k) [force] shear force on each of these asperities
+    asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
+        own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md
 
-def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
-    """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
-    levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
-    (first, loss), (first_error, error) = rounded(spent)
-    half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
-    amplitude, amplitude_error = (float(part) for part in rounded(half))
-    rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
-    lost, kept = top.touching & bottom.open, bottom.touching
-    statuses = {
-        "intermittent": lost,
-        "sliding": kept & rest.open,
-        "partial" if closed.cycles[1] else "stuck": rest.touching & top.touching,
+    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
+    >>> len(loop.forces), loop.asperity_forces.shape
+    (101, (101, 61))
+    """
+
+    _shown = ("area",)
+    _along: ClassVar[Along] = {
+        ("point",): ("forces", "displacements"),
+        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+        ("asperity",): ("asperities",),
     }
-    doubtful = levels.to_scene((kept & rest.open) | ~(rest.touching | rest.open))
-    slips, slip_errors = rounded(
-        (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
-    )
-    slip_errors = np.where(doubtful, slip_errors, 0.0)
-    radii, radius_errors = stick_radii(levels, rest)
-    loaded, heights = zip(*closed.points[: closed.once], strict=True)
-    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    defect = smooth = np.nan
-    if set(loaded) == {levels.load}:
-        other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
-        defect = abs(float(other.value) - loss) / (loss or 1.0)
-        if reference:
-            smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
-    if order != "proved":
-        error = first_error = np.inf
-    if order == "fails":
-        amplitude_error, statuses = np.inf, {}
-        slip_errors, radius_errors = (np.full(len(slips), np.inf) for _ in range(2))
-    if closed.general is not None:
-        first, both = closed.general.losses[[closed.once, -1]]
-        loss, defect = both - first, np.nan
-        amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
-    found = Cycle(
-        contact=contact,
-        loads=frozen(np.array([float(load) for load in loaded])),
-        forces=closed.forces[: closed.once],
-        loss=float(loss),
-        loss_error=float(error),
-        loss_first=float(first),
-        loss_first_error=float(first_error),
-        status=by_status(levels, top, **statuses),
-        slips=frozen(
-            np.where(levels.to_scene(lost), np.nan, np.where(levels.to_scene(kept), slips, 0.0))
-        ),
-        slip_errors=frozen(slip_errors),
-        stick_radii=radii,
-        stick_radius_errors=frozen(radius_errors),
-        level=float(stuck),
-        force_level=float(levels.coefficient.value) * float(stuck_height),
-        balance_defect=defect,
-        loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
-        smooth_normalised=smooth,
-        displacement_amplitude=amplitude,
-        displacement_error=amplitude_error,
-        order=order,
-        presses=levels.presses,
-        start=float(closed.start.load),
-        heights=heights,
-    )
-    found.__dict__["_walk"] = closed  # the cached property would follow the path again
-    return found
+
+    asperities: Indices
+    forces: Array
+    displacements: Array
+    asperity_forces: Array
+    asperity_displacements: Array
+
+    @property
+    def area(self) -> float:
+        """[force length] area of the polygon through the points, a little less than the loss."""
+        return float(np.trapezoid(self.forces, self.displacements))
 
 
 def loops(
@@ -347,17 +280,24 @@ def loops(
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
     chosen = indices("asperities", asperities, len(contact.scene))
+    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    loaded = levels.to_scene(levels.top.loads.value > 0)[chosen]
     widest = max(each.force_amplitude for each in cycles)
     way = (widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:]).tolist()
-    levels = contact.cached(FrictionLevels)
-    return [
-        loop_through(
-            levels,
-            max(each.heights),
-            min(each.heights),
-            [w for w in way if w < each.force_amplitude],
-            chosen,
-            by_steps=each.order == "fails" and levels.proved,
-        )
-        for each in cycles
-    ]
+    found = list[Loop]()
+    for each in cycles:
+        top, bottom = max(each.heights), min(each.heights)
+        drops = [min(2 * Fraction(w) / f, top - bottom) for w in way if w < each.force_amplitude]
+        drops.append(top - bottom)
+        LOGGER.info(f"computing {len(drops)} levels of a loop")
+        heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]
+        path = [(levels.load, height) for height in (top, bottom, *heights)]
+        walk = Walk(levels, MemoryCurve.pressed(levels.load), path, steps=1)
+        if each.order == "fails" and levels.proved:
+            states, some = walk.states(), chosen
+        else:
+            states, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
+        forces, displacements = states.forces.value, states.asperity_displacements.value
+        own = (frozen(np.where(loaded, it[2:, some], 0.0)) for it in (forces, displacements))
+        found.append(Loop(chosen, walk.forces[2:], frozen(states.displacements.value[2:]), *own))
+    return found

@@ -22,9 +22,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: The largest traction in a contact disc is sought at these distances from its centre: the contact
-#: radii of the asperity at the vertices of the memory curve, and about this number of others. At
-#: constant load it lies at one of the a(s_k); else its error is about 0.1 %.
+#: The largest traction in a contact disc is sought at the contact radii at the vertices of the
+#: memory curve (exact at constant load), and at about this number of other distances (to 0.1 %).
 DISTANCES = 64
 
 
@@ -36,10 +35,8 @@ class Fretting(Table, Plottable):
     maximum, minimum : [force] the largest and the smallest shear force of the cycle
     status           : `Cycle.status`
     slip_amplitudes  : [length] half the range of slip at the edge of the contact disc at the lowest
-        load of the cycle; nan where contact is lost in the cycle ("intermittent"), because slip of
-        an open asperity is not known
-    gross_slip_amplitudes : [length] half the range of slip of the whole disc; 0 if some of it
-        sticks, nan where "intermittent"
+        load of the cycle; nan where contact is lost in the cycle ("intermittent")
+    gross_slip_amplitudes : [length] the same for the whole disc; 0 if some of it sticks
     losses, loss_errors : [force length] `Cycle.asperity_losses`, the energy lost per cycle, and
         bounds on their errors. If the load varies, their sum is less exact than `Cycle.loss`
     mean_tractions   : [force / length^2] the largest |shear force of the asperity / area of its
@@ -88,6 +85,7 @@ def fretting(cycle: Cycle) -> Fretting:
     checks.instance("cycle", cycle, Cycle)
     contact, scene, walk = cycle.contact, cycle.scene, cycle._walk
     f, R, levels = checks.friction(scene.friction), scene.relative_radii, walk.levels
+    modulus = scene.material.contact_modulus
     unknown = np.nan if walk.general is not None else 0.0  # the memory curve does not hold
     gross = cycle.slips / 2.0 + unknown
     a = stick_radii(levels, levels.at(walk.least))[0]
@@ -110,9 +108,7 @@ def fretting(cycle: Cycle) -> Fretting:
         losses=cycle.asperity_losses,
         loss_errors=cycle.asperity_loss_errors,
         mean_tractions=frozen(mean),
-        largest_tractions=frozen(
-            f * hertz.peak_pressure(largest, scene.material.contact_modulus, R)
-        ),
+        largest_tractions=frozen(f * hertz.peak_pressure(largest, modulus, R)),
     )
 
 
@@ -136,18 +132,17 @@ def rim_gap(x: Array) -> Array:
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
     """The columns of fretting.csv; for each cycle there is a row for each asperity that touches."""
-    names = ("status", "losses", "loss_errors", "slip_amplitudes", "gross_slip_amplitudes",
-             "mean_tractions", "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()
     for each in worn:
         x, y = each.contact.scene.asperities.positions.T
         every = {name: np.full(len(x), getattr(each, name)) for name in ("maximum", "minimum")}
-        every |= {"asperity": np.arange(len(x)), "x": x, "y": y, **each.columns(*names)}
+        every |= {"asperity": np.arange(len(x)), "x": x, "y": y}
+        every |= each.columns("status", "losses", "loss_errors")  # these columns come first
+        every |= each.columns()
         rows.append({name: column[each.contact.loads > 0] for name, column in every.items()})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def _over(part: Array, whole: Array) -> Array:
     """(n,) part / whole; 0 where whole is 0."""
-    quotient: Array = np.divide(part, whole, out=np.zeros(len(whole)), where=whole > 0)
-    return quotient
+    return np.asarray(np.divide(part, whole, out=np.zeros(len(whole)), where=whole > 0))

@@ -1,23 +1,21 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
-docs/theory/without-order.md, "The general step", derives the equations (1) of a step. Shear forces
-are divided by the coefficient of friction f, tangential displacements by c_t f with Mindlin's ratio
-c_t. Each asperity has its own memory curve: the deflection that its own shear force causes, as a
-function of its indentation. Newton's method solves (1) for eta_i and x, the displacements of the
-asperities and of the bodies in the step.
-
-A step cuts the old curve of an asperity at the smaller of the old and the new indentation. Then the
-curve changes as in docs/theory/paths.md, "Changes of the curve".
+Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i and x, the
+displacements of the asperities and of the bodies in the step. Shear forces are divided by the
+coefficient of friction f, tangential displacements by c_t f with Mindlin's ratio c_t. Each asperity
+has its own memory curve: the deflection by its own shear force, as a function of its indentation. A
+step cuts it at the smaller of the old and the new indentation, then changes it as in
+docs/theory/paths.md, "Changes of the curve".
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,76 +33,56 @@ from convexrough.roundoff import ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding prevents
-#: this accuracy, a residual up to a thousand times as large is accepted.
-ACCURATE = 1e-14
+#: this accuracy, a residual up to a thousand times as large is accepted. The residual must be below
+#: the largest of the RECENT latest ones; slopes jump where an asperity begins or ceases to slide.
+ACCURATE, RECENT = 1e-14, 10
 
 #: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
-#: The residual after a Newton step must be below the largest of this many latest residuals. It need
-#: not fall in each step, because slopes jump where an asperity begins or ceases to slide.
-RECENT = 10
-
-#: The numbers of steps per segment that are tried.
+#: The numbers of steps per segment that are tried, until each loss changes by at most SETTLED times
+#: the sum of this loss and NEGLIGIBLE times the largest loss, and each displacement by at most
+#: SETTLED_MOTION times the largest displacement.
 COUNTS = (4, 8, 16, 32, 64)
-
-#: The number of steps is doubled until each loss changes by at most SETTLED times the sum of this
-#: loss and NEGLIGIBLE times the largest loss, and each displacement by at most SETTLED_MOTION times
-#: the largest displacement.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
-
-#: A point on each of n curves: index of the next vertex, indentation and deflection, (n,) each.
-Front: TypeAlias = tuple[Indices, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class OwnCurves:
-    """The memory curves of n asperities: polygonal lines of m vertices; the last may be repeated.
+    """The memory curves of n asperities, as lines of m vertices; the last may be repeated."""
 
-    coefficients : (n,) k of Hertz's law
-    indentations, deflections : (n, m) at the vertices
-    """
-
-    coefficients: Array
-    indentations: Array
-    deflections: Array
-
-    @classmethod
-    def pressed(cls, indentations: Array, coefficients: Array) -> OwnCurves:
-        """The curves of asperities without shear."""
-        ends = np.column_stack((np.zeros(len(indentations)), indentations))
-        return cls(coefficients, ends, np.zeros(ends.shape))
+    coefficients: Array  # (n,) k of Hertz's law
+    vertices: Array  # (2, n, m) indentations and deflections
 
     @cached_property
     def layers(self) -> tuple[Array, Array, Array]:
         """(n, m) loads and shear forces at the vertices; (n, m - 1) slopes of the layers."""
-        run, added = np.diff(self.indentations), np.diff(self.deflections)
+        run, added = np.diff(self.vertices)
         slopes = np.divide(added, run, out=np.zeros(run.shape), where=run > 0)
-        loads = hertz.load(self.indentations, self.coefficients[:, None])
+        loads = hertz.load(self.vertices[0], self.coefficients[:, None])
         forces = np.cumsum(slopes * np.diff(loads), axis=1)
         return loads, np.column_stack((np.zeros(len(forces)), forces)), slopes
 
     def cut(self, indentations: Array) -> OwnCurves:
         """The curves up to these indentations (n,); curves that end below these are unchanged."""
-        front = self._front(np.zeros(len(indentations)), indentations)
-        return self.ended(front, front[1:])
+        after, front = self._front(np.zeros(len(indentations)), indentations)
+        return self.ended(after, front, front)
 
     def step(self, indentations: Array, deflections: Array) -> OwnStep:
         """The step to these indentations and deflections; the curves are cut at `indentations`."""
-        base, moved = self.indentations[:, -1], deflections - self.deflections[:, -1]
+        base, moved = self.vertices[0, :, -1], deflections - self.vertices[1, :, -1]
         sticks = (indentations > base) & (np.abs(moved) <= indentations - base)
         sign = np.where(sticks, 0.0, np.sign(moved))
-        front = self._front(sign, np.where(sign == 0, base, indentations - sign * deflections))
-        (after, depth, _), k = front, self.coefficients
+        wanted = np.where(sign == 0, base, indentations - sign * deflections)
+        (after, front), k = self._front(sign, wanted), self.coefficients
+        depth = front[0]
         loads, forces, slopes = (each[np.arange(len(k)), after - 1] for each in self.layers)
         low, high = hertz.load(depth, k), hertz.load(indentations, k)
         grown = np.where(sticks, indentations - base, 1.0)
         slope = np.where(sticks, moved / grown, sign)
         stiffness = np.where(sticks, (high - low) / grown, 1.5 * np.sqrt(depth / k**3))
         return OwnStep(
-            self,
-            front,
-            (indentations, deflections),
+            partial(self.ended, after, front, np.stack((indentations, deflections))),
             fronts=np.where(sign != 0, depth, indentations),
             forces=forces + slopes * (low - loads) + slope * (high - low),
             stiffness=np.where(np.abs(deflections) < indentations, stiffness, 0.0),
@@ -113,109 +91,68 @@ class OwnCurves:
     def energies(self) -> Array:
         """(n,) elastic energies of the own deflections, divided by c_t f^2."""
         loads, forces, slope = self.layers
-        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.indentations)
-        power = np.diff(loads * self.indentations)
+        plain = slope * (forces[:, :-1] - slope * loads[:, :-1]) * np.diff(self.vertices[0])
+        power = np.diff(loads * self.vertices[0])
         return np.asarray((plain + 0.4 * slope**2 * power).sum(axis=1))
 
-    def _front(self, sign: Array, wanted: Array) -> Front:
-        """The point on each curve where  indentation - sign * deflection  reaches `wanted` (n,)."""
-        keys, rows = self.indentations - sign[:, None] * self.deflections, np.arange(len(sign))
-        below = (keys < wanted[:, None]).sum(axis=1)
+    def _front(self, sign: Array, wanted: Array) -> tuple[Indices, Array]:
+        """The points (2, n) of the curves where  indentation - sign * deflection  reaches `wanted`
+        (n,), and the indices of the next vertices.
+        """
+        keys = self.vertices[0] - sign[:, None] * self.vertices[1]
+        below, rows = (keys < wanted[:, None]).sum(axis=1), np.arange(len(sign))
         after = np.clip(below, 1, keys.shape[1] - 1)
-        here, there = (rows, after - 1), (rows, after)
-        width = keys[there] - keys[here]
+        width = keys[rows, after] - keys[rows, after - 1]
         part = np.where(below > after, 1.0, 0.0)
-        np.divide(wanted - keys[here], width, out=part, where=width > 0)
-        part = np.clip(part, 0.0, 1.0)
-        at_front = (
-            each[here] + part * (each[there] - each[here])
-            for each in (self.indentations, self.deflections)
-        )
-        return (after, *at_front)
+        np.divide(wanted - keys[rows, after - 1], width, out=part, where=width > 0)
+        here, there = self.vertices[:, rows, after - 1], self.vertices[:, rows, after]
+        return after, here + np.clip(part, 0.0, 1.0) * (there - here)
 
-    def ended(self, front: Front, end: tuple[Array, Array]) -> OwnCurves:
-        """The curves up to their fronts, then a line to `end`: indentations and deflections."""
-        after, *at_front = front
+    def ended(self, after: Indices, front: Array, end: Array) -> OwnCurves:
+        """The curves up to their fronts (2, n) before the vertices `after`, then lines to `end`."""
         columns, after = np.arange(int(after.max()) + 2), after[:, None]
-        kept = np.minimum(columns, self.indentations.shape[1] - 1)
-        unchanged, at = columns < after, columns == after
-        whole = (
-            np.where(unchanged, old[:, kept], np.where(at, here[:, None], last[:, None]))
-            for old, here, last in zip(
-                (self.indentations, self.deflections), at_front, end, strict=True
-            )
-        )
-        return OwnCurves(self.coefficients, *whole)
+        kept = self.vertices[:, :, np.minimum(columns, self.vertices.shape[2] - 1)]
+        following = np.where(columns == after, front[:, :, None], end[:, :, None])
+        return OwnCurves(self.coefficients, np.where(columns < after, kept, following))
 
 
 class OwnStep(NamedTuple):
-    """A straight step of n asperities from their curves `old`; arrays are (n,).
+    """A straight step of n asperities; arrays are (n,)."""
 
-    front     : the point up to which each old curve is kept; a line leads from there to `end`
-    end       : indentations and deflections after the step
-    fronts    : indentation at the slip front; the whole indentation if the asperity sticks
-    forces    : shear forces T_i
-    stiffness : derivatives of the forces with respect to the deflections
-    """
-
-    old: OwnCurves
-    front: Front
-    end: tuple[Array, Array]
-    fronts: Array
-    forces: Array
-    stiffness: Array
-
-    @property
-    def curves(self) -> OwnCurves:
-        """The curves after the step."""
-        return self.old.ended(self.front, self.end)
+    curves: Callable[[], OwnCurves]  # the curves after the step, which few steps need
+    fronts: Array  # indentation at the slip front; the whole indentation where an asperity sticks
+    forces: Array  # shear forces T_i
+    stiffness: Array  # derivatives of the forces with respect to the deflections
 
 
 class Bundle(NamedTuple):
-    """The state of n asperities after a step.
-
-    load, height : [force] P and T = Q / f
-    indentations : (n,) at P; minus the gap of an open asperity
-    curves    : the memory curves of the asperities
-    fronts    : (n,) indentation at the slip front of each; its whole indentation where it sticks
-    forces    : (n,) T_i, the shear forces of the asperities divided by f
-    positions : (n,) own deflection plus drift (docs/theory/paths.md), divided by c_t f
-    displacement : X / (c_t f), with the relative displacement X of the bodies
-    work      : work of the shear force along X, divided by c_t f^2
-    """
+    """The state of n asperities at the load P and the shear force f T [force]; arrays are (n,)."""
 
     load: Fraction
-    height: Fraction
-    indentations: Array
+    height: Fraction  # T
+    indentations: Array  # at P; minus the gap of an open asperity
     curves: OwnCurves
-    fronts: Array
-    forces: Array
-    positions: Array
-    displacement: float = 0.0
-    work: float = 0.0
+    fronts: Array  # as in `OwnStep`
+    forces: Array  # T_i, divided by f
+    positions: Array  # own deflection plus drift (docs/theory/paths.md), divided by c_t f
+    displacement: float = 0.0  # X / (c_t f), with the relative displacement X of the bodies
+    work: float = 0.0  # work of the shear force along X, divided by c_t f^2
 
     @property
     def deflections(self) -> Array:
-        """(n,) the own deflection of each asperity, divided by c_t f."""
-        return self.curves.deflections[:, -1]
+        return self.curves.vertices[1, :, -1]
 
 
 class Step(NamedTuple):
-    """The equations of a step from the state `now` to shear forces T_i with the sum `total`.
-
-    indentations : (n,) after the step; minus the gap of an open asperity
-    own, loads : (n,) indentations (0 if open) and loads after the step
-    curves : the curves before the step, up to these indentations
-    parts  : (n,) fraction of the step during which each asperity touches
-    """
+    """The equations of a step from the state `now` to shear forces T_i with the sum `total`."""
 
     now: Bundle
     total: float
-    indentations: Array
-    own: Array
-    loads: Array
-    curves: OwnCurves
-    parts: Array
+    indentations: Array  # (n,) after the step; minus the gap of an open asperity
+    own: Array  # (n,) the same, but 0 if open
+    loads: Array  # (n,) after the step
+    curves: OwnCurves  # before the step, up to the indentations `own`
+    parts: Array  # (n,) fraction of the step during which each asperity touches
 
     @classmethod
     def to(cls, now: Bundle, indentations: Array, total: float) -> Step:
@@ -245,14 +182,13 @@ class Stepper:
         modulus = scene.material.contact_modulus
         self.levels = levels
         self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-        self.influence = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense")
-        self.A = self.influence.matrix
+        self.A = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense").matrix
 
     def start(self, load: Fraction) -> Bundle:
         """The state without shear at a load."""
         found = self.levels.depths(load)
         own, zero = np.maximum(found, 0.0), np.zeros(len(found))
-        curves = OwnCurves.pressed(own, self.coefficients)
+        curves = OwnCurves(self.coefficients, np.stack(((zero, own), (zero, zero))).mT)
         return Bundle(load, Fraction(0), found, curves, own, zero, zero)
 
     def along(self, start: MemoryCurve, points: Sequence[Point], steps: int) -> list[Bundle]:
@@ -261,9 +197,8 @@ class Stepper:
         for (load, height), (target, shear) in pairwise([(start.load, start.height), *points]):
             grading = 1 if load else 3  # indentations grow as L^(2/3)
             parts = [Fraction(k + 1, steps) ** grading for k in range(steps)]
-            segments.append(
-                [(load + x * (target - load), height + x * (shear - height)) for x in parts]
-            )
+            added, moved = target - load, shear - height
+            segments.append([(load + x * added, height + x * moved) for x in parts])
         self.levels.prepare(load for each in segments for load, _ in each)
         for segment in segments:
             for load, height in segment:
@@ -284,9 +219,9 @@ class Stepper:
                 raise
             middle = (now.load + load) / 2, (now.height + height) / 2
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
-        work = now.work + float(now.height + height) / 2 * x
         moved, displacement = now.positions + eta, now.displacement + x
-        known = step.indentations, own.curves, own.fronts, own.forces
+        work = now.work + float(now.height + height) / 2 * x
+        known = step.indentations, own.curves(), own.fronts, own.forces
         return Bundle(load, height, *known, moved, displacement, work)
 
     def _gross(self, step: Step) -> tuple[Array, float, OwnStep]:
@@ -297,10 +232,7 @@ class Stepper:
         return x - coupled, x, step.at(x - coupled)
 
     def _solve(self, step: Step) -> tuple[Array, float, OwnStep]:
-        """eta, x and the own steps by Newton's method.
-
-        It starts with deflections that are an equal fraction of the indentations.
-        """
+        """eta, x and the own steps, from deflections that are equal fractions of indentations."""
         size, load = float(np.abs(step.indentations).max()), float(step.loads.sum())
         eta = step.taken(step.total / load * step.own)
         tried = [self._iterate(step, np.append(eta, eta @ step.loads / load))]
@@ -333,10 +265,7 @@ class Stepper:
         return _Iterate(unknown, own, slopes, np.append(defect, excess), residual)
 
     def _newton(self, iterate: _Iterate) -> Array:
-        """The change of eta and x in a Newton step.
-
-        The unknowns of its linear system are x and those eta_i on which the force T_i depends.
-        """
+        """The change of eta and x, from a system in x and those eta_i on which T_i depends."""
         some, wanted = np.flatnonzero(iterate.slopes), -iterate.defect
         slopes, moved, n = iterate.slopes[some], wanted[:-1], len(some)
         coupled, matrix = self.A[:, some] * slopes, np.zeros((n + 1, n + 1))
@@ -348,10 +277,10 @@ class Stepper:
             raise SolverError("everything slides", solver="general step") from error
         return np.append(moved + found[-1] - coupled @ found[:-1], found[-1])
 
-    def stored(self, state: Bundle) -> float:
-        """The elastic energy, of own deflections and of coupling, divided by c_t f^2."""
-        own = float(state.curves.energies().sum())
-        return own + 0.5 * float(state.forces @ self.A @ state.forces)
+    def lost(self, state: Bundle) -> float:
+        """The work less the elastic energy (of own deflections and coupling), over c_t f^2."""
+        stored = float(state.curves.energies().sum())
+        return state.work - (stored + 0.5 * float(state.forces @ self.A @ state.forces))
 
 
 class _Iterate(NamedTuple):
@@ -363,18 +292,12 @@ class _Iterate(NamedTuple):
 
 
 class SteppedPath(NamedTuple):
-    """Results of general steps at m points, without proofs.
-
-    losses : (m,) [force length] energy lost since the start; nan if it still changes by more than
-        SETTLED when the number of steps is doubled
-    status : (m, N) "open" or "undecided"
-    fronts : (m, N) as in `OwnStep`, for each asperity
-    """
+    """Results of general steps at m points, without proofs."""
 
     states: States
-    losses: Array
-    status: NDArray[np.str_]
-    fronts: Array
+    losses: Array  # (m,) [force length] energy lost since the start; nan if it does not settle
+    status: NDArray[np.str_]  # (m, N) "open" or "undecided"
+    fronts: Array  # (m, N) as in `OwnStep`, for each asperity
 
 
 def followed(
@@ -382,19 +305,14 @@ def followed(
     start: MemoryCurve,
     points: Sequence[Point],
     steps: int | None = None,
-    stepper: type[Stepper] | None = None,
+    stepper: type[Stepper] = Stepper,
 ) -> SteppedPath:
-    """The results of general steps along a path.
+    """The results of general steps along a path, with `steps` steps per segment.
 
-    The loss W_n by n steps has an error of about e / n^2, with some constant e. By default the loss
-    returned is (4 W_2n - W_n) / 3. The change of this value at the next doubling estimates its
-    error.
-
-    steps : number n of steps per segment; the loss returned is then W_n. With None, n is doubled
-        until losses and displacements settle (SETTLED), up to 64
+    With None, the number n of steps is doubled until losses and displacements settle. The error of
+    the loss W_n is about e / n^2 with some constant e, so the loss is then (4 W_2n - W_n) / 3.
     """
-    by = (stepper or Stepper)(levels)
-    f = float(levels.coefficient.value)
+    by, f = stepper(levels), float(levels.coefficient.value)
     travel = float((levels.coefficient * levels.ratio).value)
 
     def found(count: int) -> SteppedPath:
@@ -403,12 +321,11 @@ def followed(
         positions = travel * np.array([each.positions for each in bundles])
         own = travel * np.array([each.deflections for each in bundles])
         forces = f * np.array([each.forces for each in bundles])
-        spent = np.array([each.work - by.stored(each) for each in bundles])
         displacements = travel * np.array([each.displacement for each in bundles])
         parts = (displacements, forces, positions, positions - own)
         return SteppedPath(
             states=States(*(Ball.around(part, np.inf) for part in parts)),
-            losses=frozen(f * travel * spent),
+            losses=frozen(f * travel * np.array([by.lost(each) for each in bundles])),
             status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
             fronts=np.array([each.fronts for each in bundles]),
         )

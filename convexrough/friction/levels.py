@@ -1,13 +1,12 @@
 """The levels of a contact (normal solutions at given loads), and the units of friction results.
 
 Levels are in the scaled units of the normal problem (`normal.problem`). The unit of shear forces is
-f times the unit of loads. The unit of displacements is c_t f times the unit of lengths, with the
-coefficient of friction f, c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu.
+f times that of loads, the unit of displacements c_t f times that of lengths, with the coefficient
+of friction f and c_t = (2 - nu) / (2 (1 - nu)).
 
-A rational number [force] identifies each level. If the load of the contact is prescribed, this
-number is the total load of the level. If the approach is prescribed, the load P of the contact is a
-result, known to about thirty digits. Then a float64 number p close to P identifies the level at P,
-and p - x identifies the level at P - x. The number 0 always identifies the level at the load 0.
+A rational number [force] identifies each level: its total load or, if the approach of the contact
+is prescribed and its load P known to about thirty digits only, p - x for the level at P - x, with a
+float64 number p close to P. The number 0 always identifies the level at the load 0.
 """
 
 from __future__ import annotations
@@ -34,16 +33,7 @@ from convexrough.scene.scene import Scene
 
 
 class FrictionLevels:
-    """The levels of a contact, by rational numbers; use `contact.cached(FrictionLevels)`.
-
-    scene : the scene, with N asperities and friction
-    top   : the level at the load P of the contact
-    load  : [force] the number that identifies `top`: P or, if the approach is prescribed, p
-    candidates : (n,) indices of the asperities that may touch at loads up to P
-    coefficient, ratio : f and c_t
-    force_unit [force], travel_unit [length], loss_unit [force length] : units of shear forces,
-        tangential displacements and energy losses
-    """
+    """The levels of a contact, by rational numbers; use `contact.cached(FrictionLevels)`."""
 
     def __init__(self, contact: Contact) -> None:
         self._levels, self.scene = contact.cached(levels_of), contact.scene
@@ -51,10 +41,10 @@ class FrictionLevels:
         self._orders: dict[tuple[frozenset[Fraction], int], Order] = {}
         self._ordered: Fraction | None = None  # order is proved from this load up to P
         self.top, problem = self._levels.top, self._levels.problem
-        self.candidates, self.units = problem.candidates, problem.units
+        self.candidates, self.units = problem.candidates, problem.units  # may touch up to P
         self._prescribed = contact.prescribed_load
         found = float(self.top.load.value) * self.units.force
-        self.load = Fraction(found if self._prescribed is None else self._prescribed)
+        self.load = Fraction(found if self._prescribed is None else self._prescribed)  # of `top`
         nu = Ball.exact(self.scene.material.poisson_ratio)
         self.coefficient = Ball.exact(checks.friction(self.scene.friction))
         self.ratio = (2.0 - nu) / ((1.0 - nu) * 2.0)
@@ -102,10 +92,10 @@ class FrictionLevels:
         return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
-        """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 from rest.
+        """[force] P - Q / f, for the shear force Q that displaces the bodies by X >= 0 [length].
 
-        The approach at this load is D0(P) - X / (c_t f). Raises InputError if X = `displacement`
-        [length] exceeds the displacement at the onset of gross sliding.
+        The approach at this load is D0(P) - X / (c_t f). Raises InputError beyond the X at which
+        gross sliding starts.
         """
         room = self.top.approach - self.at(Fraction(0)).approach
         farthest = float((room * self.travel_unit).value)
@@ -119,10 +109,8 @@ class FrictionLevels:
         if displacement == 0.0:
             return self.load
         level = self._levels.at_approach(self.top.approach - lowered)
-        drop = (self.top.load - level.load).mid
-        load = self.load - (Fraction(float(drop.high)) + Fraction(float(drop.low))) * Fraction(
-            self.units.force
-        )
+        drop = sum(Fraction(float(part)) for part in (self.top.load - level.load).mid)
+        load = self.load - drop * Fraction(self.units.force)
         self._named[load] = level
         return load
 
@@ -131,9 +119,8 @@ class FrictionLevels:
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
-        if (asked, most) not in self._orders:
-            self._orders[asked, most] = order_between(self.at, asked, most)
-        found = self._orders[asked, most]
+        if (found := self._orders.get((asked, most))) is None:
+            found = self._orders[asked, most] = order_between(self.at, asked, most)
         if found == "proved":
             self._ordered = min(asked)
         return found
@@ -145,22 +132,21 @@ class FrictionLevels:
     def indentations(self, level: Level) -> Ball:
         """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
-        others = self._others
+        others, unit = self._others, self.units.length
         if len(others) == 0:
             return known
-        (high, low), radius = known.mid, known.radius
         approach = float(level.approach.value)
-        high[others] = approach + self.scene.offsets[others] / self.units.length
-        radius[others] = self.scene.offset_errors[others] / self.units.length
-        radius[others] += 4 * ROUNDOFF * (np.abs(high[others]) + abs(approach))
-        radius[others] += float(level.approach.error)
+        n = approach + self.scene.offsets[others] / unit
+        off = self.scene.offset_errors[others] / unit + float(level.approach.error)
+        off += 4 * ROUNDOFF * (np.abs(n) + abs(approach))
         if level.trial is not None:
             loads = level.trial.loads.high
             coupled = self._beyond.apply(loads)
-            high[others] -= coupled
-            radius[others] += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
-            radius[others] += level.moves(self._beyond)
-        return Ball(Pair(high, low), radius * (1 + SAFETY))
+            n -= coupled
+            off += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
+            off += level.moves(self._beyond)
+        known.mid.high[others], known.radius[others] = n, off
+        return Ball(known.mid, known.radius * (1 + SAFETY))
 
     @cached_property
     def _others(self) -> Indices:
@@ -169,8 +155,7 @@ class FrictionLevels:
 
     @cached_property
     def _beyond(self) -> Coupling:
-        points = self.scene.contact_points[self._others]
-        return self._levels.problem.influence.onto(points)
+        return self._levels.problem.influence.onto(self.scene.contact_points[self._others])
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""

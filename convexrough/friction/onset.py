@@ -1,9 +1,9 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
-P is the load, Q the shear force and f the coefficient of friction. The onset of asperity i is the
-total load L at which its indentation n_i(L) rises to 0. On first loading the asperity slides once
-P - Q / f is below its onset. Newton's method computes the onset. Two proofs enclose it: the
-asperity is open at a slightly smaller load, and it touches at a slightly larger load.
+The onset of an asperity is the load at which its indentation rises to 0. On first loading it slides
+once P - Q / f is below its onset (load P, shear force Q, coefficient of friction f). The onset
+comes from Newton's method; proofs that the asperity is open at a slightly smaller load and touches
+at a slightly larger load enclose it.
 """
 
 from __future__ import annotations
@@ -21,27 +21,21 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.levels import FrictionLevels
 
-#: The largest number of onsets in one call if no compliance matrix is stored.
-MOST_ONSETS = 256
+MOST_ONSETS = 256  # in one call, if no compliance matrix is stored
 
 #: Relative distances of loads from the computed onset at which proofs are tried, smallest first.
-TRIED = tuple(10.0**-k for k in range(13, 3, -1))
-
-#: Levels (normal solutions) that are known already are tried first if the relative distance of
-#: their load from the onset is between TRIED[0] and TRIED[ENOUGH].
-ENOUGH = 2
+#: Levels that are known already are tried first if their distance is from TRIED[0] to
+#: TRIED[ENOUGH].
+TRIED, ENOUGH = tuple(10.0**-k for k in range(13, 3, -1)), 2
 
 #: The largest number of Newton steps, and the change of L, relative to P, at which they end.
 STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """The load at which an asperity first touches, and two loads [force] below and above it.
+    """Loads [force] between which an asperity first touches, if no indentation falls on the way."""
 
-    If no indentation falls as the load rises, the first touch is proved to be between the two.
-    """
-
-    load: Fraction
+    load: Fraction  # at which it first touches, as computed
     lower: Fraction  # proved open at this load; 0 if none is proved
     upper: Fraction  # proved to touch at this load; P if no lower load is proved
 
@@ -49,12 +43,10 @@ class Onset(NamedTuple):
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
-    It is f (P - the load of the first touch): docs/theory/states.md, "First loading".
-
-    In a steady cycle at constant load, the asperity slides if the amplitude of the shear force,
-    (maximum - minimum) / 2, exceeds this force. The result is nan for an asperity without load, and
-    if order (docs/theory/states.md) "fails" between the load of the asperity's first touch and the
-    load of the contact: the asperity may then start to slide at another force.
+    It is f (P - the load of the first touch): docs/theory/states.md, "First loading". In a steady
+    cycle at constant load, the asperity slides if the amplitude of the shear force exceeds it. The
+    result is nan for an asperity without load, and if order (docs/theory/states.md) "fails" between
+    its first touch and the load of the contact: it may then start to slide at another force.
 
     which : indices of asperities, in the order of the result; default: all. Several normal problems
         are solved for each
@@ -69,23 +61,18 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     checks.instance("contact", contact, Contact)
     f = Fraction(checks.friction(contact.scene.friction))
     asked = indices("which", which, len(contact.scene))
-    onsets = np.full(len(asked), np.nan)
-    loaded = np.flatnonzero(contact.loads[asked])
-    if len(loaded) == 0:
-        return frozen(onsets)
+    onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(contact.loads[asked])
     levels = contact.cached(FrictionLevels)
     if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
-        raise InputError(
-            "which",
-            found=f"{len(loaded):,} loaded asperities",
-            expected=f"at most {MOST_ONSETS}: for each, several normal problems are solved",
-        )
+        expected = f"at most {MOST_ONSETS}: for each, several normal problems are solved"
+        raise InputError("which", found=f"{len(loaded):,} loaded asperities", expected=expected)
     found = enclosed(levels, asked[loaded].tolist())
-    lowest = min(each.load for each in found.values())
+    lowest = min((each.load for each in found.values()), default=levels.load)
     ordered = levels.order([lowest]) != "fails"
-    for k, i in zip(loaded.tolist(), asked[loaded].tolist(), strict=True):
-        if ordered or levels.order([found[i].load]) != "fails":
-            onsets[k] = float(f * (levels.load - found[i].load))
+    for k in loaded.tolist():
+        load = found[int(asked[k])].load
+        if ordered or levels.order([load]) != "fails":
+            onsets[k] = float(f * (levels.load - load))
     return frozen(onsets)
 
 
@@ -116,15 +103,12 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
     if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
-    known = [load for load in levels.known if depth(load) > 0]
-    low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)
+    high = min(load for load in levels.known if depth(load) > 0)
+    low = max((load for load in levels.known if depth(load) <= 0), default=Fraction(0))
     here = min((low, high), key=lambda s: abs(depth(s))) if low else high
     for _ in range(STEPS):
         value = depth(here)
-        if value > 0:
-            high = min(high, here)
-        else:
-            low = max(low, here)
+        low, high = (low, min(high, here)) if value > 0 else (max(low, here), high)
         try:
             rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
             step = Fraction(value / rate)

@@ -1,10 +1,9 @@
 """Proof of order: no indentation falls as the load rises, which theorems on friction require.
 
-docs/theory/states.md, "The proof of order", states and proves the theorem and defines its symbols;
-(3), (4), the theorem and the corollary in this module are those of that section. C~ and delta are
-diagonal matrices. Weights come from an inverse if at most `SWEPT` asperities touch. If more touch,
-they come from `friction.sweeping`; if this proves nothing and at most `INVERTED` touch, from an
-inverse.
+docs/theory/states.md, "The proof of order", defines the symbols and proves the theorem, the
+corollary, (3) and (4). C~ and delta are diagonal matrices. If at most `SWEPT` asperities touch,
+weights come from an inverse; else from `friction.sweeping` and then, for at most `INVERTED`, from
+an inverse.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
 #: falls from a level in use to the next higher one, and no rate at the tested levels is negative;
-#: each friction state solves one step of `general_step`. "fails": a computed rate is negative, or
-#: it is not proved that no load P_i falls from one level to the next.
+#: each friction state solves one step of `general_step`. "fails": one of these conditions
+#: is not met.
 Order = Literal["proved", "proved for one step", "fails"]
 
 #: A computed rate below -RATE_ROUNDING counts as negative. Rates are solved for to the relative
@@ -41,33 +40,28 @@ RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 #: number for which a proof is tried. `cr.prove_order` has a limit of its own.
 SWEPT, INVERTED, MOST = 400, 800, 20_000
 
-#: Largest number of intermediate levels of the bisection, with an inverse and without one.
-BETWEEN, FEW_BETWEEN = 7, 1
-
-#: Largest number of asperities of which rates are bounded by an inverse.
-MOST_BOUNDED = 4 * INVERTED
-
-#: Number of times that (4) decreases m. A heuristic.
-IMPROVEMENTS = 4
+#: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
+#: number of asperities of which an inverse bounds rates; number of times that (4) decreases m.
+BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
 
 
 def order_between(
     at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
 ) -> Order:
-    """What is proved about order between the lowest and the highest of some loads, by bisection.
+    """What is proved about order, by bisection, between the ends of `loads`, whose levels are in
+    use.
 
-    at    : function that returns the level at a load
-    loads : the loads of the levels in use
-    most  : largest number of touching asperities for which a proof is tried
+    at   : function that returns the level at a load
+    most : largest number of touching asperities for which a proof is tried
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
     rising = ~top.open
     if len(used) == 1 or proved_between(top, at(used[-1]), rising, most):
         return "proved"
-    if any(_falls(at(high), at(low), rising) for high, low in pairwise(used)):
-        return "fails"
-    if min(_least_rate(at(load), rising) for load in used) < -RATE_ROUNDING:
+    if any(_falls(at(high), at(low), rising) for high, low in pairwise(used)) or any(
+        _falling_rate(at(load), rising) for load in used
+    ):
         return "fails"
     unproved = [(used[0], used[-1])]
     left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
@@ -79,9 +73,11 @@ def order_between(
             level = at(middle)
         except SolverError:  # the intermediate level could not be computed
             return "proved for one step"
-        if _falls(at(high), level, rising) or _falls(level, at(low), rising):
-            return "fails"
-        if _least_rate(level, rising) < -RATE_ROUNDING:
+        if (
+            _falls(at(high), level, rising)
+            or _falls(level, at(low), rising)
+            or _falling_rate(level, rising)
+        ):
             return "fails"
         for a, b in ((high, middle), (middle, low)):
             if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising, most):
@@ -95,7 +91,6 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     """True if the upper level proves order down to the lower level, by the corollary.
 
     rising : (n,) true for asperities that may touch at the highest load of the path
-    most   : as in `order_between`
     """
     box, problem = upper.box, upper.problem
     if box is None or (box.fixed_open & ~upper.open).any():
@@ -119,10 +114,8 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     if len(support) > INVERTED or len(both) > MOST_BOUNDED:
         return False
     entries = influence.submatrix(both)[None, :, : len(support)]
-    better = span.at(support[None]).rates(entries, np.full((1, 1), influence.entry_error))[0]
-    rates[support] = -np.inf
-    rates[both] = np.maximum(rates[both], better)
-    return not span.unsettled(rates[None], rising).any()
+    error = np.full((1, 1), influence.entry_error)
+    return bool(span.settled(rates[None], rising, both[None], entries, error)[0])
 
 
 @np.errstate(all="ignore")
@@ -142,31 +135,19 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
     for some, problem in rows.coupled:
         which = order[some]
         entries[some] = problem.influence.matrix[which[:, :, None], which[:, None, :count]]
-    rates[span.support] = -np.inf
-    found = span.at(order[:, :count]).rates(entries, entry_error)
-    found = np.maximum(found, np.take_along_axis(rates, order, axis=1))
-    np.put_along_axis(rates, order, found, axis=1)
-    return np.asarray(span.regular[:, 0] & ~span.unsettled(rates, span.support).any(axis=1))
+    return span.settled(rates, span.support, order, entries, entry_error)
 
 
 class _Span(NamedTuple):
-    """The quantities of the proof between the levels in m rows, as arrays (m, n) or (m, 1).
-
-    support : true on the support
-    c       : diagonal of C~
-    drop    : F = D0(L1) - D0(L0)
-    depth, gaps : lower bounds on indentations and gaps at L1
-    steep   : k^(3/2), with the coefficient k of Hertz's law n = k P^(2/3)
-    regular : true if I + A C is regular for 0 <= C <= C~
-    """
+    """The quantities of the proof between the levels in m rows, as arrays (m, n) or (m, 1)."""
 
     support: NDArray[np.bool_]
-    c: Array
-    drop: Array
-    depth: Array
-    gaps: Array
-    steep: Array
-    regular: NDArray[np.bool_]
+    c: Array  # diagonal of C~
+    drop: Array  # F = D0(L1) - D0(L0)
+    depth: Array  # lower bounds on the indentations at L1
+    gaps: Array  # lower bounds on the gaps at L1
+    steep: Array  # k^(3/2), with the coefficient k of Hertz's law n = k P^(2/3)
+    regular: NDArray[np.bool_]  # true if I + A C is regular for 0 <= C <= C~
 
     @classmethod
     @np.errstate(invalid="ignore")
@@ -189,6 +170,24 @@ class _Span(NamedTuple):
             **{name: np.take_along_axis(getattr(self, name), which, axis=1) for name in wide}
         )
 
+    def settled(
+        self,
+        rates: Array,
+        rising: NDArray[np.bool_],
+        order: Indices,
+        entries: Array,
+        entry_error: Array,
+    ) -> NDArray[np.bool_]:
+        """(m,) true where (3) proves order, with entries (m, r, s) of A for the asperities `order`.
+
+        The first s of the r asperities include the support. `rates` (m, n) are known from row sums.
+        """
+        rates[self.support] = -np.inf
+        found = self.at(order[:, : entries.shape[2]]).rates(entries, entry_error)
+        found = np.maximum(found, np.take_along_axis(rates, order, axis=1))
+        np.put_along_axis(rates, order, found, axis=1)
+        return np.asarray(self.regular[:, 0] & ~self.unsettled(rates, rising).any(axis=1))
+
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(m, n) true where order is not proved: the rate may be negative, or the gap may close."""
         return np.asarray(~((rates > 0) | (~rising & (rates > -self.spare))))
@@ -208,8 +207,6 @@ class _Span(NamedTuple):
     @np.errstate(all="ignore")
     def rates(self, entries: Array, entry_error: Array) -> Array:
         """(m, r) lower bounds (3) on rates, with the best weights; -inf where the theorem fails.
-
-        The arrays of this object must be for s asperities that include the support.
 
         entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
         entry_error : (m, 1) bound on the relative error of the entries
@@ -254,11 +251,11 @@ def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
     return not (lower.open | (rising & grows)).all()
 
 
-def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
-    """The least rate y = (I + A C)^-1 1 of the rising asperities, or 0 if none is negative."""
+def _falling_rate(level: Level, rising: NDArray[np.bool_]) -> bool:
+    """True if a rate y = (I + A C)^-1 1 of a rising asperity is negative."""
     problem, touching = level.problem, level.loads.value > 0
     if not touching.any():
-        return 0.0
+        return False
     h = problem.compliance(np.where(touching, level.loads.value, 1.0))
     y: Array = correct(
         problem.influence,
@@ -268,4 +265,4 @@ def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
         balanced=False,
         tolerance=SOLVED,
     )
-    return float(y[rising].min(initial=0.0))
+    return bool((y[rising] < -RATE_ROUNDING).any())

@@ -1,12 +1,10 @@
-"""`load_path` computes friction states along a path of load P and shear force Q.
+"""Friction states along a path of load P and shear force Q: `load_path`; at constant P: `history`.
 
-`history` does so at constant P. With the coefficient of friction f, the points of a path are
-(P, T) with T = Q / f; `walk.Walk` follows them.
+With the coefficient of friction f, `walk.Walk` follows the points (P, T), where T = Q / f.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
@@ -18,7 +16,7 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import Stepper
 from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.order import Order
@@ -46,19 +44,16 @@ class LoadPath(Table, Plottable):
     approaches     : (m,) [length] approach D0; at the load 0, the approach at the first touch
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
-    asperity_displacements : (m, n) [length] for each asperity, its drift (next field) plus its own
-        deflection, the tangential displacement that its own shear force causes
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
         opposite surface, also while it is open
+    asperity_displacements : (m, n) [length] drift plus the displacement that the own force causes
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
     fronts         : (m,) [force] load down to which the contact slips on arrival at the point; nan
-        if nothing slips then, for example if the load has fallen below the front. A segment along
-        which P and Q do not change does not change fronts and status. Not valid if `order` is
-        "fails"
-    status : (m, n) status of each asperity on arrival at the point: "stuck" (no slip),
-        "partial" (a disc sticks), "sliding" (the whole asperity slides), "open" (no contact) or
-        "undecided"
+        if nothing slips then. A segment along which P and Q do not change does not change fronts
+        and status. Not valid if `order` is "fails"
+    status : (m, n) status on arrival at the point: "stuck" (no slip), "partial" (a disc sticks),
+        "sliding" (the whole asperity slides), "open" (no contact) or "undecided"
     curves         : the memory curve after each point; not valid if `order` is "fails"
     order          : "proved" if order (docs/theory/states.md) is proved between the lowest and the
         highest load of all normal solutions used; other values as in `Cycle`
@@ -158,10 +153,9 @@ def load_path(
         separate where P = 0. As in `shear`, Q counts as f P if they differ only by rounding
     start     : a pressed contact of this scene, without shear; default: the bodies are separate
     influence : how the compliance matrix is stored, as in `press`; with None, in the cheapest way
-    general_steps : number of general steps per segment (docs/theory/without-order.md). They also
-        apply if an indentation falls as the load rises (order fails), but nothing is proved about
-        their results. With None, the states come from the memory curve; if order fails and the
-        normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
+    general_steps : number of general steps per segment (docs/theory/without-order.md), whose
+        results are not proved. With None, the states come from the memory curve; if order fails and
+        the normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem is not solved.
@@ -171,7 +165,9 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, general_steps)
+    if general_steps is not None:
+        checks.whole("general_steps", general_steps)
+    return path_of(*walk_of(scene, loads, forces, start, influence, general_steps))
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
@@ -194,68 +190,56 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     checks.some("forces", Q)
     levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
-    return _path(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
+    return path_of(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
 
 
-def walk(
+def walk_of(
     scene: Scene,
     loads: ArrayLike,
     forces: ArrayLike,
     start: Contact | None = None,
     influence: Kind | None = None,
-    general_steps: int | None = None,
+    steps: int | None = None,
     stepper: type[Stepper] = Stepper,
-) -> LoadPath:
-    """The result of `load_path`; `stepper` is the solver of the general steps."""
-    points = points_of(scene, loads, forces)
-    if general_steps is not None:
-        checks.whole("general_steps", general_steps)
-    curve = MemoryCurve()
+) -> tuple[Contact, Walk]:
+    """The contact at the highest load of a path, and the path; arguments as in `load_path`.
+
+    If all loads are 0, the contact is at the first touch.
+    """
+    checks.instance("scene", scene, Scene)
+    f = checks.friction(scene.friction)
+    P, Q = checks.array("loads", loads, sign="not negative"), checks.array("forces", forces)
+    if len(P) == 0 or len(P) != len(Q):
+        found = f"{len(P)} loads and {len(Q)} forces"
+        raise InputError("loads, forces", found=found, expected="equal numbers, at least one")
+    if len(bare := np.flatnonzero((P == 0) & (Q != 0))):
+        expected = "0 at a load of 0: shear must end before contact is lost"
+        raise InputError(f"forces[{bare[0]}]", found=Q[bare[0]], expected=expected)
+    checks.bearable("forces", Q, f * P)
+    pairs = zip(map(Fraction, P.tolist()), Q.tolist(), strict=True)
+    points, curve = [(load, height_at(load, force, scene)) for load, force in pairs], MemoryCurve()
     if start is not None:
         checks.instance("start", start, Contact)
         if start.scene is not scene:
             expected = "a contact whose scene is this very object: pass start.scene"
             raise InputError("start", found="a contact of another scene", expected=expected)
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
-    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
-    levels = contact.cached(FrictionLevels)
-    return _path(contact, Walk(levels, curve, points, general_steps, stepper))
+    if positive := [float(load) for load in (curve.load, *(load for load, _ in points)) if load]:
+        if min(positive) < LEAST_PART * max(positive):
+            expected = f"0, or at least {LEAST_PART:g} of the largest load, {max(positive):g}"
+            raise InputError("loads", found=min(positive), expected=expected)
+        contact = press(scene, load=max(positive), influence=influence)
+    else:
+        contact = press(scene, approach=-float(scene.offsets.max()))
+    return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
 
 
-def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
-    """The contact at the highest of these loads; at the first touch if all loads are 0."""
-    if highest := float(max(loads)):
-        if (least := float(min(load for load in loads if load))) < LEAST_PART * highest:
-            expected = f"0, or at least {LEAST_PART:g} of the largest load, {highest:g}"
-            raise InputError("loads", found=least, expected=expected)
-        return press(scene, load=highest, influence=influence)
-    return press(scene, approach=-float(scene.offsets.max()))
-
-
-def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
-    """The checked points (P, T = Q / f), as exact fractions."""
-    checks.instance("scene", scene, Scene)
-    f = checks.friction(scene.friction)
-    P = checks.array("loads", loads, sign="not negative")
-    Q = checks.array("forces", forces)
-    if len(P) == 0 or len(P) != len(Q):
-        found = f"{len(P)} loads and {len(Q)} forces"
-        raise InputError("loads, forces", found=found, expected="equal numbers, at least one")
-    bare = (P == 0) & (Q != 0)
-    if bare.any():
-        k = int(np.argmax(bare))
-        expected = "0 at a load of 0: shear must end before contact is lost"
-        raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
-    checks.bearable("forces", Q, f * P)
-    pairs = zip(map(Fraction, P.tolist()), Q.tolist(), strict=True)
-    return [(load, height_at(load, force, scene)) for load, force in pairs]
-
-
-def _path(contact: Contact, walk: Walk) -> LoadPath:
+def path_of(contact: Contact, walk: Walk) -> LoadPath:
+    """The result for a path whose highest load is that of the contact."""
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
     (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
-    (displacements, displacement_errors), (asperity_forces, force_errors), *others = found
+    (displacements, displacement_errors), (asperity_forces, force_errors), own, drifts = found
     rows = levels.rows(points)
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
     return LoadPath(
@@ -270,8 +254,8 @@ def _path(contact: Contact, walk: Walk) -> LoadPath:
         asperity_forces=asperity_forces,
         asperity_force_errors=force_errors,
         asperity_loads=frozen(levels.to_scene(rows.loads.value * levels.units.force)),
-        asperity_displacements=others[0][0],
-        drifts=others[1][0],
+        asperity_displacements=own[0],
+        drifts=drifts[0],
         fronts=frozen(np.array(fronts)),
         status=walk.status(),
         curves=tuple(walk.curves),

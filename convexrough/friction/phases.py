@@ -1,13 +1,9 @@
-"""Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude.
-
-A smooth path is replaced by chords between some of its points. Among these points are the extremes
-of P, P + Q/f and P - Q/f, with the load P, the shear force Q and the coefficient of friction f.
-"""
+"""Cycles with oscillating load and shear force: their paths, and losses by phase and amplitude."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -45,8 +41,7 @@ def elliptic_path(
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase  : [rad] from -pi to pi. At 0 the axes of the ellipse are parallel to those of P and Q; at
-        pi/2 the ellipse is a straight line, as P and Q are in phase
+    phase  : [rad] from -pi to pi; at pi/2 P and Q are in phase, and the ellipse is a straight line
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so `Cycle.level` is that of the ellipse
     chords : approximate number of chords that replace the ellipse. In tests the loss along the
@@ -61,22 +56,16 @@ def elliptic_path(
     (12, 1.5)
     """
     checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200)
-    p, q = (
-        checks.finite("load_amplitude", load_amplitude),
-        checks.finite("force_amplitude", force_amplitude),
-    )
-    t = q / checks.positive("friction", friction)
-    phase = checks.phase("phase", phase)
+    p = checks.finite("load_amplitude", load_amplitude)
+    q = checks.finite("force_amplitude", force_amplitude)
+    t, phase = q / checks.positive("friction", friction), checks.phase("phase", phase)
     across, along = t * np.cos(phase), t * np.sin(phase)
     corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
     halves = np.sort(np.mod(corners, np.pi))
     ends = np.append(np.concatenate((halves, halves + np.pi)), halves[0] + 2 * np.pi)
-    arcs = [
-        np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
-        for a, b in pairwise(ends)
-        if b - a > 1e-9
-    ]
-    angles = np.concatenate(arcs)
+    each = ((a, b, chords * (b - a) / (2 * np.pi)) for a, b in pairwise(ends) if b - a > 1e-9)
+    arcs = (np.linspace(a, b, max(1, int(np.ceil(part))), endpoint=False) for a, b, part in each)
+    angles = np.concatenate([*arcs])
     loads = checks.finite("load", load) + p * np.cos(angles)
     forces = checks.finite("force", force) + q * np.sin(angles + phase)
     return frozen(loads), frozen(forces)
@@ -88,20 +77,16 @@ class PhaseLosses(Table, Plottable):
 
         P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    An ellipse has one phase and one factor. In all arrays the ellipses with the first factor come
-    first, one for each phase, then those with the second factor, and so on.
+    In all arrays the ellipses with the first factor come first, one for each phase, then those with
+    the second factor, and so on.
 
     scene   : the scene
     phases, factors : (c,) phase [rad], and factor of both amplitudes
-    losses  : (c,) [force length] energy lost by both bodies per steady cycle along the chords that
-        replace the ellipse
-    loss_errors : (c,) [force length] proved bounds on the errors of `losses`, without the error of
-        the chords
-    smooth  : (c,) [force length] losses of the shape without roughness; nan if the solution of the
-        smooth contact is not known
+    losses, loss_errors : (c,) [force length] energy lost by both bodies per steady cycle along the
+        chords that replace the ellipse, and proved bounds on the errors for these chords
+    smooth  : (c,) [force length] losses of the shape without roughness; nan if not known
     levels  : (c,) [force] `Cycle.level`, the load L* up to which the memory curve no longer changes
-    sliding : (c,) number of asperities that, on this ellipse, slide as a whole or lose contact in
-        the steady cycle
+    sliding : (c,) number of asperities that slide as a whole or lose contact in the steady cycle
     order   : the weakest `Cycle.order` of all cycles
 
     >>> losses = cr.phase_losses(
@@ -163,39 +148,35 @@ def phase_losses(
     """
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
-    load_amplitude = checks.finite("load_amplitude", load_amplitude)
-    force_amplitude = checks.finite("force_amplitude", force_amplitude)
+    swing = checks.finite("load_amplitude", load_amplitude)
+    shear = checks.finite("force_amplitude", force_amplitude)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
     checks.some("phases", turns)
     checks.some("factors", sizes)
-    for i, turn in enumerate(turns):
-        checks.phase(f"phases[{i}]", turn)
-    alone = _smooth_alone(scene, load)
-    rough, smooth = list[Cycle](), list[float]()
-    ellipses = list(product(sizes.tolist(), turns.tolist()))
-    for k, (size, phase) in enumerate(ellipses):
-        LOGGER.info(f"ellipse {k + 1} of {len(ellipses)}")
+    for i, phase in enumerate(turns):
+        checks.phase(f"phases[{i}]", phase)
+    alone, rough, smooth = None, list[Cycle](), list[float]()
+    if (reference := smooth_reference(scene, load)) is not None:  # as a scene with one asperity
+        twice = 2.0 * reference.radius
+        alone = Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)
+    turn, size_of = np.tile(turns, len(sizes)), np.repeat(sizes, len(turns))
+    for k, (phase, size) in enumerate(zip(turn.tolist(), size_of.tolist(), strict=True)):
+        LOGGER.info(f"ellipse {k + 1} of {len(turn)}")
         with blamed_on(f"factors[{k // len(turns)}] = {size:g}"):
-            P, Q = elliptic_path(
-                load=load,
-                load_amplitude=size * load_amplitude,
-                force=force,
-                force_amplitude=size * force_amplitude,
-                phase=phase,
-                friction=f,
-                chords=chords,
-            )
+            given = {"load": load, "force": force, "phase": phase, "friction": f}
+            amplitudes = {"load_amplitude": size * swing, "force_amplitude": size * shear}
+            P, Q = elliptic_path(**given, **amplitudes, chords=chords)
             rough.append(steady(scene, loads=P, forces=Q, influence=influence))
         smooth.append(steady(alone, loads=P, forces=Q).loss if alone else np.nan)
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
     return PhaseLosses(
         scene=scene,
         load=float(load),
-        load_amplitude=float(load_amplitude),
+        load_amplitude=swing,
         force=float(force),
-        force_amplitude=float(force_amplitude),
-        phases=frozen(np.array([phase for _, phase in ellipses])),
-        factors=frozen(np.array([size for size, _ in ellipses])),
+        force_amplitude=shear,
+        phases=frozen(turn),
+        factors=frozen(size_of),
         losses=frozen(np.array([each.loss for each in rough])),
         loss_errors=frozen(np.array([each.loss_error for each in rough])),
         smooth=frozen(np.array(smooth)),
@@ -203,11 +184,3 @@ def phase_losses(
         sliding=frozen(np.array(sliding, dtype=np.int64)),
         order=min((each.order for each in rough), key=UNSURE_FIRST.index, default="proved"),
     )
-
-
-def _smooth_alone(scene: Scene, load: float) -> Scene | None:
-    """The smooth contact as a scene with one asperity; None if its solution is not known."""
-    if (reference := smooth_reference(scene, load)) is None:
-        return None
-    twice = 2.0 * reference.radius
-    return Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)

@@ -32,16 +32,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearCertificate(Proved):
-    """What is proved about a friction state, independently of how it was computed.
-
-    Arrays are (n,), in the order of the scene's asperities.
+    """What is proved about a friction state, however it was computed. Arrays are (n,), in the
+    order of the scene's asperities.
 
     scope  : as in `Certificate`, for the pressed contact; "none" if nothing is proved
     order  : what is proved about order from the load P - |Q|/f to P (docs/theory/states.md,
         "Order"). "proved": statuses and bounds hold for the true state. "proved for one step": they
-        hold for the solution of one general step (docs/theory/without-order.md) from rest to Q.
-        This is the true state unless the tangential deflection of some asperity, due to its own
-        force, decreased on the way. "fails": nothing is proved
+        hold for the solution of one general step (docs/theory/without-order.md) from rest to Q,
+        the true state unless an asperity's deflection by its own force decreased on the way.
+        "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force] bounds on |force - solution|
@@ -86,8 +85,7 @@ class ShearState(Table, Plottable):
     force         : [force] shear force Q on the contact
     displacement  : [length] relative tangential displacement of distant points of the two bodies
     forces        : [force] shear forces on the asperities; their sum is Q
-    displacements : [length] tangential displacement of each asperity due to its own force, plus its
-        slip; the effect of other asperities is left out
+    displacements : [length] tangential displacement of each asperity by its own force, plus slip
     slips         : [length] gross slip; 0 where the asperity does not slide
     stick_radii   : [length] radii of the stick discs; 0 where the asperity slides or is open
     certificate   : what is proved about this state
@@ -133,8 +131,7 @@ class ShearState(Table, Plottable):
     ) -> Gradient:
         """Derivatives of a weighted sum of results with respect to the scene.
 
-        displacement  : weight of the displacement
-        forces, slips : (n,) weights of the forces and slips of the asperities
+        displacement, forces, slips : weights of the displacement and, (n,), of forces and slips
         holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
             too; `Gradient` says how to keep a prescribed displacement constant
 
@@ -174,15 +171,11 @@ def shear(
     With order it is the difference of two normal solutions, (1) of docs/theory/states.md. If
     `order` is "fails" and the normal solution is proved, it comes from general steps.
 
-    Prescribe one of the two:
+    force [force] or displacement [length] : the prescribed one of shear force Q and relative
+        tangential displacement of distant points
 
-    force        : [force] shear force Q
-    displacement : [length] relative tangential displacement of distant points
-
-    If |Q| differs from the friction limit f P by at most 16 * 2^-53 f P, it counts as f P: gross
-    sliding. A displacement that differs as little, relatively, from that at the onset of gross
-    sliding also counts as gross sliding. Then the result contains f P and the displacement at which
-    gross sliding starts.
+    If |Q| or the displacement differs from its value at the onset of gross sliding (f P for |Q|) by
+    at most 16 * 2^-53 of this value, it counts as that value, also in the result.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
     that at which gross sliding starts; SolverError if a normal problem is not solved.
@@ -196,7 +189,7 @@ def shear(
     checks.exactly_one("force", force, "displacement", displacement)
     LOGGER.info("pressing at the load P - Q / f")
     levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
-    start = MemoryCurve.pressed(levels.load)
+    P, start = levels.load, MemoryCurve.pressed(levels.load)
     if displacement is None:
         assert force is not None  # exactly_one
         if shape := np.shape(force):
@@ -206,23 +199,22 @@ def shear(
         height = levels.height(force)
     else:
         displacement = checks.finite("displacement", displacement)
-        height = levels.load - levels.displaced(abs(displacement))
+        height = P - levels.displaced(abs(displacement))
         height = height if displacement >= 0 else -height
-    walk = Walk(levels, start, [(levels.load, height)])
+    walk = Walk(levels, start, [(P, height)])
     if walk.general is not None and displacement is not None:
-        walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
-    found, order = walk.states(), walk.order
-    moved, carried, asperities, drifts = (each[0] for each in found)
+        walk = Walk(levels, start, [(P, _by_steps(levels, displacement))])
+    order, (moved, carried, asperities, drifts) = walk.order, (each[0] for each in walk.states())
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
         total = Ball.exact(walk.points[0][1]) * levels.coefficient
     else:
-        level = levels.at(levels.load - abs(height))
+        level = levels.at(P - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         total = (levels.top.load - level.load) * levels.force_unit
         total = total if height >= 0 else -total
-    if abs(height) == levels.load:  # the given value may differ from gross sliding by rounding
+    if abs(height) == P:  # the given value may differ from gross sliding by rounding
         force = displacement = None
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
@@ -258,7 +250,7 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
     def beyond(part: float) -> float:
         points = [(levels.load, Fraction(part) * levels.load)]
-        found = followed(levels, MemoryCurve.pressed(levels.load), points)
-        return float(found.states.displacements.value[0] - displacement)
+        states = followed(levels, MemoryCurve.pressed(levels.load), points).states
+        return float(states.displacements.value[0] - displacement)
 
     return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load

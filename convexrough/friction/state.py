@@ -1,70 +1,62 @@
-"""Friction states as weighted sums of solutions under normal load.
+"""Friction states and energy losses, from solutions under normal load; both assume order.
 
-The weights are the changes of slope of the memory curve. Equation (1) of docs/theory/paths.md gives
-the shear forces Q_i of the asperities and the displacement X of the bodies. The sum for X, with the
-indentations of an asperity in place of the approach, gives the own deflection plus drift of this
-asperity. Equation (1) of docs/theory/states.md is the special case of first loading.
+States are sums of solutions, weighted by the changes of slope of the memory curve: (1) of
+docs/theory/paths.md. The sum for the displacement X of the bodies, with the indentations of an
+asperity in place of the approach, gives the own deflection plus drift of this asperity.
+
+Losses (docs/theory/losses.md) are divided by c_t f^2. While the total load is P and the slip front
+falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL), with the slope th of the
+memory curve at L and the direction c of slip, 1 or -1. B is the sum of the B_i(P, L) of (2).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from itertools import pairwise
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball, of_rows
+from convexrough import threads
+from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.levels import FrictionLevels, exactly, rounded
 from convexrough.friction.order import Order
-from convexrough.normal.level import Level
+from convexrough.normal.level import Level, Rows, energies
+from convexrough.normal.levels import NUMBERS
+from convexrough.roundoff import SAFETY
+from convexrough.sphere import mindlin
+
+#: The load P and the level L of the front at one moment, or one of them at two moments [force].
+Loads: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):
-    """m states of N asperities in the scene's units.
+    """m states of N asperities in the scene's units, with errors; infinite without a proof."""
 
-    Each array is a `Ball`: values, and radii that bound their errors (infinite without a proof).
-
-    displacements : (m,) X, tangential displacement of one body relative to the other
-    forces        : (m, N) Q_i, shear forces of the asperities
-    asperity_displacements : (m, N) own deflection plus drift
-    drifts        : (m, N) displacements of asperities, open ones too, along the opposite surface
-    """
-
-    displacements: Ball
-    forces: Ball
-    asperity_displacements: Ball
-    drifts: Ball
-
-    def unproved(self) -> States:
-        """The same states with infinite error bounds."""
-        return States(*(Ball.around(each.mid, np.inf) for each in self))
+    displacements: Ball  # (m,) X, tangential displacement of one body relative to the other
+    forces: Ball  # (m, N) Q_i, shear forces of the asperities
+    asperity_displacements: Ball  # (m, N) own deflection plus drift
+    drifts: Ball  # (m, N) displacements of asperities, open ones too, along the opposite surface
 
 
 class LevelSums(NamedTuple):
-    """Sums over the levels of each of m memory curves, weighted by changes of slope.
+    """Sums over the levels of each of m memory curves, weighted by changes of slope."""
 
-    used    : the k total loads of the levels of all curves, sorted
-    places  : (m, j) the levels of each curve, as indices into `used`
-    weights : (m, j) changes of slope of the curves at these levels: slope below minus slope above.
-        If a curve has fewer than j levels, its row ends with zeros
-    """
-
-    used: list[Fraction]
-    places: Indices
-    weights: Ball
+    used: list[Fraction]  # the k total loads of the levels of all curves, sorted
+    places: Indices  # (m, j) the levels of each curve, as indices into `used`
+    weights: Ball  # (m, j) slope below minus slope above; rows of curves with fewer levels: 0
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
         place = {load: k for k, load in enumerate(used)}
-        most = max((len(each) for each in bends), default=0)
-        places = np.zeros((len(bends), most), dtype=np.intp)
+        places = np.zeros((len(bends), max((len(each) for each in bends), default=0)), np.intp)
         high, low = np.zeros(places.shape), np.zeros(places.shape)
         for row, each in enumerate(bends):
             for column, (load, bend) in enumerate(each):
@@ -93,10 +85,9 @@ def states_of(
     """The states of these curves, for the asperities `which` in this order; default all."""
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
-    solved = [levels.at(load) for load in sums.used]
+    solved, travel = [levels.at(load) for load in sums.used], levels.travel_unit
     loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[some] for level in solved])
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
-    travel = levels.travel_unit
     return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,
@@ -118,9 +109,8 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) for each asperity the last status in `proved` whose mask is true for this asperity.
-
-    If no mask is true, the status is "open" if the asperity is proved to be open, else "undecided".
+    """(N,) for each asperity the last status in `proved` whose mask is true for this asperity, or
+    "open" if it is proved to be open, or "undecided".
     """
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
@@ -136,6 +126,140 @@ def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
     modulus = Ball.exact(levels.scene.material.contact_modulus)
     root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
     radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus
-    radii = radii * (0.75 * root * levels.units.local)
-    values, errors = (levels.to_scene(np.array(part)) for part in (radii.value, radii.error))
-    return frozen(values), frozen(errors)
+    return rounded(of_rows(levels.to_scene, radii * (0.75 * root * levels.units.local)))
+
+
+def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
+    """(k, n) the parts of B_i due to partial slip and those due to sliding, for k moments."""
+    nothing = Ball.exact(np.zeros(high.loads.shape))
+    loaded = high.loads.value > 0
+    P = where(loaded, high.loads, 1.0 + nothing)
+    own, gaps = high.indentation.positive_part(), (-low.indentation).positive_part()
+    s = (low.loads / P).cbrt()
+    x = (P - low.loads) / P / (1.0 + s + s * s)
+    slip, slide = P * own * mindlin.loss_at(x) * Fraction(6, 5), P * gaps
+    doubtful = ~high.touching & ~high.open & np.isfinite(high.loads.upper)
+    if doubtful.any():
+        most = Ball.between(nothing.value, high.loads.upper)
+        slip = where(doubtful, most * own * Fraction(1, 5), slip)
+        slide = where(doubtful, most * gaps, slide)
+    moved = (loaded | doubtful) & ((high.load - low.load).size > 0)[:, None]
+    return where(moved, slip, nothing), where(moved, slide, nothing)
+
+
+def trapezoid_loss(high: Level, low: Level) -> Ball:
+    """B(P, L): twice the integral of D0 from L to P, minus twice its trapezoid-rule value."""
+    run = high.load - low.load
+    return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
+
+
+def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
+    """(m,) the loss on each of m segments of a path, from the pieces of each segment."""
+    pieces = [piece for each in costs for piece in each]
+    levels.prepare(load for piece in pieces for load in piece[2:])
+    still = np.array([piece.load_constant for piece in pieces], dtype=bool)
+    front = front_integrals(levels, [piece for piece in pieces if not piece.load_constant])
+    fallen = joined([_at_constant_load(levels, [p for p in pieces if p.load_constant]), front])
+    integrals = fallen[np.argsort(np.argsort(~still, kind="stable"))]  # of -dB/dL
+    found = exactly([1 - p.sign * p.slope for p in pieces]) * integrals
+    ends = np.cumsum([0, *map(len, costs)]).tolist()
+    return Ball.stacked([found[start:stop].sum() for start, stop in pairwise(ends)])
+
+
+def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
+    """(k,) integrals of -dB/dL over pieces at constant load, which are differences of B."""
+    moments = [(piece.load_after, front) for piece in pieces for front in piece[2:4]]
+    slipped = [each for each in dict.fromkeys(moments) if each[0] != each[1]]  # B(P, P) = 0
+    place, found = {each: k for k, each in enumerate(slipped)}, list[Ball]()
+    for some in threads.chunks(len(slipped), max(1, NUMBERS // (1 + len(levels.candidates)))):
+        slip, slide = _at_moments(levels, slipped[some])
+        found.append((slip + slide).sum())
+    lost = joined([*found, Ball.exact(np.zeros(1))])[[place.get(each, -1) for each in moments]]
+    return lost[1::2] - lost[0::2]
+
+
+def _at_moments(levels: FrictionLevels, moments: Sequence[Loads]) -> tuple[Ball, Ball]:
+    """`asperity_losses` at k moments."""
+    loads = sorted({load for each in moments for load in each})
+    rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
+    high, low = (np.array([place[each[end]] for each in moments]) for end in (0, 1))
+    return asperity_losses(rows.at(high), rows.at(low))
+
+
+def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
+    """(k,) integrals I of -dB/dL, (4) of docs/theory/losses.md, over pieces with a varying load."""
+    if not pieces:
+        return Ball.exact(np.zeros(0))
+    ends = list(zip(*(piece[2:] for piece in pieces), strict=True))  # L0, L1, P0, P1
+    over, run, fall = (
+        exactly([a - b for a, b in zip(*both, strict=True)]).scaled(1.0 / levels.units.force)
+        for both in ((ends[2], ends[0]), ends[:2], ends[2:])
+    )
+    loads = sorted({load for end in ends for load in end})
+    known, place = [levels.at(load) for load in loads], {x: k for k, x in enumerate(loads)}
+    every, approach = energies(known), Ball.stacked([level.approach for level in known])
+    which = [[place[load] for load in end] for end in ends]
+    (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
+    stiffness = np.array([_stiffest(known[k]) for k in which[1]])
+    with np.errstate(divide="ignore"):
+        most = run.upper / stiffness * (1 + SAFETY)
+    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), most))
+    m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
+    first, last = D2 - D1, D3 - D1
+    larger = where(fall.value >= 0.0, first, last)
+    M = _sharper((V2 - V3) / fall - D3 + last, _hull((first + last) * 0.5, larger))
+    found = over * D - fall * m + run * (m * 2.0 - M)
+    if not levels.proved:
+        return found
+    least = Ball.between(np.zeros(len(run)), np.maximum(found.upper, 0.0))
+    return where(found.lower >= 0.0, found, _sharper(found, least))
+
+
+def _stiffest(level: Level) -> float:
+    """A lower bound on 2 E* a, with the largest contact radius a: dD0/dL <= 1 / (2 E* a)."""
+    k = level.problem.exact.coefficients.upper
+    stiffness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
+    return float(stiffness.max(initial=0.0)) * (1 - SAFETY)
+
+
+def _hull(a: Ball, b: Ball) -> Ball:
+    return Ball.between(np.minimum(a.lower, b.lower), np.maximum(a.upper, b.upper))
+
+
+def _sharper(a: Ball, b: Ball) -> Ball:
+    """Of two balls that enclose the same numbers, the one with the smaller radius."""
+    return where(a.radius <= b.radius, a, b)
+
+
+def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
+    """(N,) [force length] losses at each asperity, due to partial slip and to sliding.
+
+    Pieces with a varying load are cut into `cells` cells. The loss in one lies between the losses
+    at the loads of its ends (docs/theory/losses.md, "A front while the load changes"); the results
+    are sums of the means. Their relative errors are about cells^-2, the bounds about 1 / cells.
+    """
+    run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
+    parts = list[tuple[Fraction, Loads, Loads]]()  # weight; P and front at both ends of a cell
+    for piece in pieces:
+        part = 0.0 if piece.load_constant else float((piece.top - piece.bottom) / run)
+        cut = max(1, round(cells * part))
+        top, bottom, before, after = piece[2:]
+        fronts, loads = (
+            [start + (end - start) * Fraction(k, cut) for k in range(cut + 1)]
+            for start, end in ((top, bottom), (before, after))
+        )
+        weight = 1 - piece.sign * piece.slope
+        parts += [(weight, *both) for both in zip(pairwise(loads), pairwise(fronts), strict=True)]
+    levels.prepare(load for _, *both in parts for ends in both for load in ends)
+    totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
+    for chunk in threads.chunks(len(parts), max(1, NUMBERS // (4 + 4 * len(levels.candidates)))):
+        some = parts[chunk]
+        moments = [(P, min(L, P)) for _, loads, fronts in some for P in loads for L in fronts]
+        weights = exactly([weight for weight, _, _ in some])
+        same = np.array([P == R for _, (P, R), _ in some])[:, None]
+        for k, values in enumerate(_at_moments(levels, moments)):
+            one, other = values[1::4] - values[0::4], values[3::4] - values[2::4]
+            lost = weights[:, None] * where(same, one, _hull(one, other))
+            totals[k] = totals[k] + of_rows(np.transpose, lost).sum()
+    slip, slide = (each * levels.loss_unit for each in totals)
+    return slip, slide

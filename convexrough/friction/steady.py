@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.cycle import Cycle, steady_cycles
+from convexrough.friction import state
+from convexrough.friction.curve import MemoryCurve, Point
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.path import points_of, pressed_for
+from convexrough.friction.path import walk_of
+from convexrough.friction.walk import Closed
 from convexrough.influence import Kind
 from convexrough.progress import LOGGER
 from convexrough.scene.scene import Scene
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import smooth_reference
 
 
 def cycle(
@@ -67,7 +76,7 @@ def cycles(
     """
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
-    limit, levels = f * contact.load, contact.cached(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
@@ -79,21 +88,36 @@ def cycles(
         heights = [(T, -T) for T in tops]
     else:
         assert maximum is not None  # exactly_one
-        upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
-        checks.some("maximum", upper)
-        lower = -upper
-        if minimum is not None:
-            lower = checks.array("minimum", minimum, length=len(upper), one="maximum")
-            lower = checks.bearable("minimum", lower, limit)
-        if (upper < lower).any():
-            i = int(np.argmax(upper < lower))
-            expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
-            raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
-        ends = zip(upper.tolist(), lower.tolist(), strict=True)
+        ranges = force_ranges(maximum, minimum, f * contact.load)
+        checks.some("maximum", ranges[0])
+        ends = zip(*(each.tolist() for each in ranges), strict=True)
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]
         LOGGER.info("pressing at the load P - T of each cycle")
     paths = [[(levels.load, T) for T in each] for each in heights]
     return steady_cycles(contact, MemoryCurve.pressed(levels.load), paths)
+
+
+def force_ranges(
+    maximum: ArrayLike,
+    minimum: ArrayLike | None,
+    limit: float | Array,
+    length: int | None = None,
+    one: str = "",
+) -> tuple[Array, Array]:
+    """(m,) the checked largest and smallest shear forces; `length` and `one` as in
+    `checks.array`."""
+    upper = checks.array("maximum", maximum, length=length, one=one)
+    upper = checks.bearable("maximum", upper, limit)
+    lower = -upper
+    if minimum is not None:
+        each = one or "maximum"
+        lower = checks.array("minimum", minimum, length=len(upper), one=each)
+        lower = checks.bearable("minimum", lower, limit)
+    if len(wrong := np.flatnonzero(upper < lower)):
+        k = wrong[0]
+        expected = f"at least the minimum, {lower[k]:g} (-maximum by default)"
+        raise InputError(f"maximum[{k}]", found=upper[k], expected=expected)
+    return upper, lower
 
 
 def steady(
@@ -115,6 +139,87 @@ def steady(
     >>> f"{settled.level / P:.4f}", int((settled.status == "sliding").sum())
     ('0.3500', 12)
     """
-    points = points_of(scene, loads, forces)
-    contact = pressed_for(scene, [load for load, _ in points], influence)
-    return steady_cycles(contact, MemoryCurve(), [points])[0]
+    contact, walk = walk_of(scene, loads, forces, influence=influence)
+    return steady_cycles(contact, walk.start, [walk.points])[0]
+
+
+def steady_cycles(
+    contact: Contact, start: MemoryCurve, paths: Sequence[Sequence[Point]]
+) -> list[Cycle]:
+    """The steady cycles of several closed paths (P, T) that begin from the same memory curve."""
+    levels = contact.cached(FrictionLevels)
+    closed = [Closed.around(levels, start, points) for points in paths]
+    levels.prepare(load for each in closed for load in each.needed)
+    for needed in sorted((each.needed for each in closed), key=min):
+        levels.order(needed)  # a proof for the widest range of loads holds for the others
+    costs = [pieces for each in closed for pieces in each.cycles]
+    spent = state.losses(levels, costs) * levels.loss_unit
+    sums = state.LevelSums.of([curve for each in closed for curve in each.steady])
+    moved = state.displacements_of(levels, sums)
+    ends = np.cumsum([0, *map(len, paths)]).tolist()
+    return [
+        _cycle(contact, closed[k], spent[2 * k : 2 * k + 2], moved[start:stop])
+        for k, (start, stop) in enumerate(pairwise(ends))
+    ]
+
+
+def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
+    """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
+    levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
+    (first, loss), (first_error, error) = spent.value, spent.error
+    half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
+    amplitude = float(half.value)
+    rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
+    kept, slides = bottom.touching, bottom.touching & rest.open
+    lost = top.touching & bottom.open
+    slips = (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
+    doubtful = levels.to_scene(slides | ~(rest.touching | rest.open))
+    gross = np.where(levels.to_scene(kept), slips.value, 0.0)
+    gross[levels.to_scene(lost)] = np.nan
+    radii, radius_errors = state.stick_radii(levels, rest)
+    loaded, heights = zip(*closed.points[: closed.once], strict=True)
+    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
+    defect = smooth = np.nan
+    if set(loaded) == {levels.load}:
+        other = state.trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
+        defect = abs(float(other.value) - loss) / (loss or 1.0)
+        if reference:
+            smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
+    if closed.general is not None:
+        first, both = closed.general.losses[[closed.once, -1]]
+        loss, defect = both - first, np.nan
+        amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
+    unknown = np.inf if order == "fails" else 0.0
+    unproved = 0.0 if order == "proved" else np.inf
+    statuses = {
+        "intermittent": lost,
+        "sliding": slides,
+        "partial" if closed.cycles[1] else "stuck": rest.touching & top.touching,
+    }
+    found = Cycle(
+        contact=contact,
+        loads=frozen(np.array(loaded, dtype=np.float64)),
+        forces=closed.forces[: closed.once],
+        loss=float(loss),
+        loss_error=float(error + unproved),
+        loss_first=float(first),
+        loss_first_error=float(first_error + unproved),
+        status=state.by_status(levels, top, **({} if unknown else statuses)),
+        slips=frozen(gross),
+        slip_errors=frozen(np.where(doubtful, slips.error, 0.0) + unknown),
+        stick_radii=radii,
+        stick_radius_errors=frozen(radius_errors + unknown),
+        level=float(stuck),
+        force_level=float(levels.coefficient.value) * float(stuck_height),
+        balance_defect=defect,
+        loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
+        smooth_normalised=smooth,
+        displacement_amplitude=amplitude,
+        displacement_error=float(half.error) + unknown,
+        order=order,
+        presses=levels.presses,
+        start=float(closed.start.load),
+        heights=heights,
+    )
+    found.__dict__["_walk"] = closed  # the cached property would follow the path again
+    return found

@@ -1,25 +1,17 @@
 r"""Proof of order for many asperities: charges at near neighbours bound the rates from below.
 
-docs/theory/states.md, "The proof of order", derives (6), defines its symbols, and compares the
-weights w_k with charges on shells, onto which a unit charge at asperity i is swept. For weights
-that satisfy (6), 1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is
-positive for all i on the support. The shells have the radii R_k = c~_k / (pi E*); `scale` is
-1 / (pi E*).
+docs/theory/states.md, "The proof of order", derives (6) and (7), and compares the weights w_k with
+charges on shells, onto which a unit charge at asperity i is swept. For weights that satisfy (6),
+1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is positive for all i on
+the support. The shells have the radii R_k = c~_k / (pi E*).
 
 The weights are those for which some moments vanish and which, together with a charge -1 at i, have
-the least electrostatic energy. Let the complex number z_k be the vector from i to k, divided by the
-outward direction: from the middle of the support to i or, in a second try, from the mean of the
-neighbours to i. The moments are:
-
-- if neighbours lie all around i: sum w_k z_k and sum w_k z_k^2. Then (7) of that page proves (6)
-  for far asperities;
-- if i is at an edge: the imaginary part of sum w_k z_k, along the edge, and
-  sum w_k (|z_k|^2 - 3 Re(z_k)^2), the term of second order of the potential towards the middle;
-- if i is at a corner: the imaginary part of sum w_k z_k.
-
-Where such weights fail, a linear program finds those with the least q_i, for few asperities. For an
-asperity i outside the contact one neighbour alone suffices if the whole support is nearer to
-this neighbour than to i, and the neighbour's shell does not reach i.
+the least electrostatic energy. The moments are sums of w_k times functions of z_k, the vector from
+i to k as a complex number, divided by the outward direction: from the middle of the support to i
+or, in a second try, from the mean of the neighbours to i. Where such weights fail, a linear program
+finds those with the least q_i, for few asperities. For an asperity i outside the contact one
+neighbour alone suffices if the whole support is nearer to this neighbour than to i, and the
+neighbour's shell does not reach i.
 """
 
 from __future__ import annotations
@@ -42,12 +34,12 @@ Moments = Callable[[NDArray[np.complex128]], list[Array]]
 
 
 def around(d: NDArray[np.complex128]) -> list[Array]:
-    """The moments that are 0 where neighbours are all around an asperity."""
+    """The moments that are 0 where neighbours lie all around; (7) then proves (6) for far ones."""
     return [d.real, d.imag, (d * d).real, (d * d).imag]
 
 
 def edge(d: NDArray[np.complex128]) -> list[Array]:
-    """The moments that are 0 at an edge of the contact."""
+    """The moments that are 0 at an edge: along it, and of second order towards the middle."""
     return [d.imag, np.abs(d) ** 2 - 3.0 * d.real**2]
 
 
@@ -60,38 +52,24 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 #: Numbers of neighbours, moments of the weights (None for the linear program), and whether the mean
 #: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
-#: also uses the asperities that determined q_i in earlier tries. Tries with more than MORE
-#: neighbours are made only if at most FEW asperities remain.
+#: also uses the asperities that determined q_i in earlier tries.
 TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
     (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
     (32, around, False), (32, edge, False), (32, edge, True),
     (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
 )  # fmt: skip
-MORE, FEW = 32, 300
 
-#: Number of nearest neighbours of an asperity outside the contact that are tried, each alone.
-ALONE = 14
-
-#: If (7) proves (6) for all far asperities, (6) is computed only for the nearest ones: NEAR times
-#: as many as the weights have neighbours.
-NEAR = 9
-
-#: Largest number of systems that are solved for weights; each leaves out the neighbours whose
-#: weights were negative in an earlier one.
-SEARCHES = 15
-
-#: The linear program considers about twice as many asperities as this.
-SAMPLE = 300
-
-#: DIRECTIONS: number of directions in which the extent of the support is computed. ROWS: number of
-#: asperities that are treated together. NUMBERS: about the number of float64 numbers in an array.
-DIRECTIONS, ROWS, NUMBERS = 256, 2**14, 2**20
+MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
+ALONE = 14  # neighbours of an asperity outside the contact that are tried, each alone
+NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
+SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
+SAMPLE = 300  # the linear program considers about twice as many asperities
+DIRECTIONS = 256  # directions in which the extent of the support is computed
+ROWS, NUMBERS = 2**14, 2**20  # asperities treated together, and float64 numbers in an array
 
 
 def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> Array:
-    """(n,) lower bounds on the rates y(C) for all diagonal C with 0 <= C <= C~.
-
-    All bounds are -inf if a bound on the support is not positive.
+    """(n,) lower bounds on the rates for 0 <= C <= C~; all -inf if one on the support is not > 0.
 
     c     : (n,) diagonal of C~, 0 where open
     rates : (n,) lower bounds known before, from row sums of A C~
@@ -117,7 +95,8 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
                 if moments is None:
                     weights = swept.lightest(which, near)
                 else:
-                    weights = swept.weights(which, near, moments, by_near)
+                    make = partial(swept.weights, moments, by_near)
+                    weights = _in_parts(make, (near.shape[1] + 5) ** 2, which, near)
                 rates[which], failed[some] = swept.rates(which, near, weights, least[which])
             todo = ~(rates[left] > least[left])
             left, worst = left[todo], np.column_stack((worst, failed))[todo]
@@ -146,15 +125,11 @@ def _each(make: Callable[[Any], T], parts: Sequence[Any]) -> list[T]:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """Sweeping of unit charges at asperities onto shells around neighbours, as in (6).
-
-    support : indices of the asperities on the support
-    shells  : (n,) radii R_k of the shells; 0 off the support
-    """
+    """Sweeping of unit charges at asperities onto shells around neighbours, as in (6)."""
 
     influence: Influence
     support: Indices
-    shells: Array
+    shells: Array  # (n,) radii R_k; 0 off the support
 
     @cached_property
     def places(self) -> NDArray[np.complex128]:
@@ -179,20 +154,21 @@ class _Swept:
         return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
     @cached_property
+    def plane(self) -> Array:
+        """(n, 2) the same points as real coordinates."""
+        return np.column_stack((self.places.real, self.places.imag))
+
+    @cached_property
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
-        return cKDTree(self._plane(self.places[self.support]))
-
-    @staticmethod
-    def _plane(places: NDArray[np.complex128]) -> Array:
-        return np.column_stack((places.real, places.imag))
+        return cKDTree(self.plane[self.support])
 
     def neighbours(self, which: Indices, count: int) -> Indices:
         """(m, count) the nearest asperities on the support to each asperity, without itself."""
         count = min(count, len(self.support) - 1)
         workers = threads.worthwhile(len(which) * count)
-        _, found = self._tree.query(self._plane(self.places[which]), count + 1, workers=workers)
+        _, found = self._tree.query(self.plane[which], count + 1, workers=workers)
         nearest = self.support[found]
         itself = np.argsort(nearest == which[:, None], axis=1, kind="stable")
         return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
@@ -212,15 +188,8 @@ class _Swept:
         found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
-    def weights(self, which: Indices, near: Indices, moments: Moments, by_near: bool) -> Array:
-        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found.
-
-        by_near : True if outward is the direction from the mean of the neighbours
-        """
-        cost = (near.shape[1] + 5) ** 2
-        return _in_parts(partial(self._weights, moments, by_near), cost, which, near)
-
-    def _weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
+    def weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
+        """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
         (m, s), here = near.shape, self.places[which]
         middle = self.places[near].mean(axis=1) if by_near else self.middle
         outwards = np.where(here == middle, 1.0, here - middle)
@@ -277,10 +246,8 @@ class _Swept:
     def rates(
         self, which: Indices, near: Indices, weights: Array, least: Array
     ) -> tuple[Array, Indices]:
-        """(m,) lower bounds 1 - q_i, and the k that determine q_i.
-
-        A bound is -inf where no weights were found, and where (7) fails and near asperities already
-        show that it is not above `least` (m,).
+        """(m,) lower bounds 1 - q_i, and the k that determine q_i; -inf where no weights were found
+        or where, without (7), near asperities show that the bound is not above `least` (m,).
         """
         rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
         known = np.flatnonzero(weights.any(axis=1))
@@ -341,9 +308,8 @@ class _Swept:
             least = swept.argmin(axis=1)
             return 1.0 / swept[rows, least], seen[least]
 
-        q, worst = map(
-            np.array, zip(*_each(among, np.array_split(self.support, parts)), strict=True)
-        )
+        found = _each(among, np.array_split(self.support, parts))
+        q, worst = map(np.array, zip(*found, strict=True))
         largest = q.argmax(axis=0)
         return q[largest, rows], worst[largest, rows]
 
@@ -351,7 +317,7 @@ class _Swept:
         """(m, k) distances of asperities; from an asperity to itself, its entry in `themselves`."""
         from scipy.spatial.distance import cdist
 
-        apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))
+        apart: Array = cdist(self.plane[some], self.plane[seen])
         both, i, j = np.intersect1d(some, seen, return_indices=True)
         apart[i, j] = themselves[both]
         return apart

@@ -20,26 +20,14 @@ from convexrough.record import Record
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
-#: An asperity keeps the status "sliding" of the solution if the error bound of its claimed force is
-#: smaller than this fraction of the friction limit f P_i.
-NEAR_SLIDING = 1e-2
-
-#: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
-CLAIMS_SLIDING = 1e-4
+#: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i. It
+#: keeps this status of the solution if the error bound of its force is below NEAR_SLIDING f P_i.
+CLAIMS_SLIDING, NEAR_SLIDING = 1e-4, 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """Comparison of claimed shear forces with what is proved about the state on first loading.
-
-    contact : the pressed contact
-    forces  : (n,) [force] the claimed shear forces
-    total_prescribed : [force] the prescribed sum Q of the shear forces
-    claimed : (n,) true where the asperity is claimed to slide
-    within  : largest error allowed, as a fraction of the largest force
-    certificate : certificate of the claimed forces
-    solution : the computed solution, with a certificate of its own
-    """
+    """Comparison of claimed shear forces with the state on first loading, as `Claim` explains."""
 
     one = "force"
     many = "shear forces"
@@ -51,7 +39,7 @@ class ShearVerdict(Claim, Record):
     claims = ("sliding", "sticking")
 
     contact: Contact
-    forces: Array
+    forces: Array  # (n,) [force] as claimed
     total_prescribed: float | None
     claimed: NDArray[np.bool_]
     within: float
@@ -116,15 +104,9 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Comparison of shear forces from any source with the proved state on first loading.
+    """The verdict on shear forces (n,) with the prescribed sum `force`.
 
-    forces  : (n,) [force] shear forces in the order of the scene's asperities
-    force   : [force] the prescribed sum Q of the shear forces
-    within  : largest error allowed, as a fraction of the largest force
-    sliding : (n,) true where an asperity is claimed to slide; default: where |force| is at least
-        (1 - 1e-4) f P_i
-
-    Raises InputError for the same reasons as `certify_shear`.
+    sliding : (n,) true where an asperity is claimed to slide; default: `claims_sliding`
     """
     checks.instance("contact", contact, Contact)
     within = tolerance("within", within)
@@ -143,17 +125,14 @@ def verify_shear(
     limits = checks.friction(contact.scene.friction) * contact.loads
     left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
     implied = (errors < left) | (state.status == "open")
+    status = np.where(implied, state.status, "undecided")
     return ShearVerdict(
         contact=contact,
         forces=given,
         total_prescribed=float(force),
         claimed=frozen(np.array(np.broadcast_to(claimed, given.shape))),
         within=within,
-        certificate=replace(
-            proved,
-            status=frozen(np.where(implied, state.status, "undecided")),
-            force_errors=frozen(errors),
-        ),
+        certificate=replace(proved, status=frozen(status), force_errors=frozen(errors)),
         solution=state,
     )
 
@@ -164,11 +143,10 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     forces : (n,) [force] shear forces in the order of the scene's asperities
     force  : [force] the prescribed sum of the shear forces
 
-    `force_errors` are bounds on the differences between the given forces and the exact ones. An
-    asperity that is open in the solution has the status "open". "sliding" and "partial" are taken
-    from the solution if the entry of `force_errors` is small enough: below 1 % of the friction
-    limit f P_i for "sliding", below f P_i - |Q_i| with the force Q_i of the solution for "partial".
-    Otherwise the asperity is "undecided". The rest of the certificate is that of the solution.
+    `force_errors` are bounds on the differences between the given forces and the exact ones. The
+    status is that of the solution if this is "open", or if `force_errors` is below 1 % of the
+    friction limit f P_i for "sliding", below f P_i - |Q_i| with the force Q_i of the solution for
+    "partial"; else "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
     the forces are not finite numbers.

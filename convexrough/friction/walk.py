@@ -1,10 +1,9 @@
 """Paths of load P and shear force Q, followed from one straight segment to the next.
 
 With the coefficient of friction f, the points of a path are (P, T) with T = Q / f. The memory curve
-stores the friction state. docs/theory/paths.md defines the curve, its layers and the slip front,
-and shows that forces and displacements are sums over its vertices. The loss along a segment is a
-sum over the pieces of the segment (`curve.Piece`). If order fails (`friction.order`), the memory
-curve does not apply. Then `general_step` computes the states, without proofs.
+(docs/theory/paths.md) stores the friction state: forces and displacements are sums over its
+vertices, the loss along a segment a sum over `curve.Piece`. If order fails (`friction.order`), the
+memory curve does not apply. Then `general_step` computes the states, without proofs.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,8 @@ from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece, Point
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
-from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import States, states_of, statuses_of
+from convexrough.friction.state import States, losses, states_of, statuses_of
 
 #: Largest total number of vertices of the memory curves along a path. A vertex takes 300 bytes.
 MOST_VERTICES = 2 * 10**7
@@ -35,20 +33,12 @@ MOST_VERTICES = 2 * 10**7
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A path of straight segments from the friction state `start` through m points.
-
-    levels  : the normal solutions of the contact
-    start   : the memory curve of the friction state before the first segment
-    points  : the m points (P, T)
-    steps   : number of general steps per segment. None: no general steps, unless order fails and
-        the normal solution of the contact is proved
-    stepper : solver of the general steps
-    """
+    """A path of straight segments from the friction state `start` through m points (P, T)."""
 
     levels: FrictionLevels
     start: MemoryCurve
     points: Sequence[Point]
-    steps: int | None = None
+    steps: int | None = None  # general steps per segment; None: none unless order fails
     stepper: type[Stepper] = Stepper
 
     @property
@@ -58,34 +48,35 @@ class Walk:
         return frozen(np.array([float(f * T) for _, T in self.points]))
 
     @cached_property
-    def _segments(self) -> list[tuple[MemoryCurve, list[Piece]]]:
-        curve, segments, vertices = self.start, list[tuple[MemoryCurve, list[Piece]]](), 0
+    def _segments(self) -> tuple[list[MemoryCurve], list[list[Piece]]]:
+        curves, costs, vertices = [self.start], list[list[Piece]](), 0
         for k, (load, height) in enumerate(self.points, 1):
-            curve, pieces = curve.go(load, height)
-            segments.append((curve, pieces))
+            curve, pieces = curves[-1].go(load, height)
+            curves.append(curve)
+            costs.append(pieces)
             vertices += len(curve.levels)
             if vertices > MOST_VERTICES:
                 found = f"{vertices:,} vertices of memory curves up to point {k:,}"
                 expected = f"at most {MOST_VERTICES:,}: use fewer reversals within reversals"
                 raise InputError("path", found=found, expected=expected)
-        return segments
+        return curves[1:], costs
 
     @property
     def curves(self) -> list[MemoryCurve]:
         """The memory curve after each point."""
-        return [curve for curve, _ in self._segments]
+        return self._segments[0]
 
     @property
     def pieces(self) -> list[list[Piece]]:
         """The pieces of each segment; their losses add up to the loss of the segment."""
-        return [pieces for _, pieces in self._segments]
+        return self._segments[1]
 
     @cached_property
     def needed(self) -> set[Fraction]:
         """The loads of all levels that states, statuses and losses need."""
         bent = {load for curve in self.curves for load, bend in curve.bends if bend}
         fronts = {curve.front for curve in self.curves if curve.front is not None}
-        return bent | fronts | {x for each in self.pieces for piece in each for x in piece[2:]}
+        return bent | fronts | {x for piece in chain(*self.pieces) for x in piece[2:]}
 
     @cached_property
     def order(self) -> Order:
@@ -94,16 +85,21 @@ class Walk:
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """Results of general steps; None if no general steps are taken (see `steps`)."""
+        """Results of general steps. If `steps` is None, they are taken only if order fails and the
+        normal solution of the contact is proved.
+        """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
     def states(self) -> States:
+        """The states at the m points."""
         if self.general is not None:
             return self.general.states
         found = states_of(self.levels, self.curves)
-        return found.unproved() if self.order == "fails" else found
+        if self.order == "fails":
+            return States(*(Ball.around(each.mid, np.inf) for each in found))
+        return found
 
     def status(self) -> NDArray[np.str_]:
         """(m, N) the statuses at each point."""
@@ -127,7 +123,7 @@ class Closed(Walk):
     """A closed path of m points, followed twice; the second cycle is the steady one."""
 
     @classmethod
-    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> Closed:
+    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: Sequence[Point]) -> Closed:
         return cls(levels, start, [*points, *points, points[0]])
 
     @property
@@ -143,9 +139,8 @@ class Closed(Walk):
     @property
     def cycles(self) -> tuple[list[Piece], list[Piece]]:
         """The pieces of the loss up to the end of the first cycle, and of each later cycle."""
-        parts = self.pieces[: self.once + 1], self.pieces[self.once + 1 :]
-        first, later = ([piece for cost in part for piece in cost] for part in parts)
-        return first, later
+        end = self.once + 1
+        return [*chain(*self.pieces[:end])], [*chain(*self.pieces[end:])]
 
     @cached_property
     def stuck(self) -> Point:

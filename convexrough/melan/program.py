@@ -1,15 +1,13 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-docs/theory/shakedown.md, "Melan's program", states the program (2), in which the points of a path
-of shear forces are t0 + lambda t_v. It derives a lower bound on lambda from residual forces, and
-the upper bound (3) from slips. A solver, which need not be accurate, finds residual forces and
-slips. The section "Elastic shares" derives the elastic forces and bounds on their errors. All
-shear forces are divided by the coefficient of friction.
+docs/theory/shakedown.md, "Melan's program", states the program (2) for the points t0 + lambda t_v
+of a path. Residual forces give a lower bound on lambda, slips the upper bound (3); a solver, which
+need not be accurate, finds both. All shear forces are divided by the coefficient of friction.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,70 +17,47 @@ from convexrough.arrays import Array, among_zeros
 from convexrough.contact import Contact
 from convexrough.convex.theorem import distance
 from convexrough.errors import SolverError
-from convexrough.friction.order import Order
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.problem import FrictionProblem
 
-#: The solver's tolerance, and the fraction by which residual forces are moved away from the
-#: friction limits.
-TOLERANCE, MARGIN = 1e-10, 1e-9
-
-#: Slips are rounded to multiples of the largest slip / STEPS, so that sums of slips are exact.
-STEPS = 2.0**30
+TOLERANCE = 1e-10  # of the solver
+MARGIN = 1e-9  # fraction by which residual forces are moved away from the friction limits
+STEPS = 2.0**30  # slips are multiples of the largest / STEPS, so that their sums are exact
 
 
-class Limit(NamedTuple):
-    """Fields of `Shakedown`; shear forces are divided by the coefficient of friction."""
-
-    factor: float
-    lower: float
-    upper: float
-    factors: Array
-    gross: float
-    witness: Array
-    mechanism: Array
-    order: Order | None = None
-
-
-def solve(contact: Contact, mean: Array, vertices: Array) -> Limit:
-    """The shakedown limit by Melan's program with the full tangential kernel.
-
-    mean, vertices : (2,) t0 and (m, 2) t_v [force], shear forces divided by f
-    """
+def solve(contact: Contact, mean: Array, vertices: Array) -> dict[str, Any]:
+    """Fields of `Shakedown` by Melan's program with the full tangential kernel, from t0 and t_v."""
     known = contact.cached(FrictionProblem)
     unit, n, m = known.units.force, len(known), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)
     shares, share_errors = elastic_shares(known)
     elastic = np.einsum("ijk,vk->vij", shares, vertices / unit)  # (m, n, 2)
     errors = np.einsum("ik,vk->vi", share_errors, np.abs(vertices) / unit)
-    steady = shares @ (mean / unit)
-    raw = run_clarabel(_program(known.loads, steady, elastic), "shakedown", TOLERANCE)
-    rest = _inwards(known.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
-    cones = raw.multipliers[2:].reshape(m, n, 3)
-    slips = _closed(-cones[..., 1:] / known.loads[:, None])
-    factor = _largest(rest, elastic, known.loads)[1]
-    return Limit(
-        factor=factor,
-        lower=_lower(known, rest, mean / unit, elastic, errors),
-        upper=_upper(known, slips, mean / unit, elastic, errors),
-        factors=np.where(contact.loads > 0, factor, np.nan),
-        gross=_largest(mean[None], vertices[:, None], np.array([contact.load]))[1],
-        witness=known.to_scene((rest - steady) * unit),
-        mechanism=among_zeros(
-            slips / np.hypot(*np.moveaxis(slips, -1, 0)).max(),
-            known.touching,
-            len(contact.scene),
-            axis=1,
-        ),
-    )
+    mean, steady, P = mean / unit, shares @ (mean / unit), known.loads
+    raw = run_clarabel(_program(P, steady, elastic), "shakedown", TOLERANCE)
+    # The residual forces, corrected to the sum t0, and moved away from the friction limits.
+    rest, parts = steady + raw.x[1:].reshape(n, 2), P[:, None] / P.sum()
+    rest = rest + parts * (mean - rest.sum(axis=0))
+    rest = rest + MARGIN * (parts * mean - rest)
+    slips = _closed(-raw.multipliers[2:].reshape(m, n, 3)[..., 1:] / P[:, None])
+    sizes = np.hypot(slips[..., 0], slips[..., 1])
+    factor = _largest(rest, elastic, P)[1]
+    whole = mean[None], vertices[:, None] / unit, np.array([contact.load / unit])
+    return {
+        "factor": factor,
+        "lower": _lower(known, rest, mean, elastic, errors),
+        "upper": _upper(known, slips, mean, elastic, errors),
+        "factors": np.where(contact.loads > 0, factor, np.nan),
+        "gross": _largest(*whole)[1],
+        "witness": known.to_scene((rest - steady) * unit),
+        "mechanism": among_zeros(slips / sizes.max(), known.touching, len(contact.scene), axis=1),
+    }
 
 
 def elastic_shares(problem: FrictionProblem) -> tuple[Array, Array]:
-    """(n, 2, 2) the shares Y, and (n, 2) bounds on |error of Y| for total forces along x and y.
-
-    The bounds are infinite where nothing is proved. docs/theory/shakedown.md, "Elastic shares",
-    derives them.
+    """(n, 2, 2) the shares Y, and (n, 2) bounds on |error of Y| for total forces along x and y,
+    which docs/theory/shakedown.md, "Elastic shares", derives; infinite where nothing is proved.
     """
     n = len(problem)
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
@@ -120,8 +95,7 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
     """
     from scipy import sparse  # 0.1 s to import: only when solving
 
-    m, n, _ = elastic.shape
-    unknowns = 1 + 2 * n
+    (m, n, _), unknowns = elastic.shape, 1 + 2 * elastic.shape[1]
     scaled, constant = np.zeros((m, n, 3)), np.zeros((m, n, 3))
     scaled[..., 1:] = -elastic / limits[:, None]
     constant[..., 0], constant[..., 1:] = 1.0, steady / limits[:, None]
@@ -138,16 +112,6 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
     )
 
 
-def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) residual forces: `state`, corrected to the sum `mean` and moved away from the limits.
-
-    limits : (n,) the friction limits P
-    """
-    parts = limits[:, None] / limits.sum()
-    state = state + parts * (mean - state.sum(axis=0))
-    return np.asarray(state + MARGIN * (parts * mean - state))
-
-
 def _lower(
     known: FrictionProblem, rest: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
@@ -157,26 +121,20 @@ def _lower(
     """
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
-    limits = (known.loads - known.errors - missing) * (1 - SAFETY)
-    if not np.isfinite(errors).all() or (limits <= 0).any():
+    limits, most = (known.loads - known.errors - missing) * (1 - SAFETY), 0.0
+    if not np.isfinite(errors).all():
         return 0.0
-    least, most = _largest(rest, elastic, limits)
-    if not least <= 0.0 <= most:
-        return 0.0
-    limits = limits - most * errors  # errors grow with lambda
-    if (limits <= 0).any():
-        return 0.0
-    least, most = _largest(rest, elastic, limits)
-    return most * (1 - SAFETY) if least <= 0.0 <= most else 0.0
+    for _ in range(2):  # the second time with errors, which grow with lambda
+        limits = limits - most * errors
+        least, most = _largest(rest, elastic, limits)
+        if (limits <= 0).any() or not least <= 0.0 <= most:
+            return 0.0
+    return most * (1 - SAFETY)
 
 
 def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
-    """The least and the largest lambda with |fixed + lambda scaled| <= limits; (inf, 0) if none.
-
-    fixed, scaled, limits : (n, 2), (m, n, 2) and (n,)
-    """
-    a = (scaled**2).sum(axis=-1)
-    b = (fixed * scaled).sum(axis=-1)
+    """The least and the largest lambda with |fixed + lambda scaled| <= limits; (inf, 0) if none."""
+    a, b = (scaled**2).sum(axis=-1), (fixed * scaled).sum(axis=-1)
     c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
     moving = a > 0
     root = np.sqrt(np.maximum(b**2 - a * c, 0.0)[moving])
@@ -192,28 +150,19 @@ def _closed(slips: Array) -> Array:
     if not largest > 0:
         raise SolverError("the solver found no slips", solver="shakedown")
     slips = np.round(slips * (STEPS / largest))
-    net = slips.sum(axis=0)
-    together = np.round(net.mean(axis=0))
-    most = np.hypot(slips[..., 0], slips[..., 1]).argmax(axis=0)
-    slips[most, np.arange(slips.shape[1])] += together - net
+    net, most = slips.sum(axis=0), np.hypot(slips[..., 0], slips[..., 1]).argmax(axis=0)
+    slips[most, np.arange(slips.shape[1])] += np.round(net.mean(axis=0)) - net
     return np.asarray(slips)
 
 
 def _upper(
     known: FrictionProblem, slips: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
-    """The upper bound (3) on lambda, from slips; infinite if the work of the slips may be <= 0.
-
-    elastic, errors : as for `_lower`
-    """
-    sizes = np.hypot(slips[..., 0], slips[..., 1])
-    done = slips * elastic
-    uncertainty = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(
-        np.abs(done).sum()
-    )
-    work = float(done.sum()) - uncertainty
-    together = slips.sum(axis=0)[0]
-    given = together * mean
+    """The upper bound (3) on lambda, from slips; infinite if the work of the slips may be <= 0."""
+    sizes, done = np.hypot(slips[..., 0], slips[..., 1]), slips * elastic
+    rounding = 4 * done.size * ROUNDOFF * float(np.abs(done).sum())
+    work = float(done.sum()) - (float((sizes * errors).sum()) + rounding)
+    given = slips.sum(axis=0)[0] * mean
     cost = float((sizes * (known.loads + known.errors)).sum()) * (1 + SAFETY)
     cost += -float(given.sum()) + 4 * ROUNDOFF * float(np.abs(given).sum())
     return cost / work * (1 + SAFETY) if work > 0 else np.inf

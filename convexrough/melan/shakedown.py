@@ -1,8 +1,7 @@
 """`shakedown`: the largest factor by which a load path may be scaled so that sliding dies out.
 
-In this module, sliding dies out if after some cycles no asperity that touches at the mean load
-slides as a whole or opens. Slip at the edges of contacts goes on. docs/theory/shakedown.md
-derives the limit with partial slip, and Melan's limit for asperities that stick until they slide.
+Slip at the edges of contacts goes on. docs/theory/shakedown.md derives the limit with partial slip,
+and Melan's limit for asperities that stick until they slide as a whole.
 """
 
 from __future__ import annotations
@@ -23,14 +22,17 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
 from convexrough.friction.order import Order
 from convexrough.influence import Kind
-from convexrough.melan.program import Limit, solve
+from convexrough.melan.program import solve
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table, singular
+from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.vector_shear.problem import FrictionProblem
 
 Theory = Literal["exact", "elastic", "vector"]
+
+#: The numbers of an array as exact fractions.
+fractions: Any = np.frompyfunc(Fraction, 1, 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,8 +52,7 @@ class Shakedown(Table, Plottable):
     factors : (n,) the same limit for each asperity alone; nan if it is not computed or the asperity
         does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
-    witness : (n,) or (n, 2) [force] residual shear forces with which no asperity slides along the
-        path scaled by `lower`
+    witness : (n,) or (n, 2) [force] residual shear forces with which none slides at `lower`
     mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
         (m, n, 2), at each point of the path
     order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
@@ -91,10 +92,7 @@ class Shakedown(Table, Plottable):
 
     @property
     def limited_by(self) -> Literal["sliding", "opening"] | None:
-        """What the critical asperities do above `factor`: slide as a whole, or open in every cycle.
-
-        It is None if there is no limit.
-        """
+        """What critical asperities do above `factor`: slide as a whole, or open in every cycle."""
         if self.factor == np.inf:
             return None
         if not self.load_amplitudes.any() or self.factor == self.gross:
@@ -114,10 +112,9 @@ class Shakedown(Table, Plottable):
             for name, along in (
                 ("witness", ("asperity", "direction")),
                 ("mechanism", ("vertex", "asperity", "direction")),
-                ("force_amplitudes", ("vertex", "direction")),
+                ("force_amplitude", ("vertex", "direction")),
             ):
-                column = singular(name)
-                found[column] = along, found[column][1]
+                found[name] = along, found[name][1]
         return found
 
 
@@ -134,8 +131,7 @@ def shakedown(
     """The largest factor by which a closed path may be scaled so that sliding dies out.
 
     The points of the path are (load, force) + factor (load_amplitudes, force_amplitudes).
-    Sliding dies out if after some cycles no asperity that touches at P0 slides as a whole or opens.
-    docs/theory/shakedown.md derives the limits.
+    `Shakedown.factor` says when sliding dies out; docs/theory/shakedown.md derives the limits.
 
     load, force : [force] mean load P0 and shear force Q0; Q0 is (2,) for "vector"
     load_amplitudes : [force] (m,) or one number for all points; must be 0 unless `kind` is "exact"
@@ -167,7 +163,7 @@ def shakedown(
     p = _alike("load_amplitudes", load_amplitudes, len(q))
     t0, t = Q0 / f, q / f
     if kind != "vector":  # exactly, as the factor can depend on small differences
-        t0, t, p = Fraction(Q0) / Fraction(f), _fractions(q) / Fraction(f), _fractions(p)
+        t0, t, p = Fraction(Q0) / Fraction(f), fractions(q) / Fraction(f), fractions(p)
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("force", found=force, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
@@ -181,12 +177,14 @@ def shakedown(
     if kind == "exact":
         limit = _exact(contact, t0, p, t)
     else:
-        limit = _elastic(contact, t0, t) if kind == "elastic" else solve(contact, t0, t)
-    arrays = {"factors": limit.factors, "witness": f * limit.witness, "mechanism": limit.mechanism}
+        limit = (_elastic if kind == "elastic" else solve)(contact, t0, t)
+    limit["witness"] = f * limit["witness"]
+    for name in ("factors", "witness", "mechanism"):
+        limit[name] = frozen(limit[name])
     return Shakedown(
         scene=scene,
         kind=kind,
-        **limit._asdict() | {name: frozen(values) for name, values in arrays.items()},
+        **limit,
         load=P0,
         force=frozen(Q0) if kind == "vector" else float(Q0),
         load_amplitudes=frozen(np.asarray(p, dtype=np.float64)),
@@ -194,13 +192,8 @@ def shakedown(
     )
 
 
-def _fractions(values: Array) -> Any:
-    """The values as an array of exact fractions."""
-    return np.array([Fraction(each) for each in values.tolist()], dtype=object)
-
-
-def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
-    """The limit with partial slip; t0, t : the mean shear force and amplitudes, divided by f."""
+def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
+    """Fields of the result with partial slip; the shear forces t0 and t are divided by f."""
     levels = contact.cached(FrictionLevels)
     P0 = levels.load
     plus, minus = (-(p + t)).max(), (-(p - t)).max()
@@ -208,17 +201,14 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
-    found = {last: worst}
+    few = touching.tolist() if len(touching) <= MOST_ONSETS else []
+    found = {last: worst} | enclosed(levels, few)
 
     def factor(onset: Fraction) -> float:
-        """The factor at which L* = `onset`, or that of gross sliding if that is smaller.
-
-        L* is defined in docs/theory/shakedown.md; an asperity that touches at L* sticks in part.
-        """
+        """The factor at which L* (docs/theory/shakedown.md) is `onset`, or that of gross
+        sliding."""
         return float(min((P0 - onset) / fall if fall > 0 else np.inf, gross))
 
-    if len(touching) <= MOST_ONSETS:
-        found |= enclosed(levels, touching.tolist())
     factors = np.full(len(contact.scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
@@ -229,42 +219,33 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> Limit:
     height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
     rest = levels.to_scene(sure.loads.value * levels.units.force)
-    return Limit(
-        factor=float(factors[last]),
-        lower=lower * (1 - SAFETY) if proved else 0.0,
-        upper=upper * (1 + SAFETY) if proved else np.inf,
-        factors=factors,
-        gross=float(gross),
-        witness=height / (float(worst.upper) or 1.0) * rest,
-        mechanism=gaps / (gaps.max() or 1.0),
-        order=order,
-    )
+    return {
+        "factor": float(factors[last]),
+        "lower": lower * (1 - SAFETY) if proved else 0.0,
+        "upper": upper * (1 + SAFETY) if proved else np.inf,
+        "factors": factors,
+        "gross": float(gross),
+        "witness": height / (float(worst.upper) or 1.0) * rest,
+        "mechanism": gaps / (gaps.max() or 1.0),
+        "order": order,
+    }
 
 
 def _fall(p: Any, t: Any) -> Any:
-    """The decrease of the load L* of `_exact` per unit of the factor.
-
-    It is the mean of the maxima of -(p + t) and -(p - t), with t = q / f.
-    """
+    """The decrease of the load L* of `_exact` per unit of the factor, with t = q / f."""
     return ((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
-def _elastic(contact: Contact, t0: Fraction, t: Any) -> Limit:
-    """Melan's limit with the scalar kernel: the least factor of all asperities and gross sliding.
-
-    t0, t : the mean shear force and its (m,) amplitudes, divided by f. The elastic shares q are the
-    derivatives of the normal loads by the total load.
+def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
+    """Fields of the result with the scalar kernel: the least factor of asperities and of gross
+    sliding. The elastic shares q are the derivatives of the normal loads by the total load.
     """
     problem, high, low = contact.cached(FrictionProblem), t.max(), t.min()
     unit, total = problem.units.force, problem.levels.load
     P, q = problem.levels.top.loads[problem.places], problem.elastic
     each = P / q * (2.0 * unit / float(high - low))  # where the range of a shear force is 2 P_i
-    gross = float(
-        min(
-            (total - t0) / high if high > 0 else np.inf,
-            (total + t0) / -low if low < 0 else np.inf,
-        )
-    )
+    ends = (total - t0, high), (total + t0, -low)
+    gross = float(min(room / run if run > 0 else np.inf for room, run in ends))
     limits = np.abs(each.value)
     factor = min(float(limits.min()), gross)
     proved = bool(q.positive.all())  # the solution holds for positive shares only
@@ -276,15 +257,15 @@ def _elastic(contact: Contact, t0: Fraction, t: Any) -> Limit:
     part = (float(t0) / unit - room_low.sum()) / (width.sum() or 1.0)
     factors = np.full(len(contact.scene), np.nan)
     factors[problem.touching] = limits
-    return Limit(
-        factor=factor,
-        lower=max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
-        upper=min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
-        factors=factors,
-        gross=gross,
-        witness=problem.to_scene(unit * (room_low + part * width)),
-        mechanism=problem.to_scene(np.asarray(critical, dtype=np.float64)),
-    )
+    return {
+        "factor": factor,
+        "lower": max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
+        "upper": min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
+        "factors": factors,
+        "gross": gross,
+        "witness": problem.to_scene(unit * (room_low + part * width)),
+        "mechanism": problem.to_scene(np.asarray(critical, dtype=np.float64)),
+    }
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks, fields
 from convexrough.arrays import Array
-from convexrough.friction.loop import Loop
+from convexrough.friction.cycle import Loop
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.paper.states import AMPLITUDES, READ_CROSSING, SHARE, PaperStates

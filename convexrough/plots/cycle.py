@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
 from convexrough.arrays import Array
-from convexrough.friction.cycle import Cycle
+from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
-from convexrough.friction.loop import Loop
 from convexrough.plots import style
 from convexrough.plots.load_plane import draw_closed
 from convexrough.plots.measure import Scale

@@ -109,7 +109,7 @@ def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
     support = np.flatnonzero(c)
     swept = sweeping._Swept(influence, support, c)
     near = swept.neighbours(support, 12)
-    weights = swept.weights(support, near, sweeping.around, False)
+    weights = swept.weights(sweeping.around, False, support, near)
     last = swept.neighbours(support, 108)[:, -1]
     gains = swept.gains(support, near, weights, last)
     proved = np.flatnonzero(gains)

@@ -15,7 +15,7 @@ import convexrough as cr
 from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.loss import shared
+from convexrough.friction.state import shared
 from convexrough.friction.walk import Walk
 
 

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from convexrough import plots
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.cycle import loops
+from convexrough.friction.cycle import Loop, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
-from convexrough.friction.loop import Loop
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
