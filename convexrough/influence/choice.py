@@ -44,7 +44,7 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
             part = scene.asperities.layout.cached(_whole).restricted(which)
-            return DenseInfluence.of(points, scale, scale * part.matrix, part.sums)
+            return DenseInfluence(points, scale, scale * part.matrix, part.sums)
         return DenseInfluence.assemble(points, scale, error, tails)
     if kind == "lattice":
         expected = "contact points on a two-dimensional lattice"

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,15 +42,12 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 class SiteBox:
     """A rectangle of lattice sites i b1 + j b2, with convolutions on it.
 
-    shape  : numbers of rows and of columns of sites
-    basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
-    extent : [spacing] upper bound on the distance between any two occupied sites (sites with a
-        point)
+    The unit of length, the spacing, is the length of the shorter vector of the basis.
     """
 
-    shape: tuple[int, int]
-    basis: Array
-    extent: float = np.inf
+    shape: tuple[int, int]  # numbers of rows and of columns of sites
+    basis: Array  # (2, 2) [spacing] rows b1 and b2
+    extent: float = np.inf  # [spacing] at least the distance of any two sites with a point
 
     @cached_property
     def padded(self) -> tuple[int, int]:
@@ -108,8 +106,7 @@ class SiteBox:
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
             weights = over_cube(squares)
-            x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
-            return [weights * x, weights * y]
+            return [weights * away for away in self._differences(i, j)]
 
         return self.kernels(values, np.float64, odd=True)
 
@@ -125,7 +122,7 @@ class SiteBox:
         halves = [np.empty(shape, dtype=whole) for _ in range(count)]
         squares = np.empty((count, last))  # sums of squares of each row
 
-        def transform(taken: slice) -> None:
+        def along_rows(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # row i stands for row -i, too
             laid_out = self._laid_out(values, taken, count)
@@ -134,9 +131,18 @@ class SiteBox:
                 waves = fft.rfft(each.astype(dtype, copy=False), axis=1)
                 half[taken] = -1j * waves if odd else waves
 
-        threads.each(transform, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
+        def along_columns(half: NDArray[Any]) -> NDArray[Any]:
+            spectrum = np.empty((rows, shape[1]), dtype=half.real.dtype)
+
+            def transform(each: slice) -> None:
+                spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
+
+            threads.each(transform, in_blocks(half), self.workers)
+            return spectrum
+
+        threads.each(along_rows, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
         norms = np.sqrt(squares.sum(axis=1)).tolist()
-        return [Kernel(self._spectrum(halves.pop(0)), norm) for norm in norms]
+        return [Kernel(along_columns(halves.pop(0)), norm) for norm in norms]
 
     def _laid_out(self, values: Values, taken: slice, count: int) -> list[Array]:
         """The values of `count` kernels in some rows of the padded box.
@@ -144,84 +150,62 @@ class SiteBox:
         If several differences of sites share an entry of the box, its value is that of the shortest
         difference. Beyond `extent` values are 0.
         """
-        shape = taken.stop - taken.start, self.padded[1]
-        squares, found = np.full(shape, np.inf), [np.zeros(shape) for _ in range(count)]
-        for within, places, i, j in self._images(taken):
-            shorter = self._lengths(i, j)
-            nearer = shorter < squares[within, places]
-            np.copyto(squares[within, places], shorter, where=nearer)
+        (rows, columns), (height, width) = self.shape, self.padded
+        squares = np.full((taken.stop - taken.start, width), np.inf)
+        found = [np.zeros_like(squares) for _ in range(count)]
+        right = slice(columns), np.arange(columns)
+        left = slice(width + 1 - columns, width), np.arange(1 - columns, 0)
+        for shift, (across, j) in product((0, height), (right, left)):
+            first = max(taken.start, shift + 1 - rows)
+            last = max(first, min(taken.stop, shift + rows))
+            i = np.arange(first, last) - shift
+            here = slice(first - taken.start, last - taken.start), across
+            shorter, y = self._differences(i, j)
+            shorter *= shorter
+            y *= y
+            shorter += y
+            nearer = shorter < squares[here]
+            np.copyto(squares[here], shorter, where=nearer)
             for whole, part in zip(found, values(i, j, shorter), strict=True):
-                np.copyto(whole[within, places], part, where=nearer)
+                np.copyto(whole[here], part, where=nearer)
         if self.extent < np.inf:
             beyond = squares > self.extent**2
             for whole in found:
                 whole[beyond] = 0.0
         return found
 
-    def _spectrum(self, half: NDArray[Any]) -> NDArray[Any]:
-        """The transform of an even kernel, from the transforms of its rows 0, 1, ...
+    def _differences(self, i: Indices, j: Indices) -> tuple[Array, Array]:
+        """(len(i), len(j)) [spacing] the coordinates x and y of i b1 + j b2."""
+        x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
+        return x, y
 
-        For an odd kernel, `half` is -i times these transforms, and the result is the imaginary part
-        of the transform.
-        """
-        from scipy import fft
-
-        rows = self.padded[0]
-        spectrum = np.empty((rows, half.shape[1]), dtype=half.real.dtype)
-
-        def transform(each: slice) -> None:
-            spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
-
-        threads.each(transform, in_blocks(half), self.workers)
-        return spectrum
-
-    def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Yield blocks of the rows `taken` of the padded box.
-
-        A block is a slice of these rows, counted from the first, a slice of columns, and the
-        differences i and j of sites that belong to these rows and columns.
-        """
-        (rows, columns), (height, width) = self.shape, self.padded
-        right, left = np.arange(columns), np.arange(1 - columns, 0)
-        for shift in (0, height):
-            first = max(taken.start, shift + 1 - rows)
-            last = max(first, min(taken.stop, shift + rows))
-            within, i = (
-                slice(first - taken.start, last - taken.start),
-                np.arange(first, last) - shift,
-            )
-            yield within, slice(columns), i, right
-            yield within, slice(width + 1 - columns, width), i, left
-
-    def _lengths(self, i: Indices, j: Indices) -> Array:
-        """(len(i), len(j)) [spacing^2] the squared lengths |i b1 + j b2|^2."""
-        x: Array = np.add.outer(i * self.basis[0, 0], j * self.basis[1, 0])
-        y: Array = np.add.outer(i * self.basis[0, 1], j * self.basis[1, 1])
-        x *= x
-        y *= y
-        x += y
-        return x
+    def field(self, dtype: Any) -> NDArray[Any]:
+        """Zeros at all sites, in an array (rows, stride) with room for the transform of rows."""
+        return np.zeros((self.shape[0], self.stride), dtype=dtype)
 
     def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
-        """The field (rows, stride) with values (n,) at some sites, and zeros elsewhere.
+        """The `field` with values (n,) at some sites, and zeros elsewhere.
 
         places : (n,) flat indices of these sites in the field
         """
-        field = np.zeros((self.shape[0], self.stride), dtype=values.dtype)
+        field = self.field(values.dtype)
         field.ravel()[places] = values  # where points coincide, the last value remains
         return field
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field (rows, columns) with a kernel.
-
-        A field of the shape (rows, stride) is overwritten by the result, which saves memory.
-        """
+        """The convolution of a `field` with a kernel, in the memory of the field."""
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             waves[0] *= spectrum[:, each]
             return waves
 
-        return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
+        return through_waves([field], self.padded, self.workers, multiply)[0]
+
+    def convolve_at(
+        self, places: Indices, values: NDArray[Any], spectrum: NDArray[Any]
+    ) -> NDArray[Any]:
+        """(n,) the convolution at the sites with the flat indices `places` of values there."""
+        return self.convolve(self.laid_out(values, places), spectrum).ravel()[places]
 
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
@@ -233,16 +217,11 @@ class SiteBox:
         return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
 
-@dataclass(frozen=True, eq=False)
-class Kernel:
-    """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary.
+class Kernel(NamedTuple):
+    """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary."""
 
-    spectrum : the transform, or the imaginary part of the transform
-    norm     : the 2-norm of the kernel
-    """
-
-    spectrum: NDArray[Any]
-    norm: float
+    spectrum: NDArray[Any]  # the transform, or the imaginary part of the transform
+    norm: float  # the 2-norm of the kernel
 
 
 def through_waves(
@@ -250,25 +229,19 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    In the results, columns beyond those of a given field have no meaning.
+    Each result is in the memory of the field, which saves memory. Columns beyond those of the sites
+    have no meaning in it.
 
-    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one.
-        A field of the shape (rows, stride), with `SiteBox.stride`, is overwritten by its result,
-        which saves memory
+    fields : (rows, stride) each, as `SiteBox.field` makes them, padded with zeros before the
+        transform; they are read one by one
     """
     from scipy import fft
 
     height, width = padded
-    stride = 2 * (width // 2 + 1)
     halves: list[NDArray[Any]] = []  # the transforms of rows
-    placed: list[bool] = []  # True if in the memory of the field
     for field in fields:
-        if field.shape[1] == stride:
-            halves.append(field.view(np.complex64 if field.dtype == np.float32 else np.complex128))
-            _row_by_row(partial(fft.rfft, axis=1), field[:, :width], halves[-1], workers)
-        else:
-            halves.append(fft.rfft(field, width, axis=1, workers=workers))
-        placed.append(field.shape[1] == stride)
+        halves.append(field.view(np.result_type(field.dtype, np.complex64)))
+        _row_by_row(partial(fft.rfft, axis=1), field[:, :width], halves[-1], workers)
     rows = len(halves[0])
 
     def work(each: slice) -> None:
@@ -277,13 +250,9 @@ def through_waves(
             half[:, each] = fft.ifft(full, axis=0, overwrite_x=True)[:rows]
 
     threads.each(work, in_blocks(halves[0]), workers)
-    found = []
-    for half, in_place in zip(halves, placed, strict=True):
-        if in_place:
-            found.append(half.view(half.real.dtype))
-            _row_by_row(partial(fft.irfft, n=width, axis=1), half, found[-1][:, :width], workers)
-        else:
-            found.append(fft.irfft(half, width, axis=1, overwrite_x=True, workers=workers))
+    found = [half.view(half.real.dtype) for half in halves]
+    for half, field in zip(halves, found, strict=True):
+        _row_by_row(partial(fft.irfft, n=width, axis=1), half, field[:, :width], workers)
     return found
 
 

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -21,25 +21,26 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import Pair, two_product, two_sum
+from convexrough.arithmetic.pairs import Pair, in_parts, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.influence.coupling import (
     Coupling,
+    Influence,
     JointCoupling,
     Kind,
     Rounding,
     Smoother,
     cubed,
+    dense_matrix,
+    entry_error,
 )
-from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, MANY, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import Layout
-from convexrough.scene.neighbours import crowding, separations
 
 Made = TypeVar("Made")
 
@@ -66,28 +67,22 @@ LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
-class LatticeInfluence:
+class LatticeInfluence(Influence):
     """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
-    array       : (N, 2) [length] contact points, with an error of at most `point_error` in each
-        coordinate
-    members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact positions of the summits. Multiplied by the factors `lattice.shrink`
-        along x and y, and rounded, they are the points in `array`. The factors are 1 in the
-        geometry "summit", and R / (R + tip radius) in "closest", with the radius R of the sphere
-    lattice     : the lattice of the points
-    scale       : 1 / (pi E*), which is A_ij r_ij
+    The points in `array` are the exact positions of the summits, multiplied by the factors
+    `lattice.shrink` along x and y, and rounded. The factors are 1 in the geometry "summit", and
+    R / (R + tip radius) in "closest", with the radius R of the sphere.
     """
 
-    array: Array
-    members: Indices
-    layout: Layout
-    lattice: Lattice
+    array: Array  # (N, 2) [length] contact points
+    members: Indices  # (n,) indices of the operator's asperities in `array`
+    layout: Layout  # the exact positions of the summits
+    lattice: Lattice  # that of the points in `array`
     scale: float
     point_error: float = 0.0
 
     name: ClassVar[Kind] = "lattice"
-    stored: ClassVar[bool] = False
     cheap_sums: ClassVar[bool] = True
 
     @cached_property
@@ -138,9 +133,12 @@ class LatticeInfluence:
         return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.spacing
 
     def apply(self, loads: Array) -> Array:
-        dtype = np.float32 if loads.dtype == np.float32 else np.float64
-        product = self._convolve(loads.astype(dtype, copy=False), self._spectrum(dtype))
-        product *= dtype(self._unit)
+        single = loads.dtype == np.float32
+        loads = loads if single else loads.astype(np.float64, copy=False)
+        box, places = self._boxed
+        spectrum = self._single if single else self._kernel.spectrum
+        product = box.convolve_at(places, loads, spectrum)
+        product *= loads.dtype.type(self._unit)
         return product
 
     def rounding(self, loads: Array) -> Rounding:
@@ -152,11 +150,11 @@ class LatticeInfluence:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """(n,) upper bounds on sum_j strengths_j / r_ij^power, from sums in single precision."""
-        kernel = self.box.kernel(power, np.float32)
-        largest = float(strengths.max(initial=0.0)) or 1.0
+        (box, places), largest = self._boxed, float(strengths.max(initial=0.0)) or 1.0
+        kernel = box.kernel(power, np.float32)
         shares = (strengths / largest).astype(np.float32)
-        total = self._convolve(shares, kernel.spectrum).astype(np.float64)
-        total += self.box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
+        total = box.convolve_at(places, shares, kernel.spectrum).astype(np.float64)
+        total += box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
@@ -185,28 +183,17 @@ class LatticeInfluence:
             return self._kernel.spectrum.astype(np.float32)
         return self.box.kernel(1, np.float32).spectrum
 
-    def _spectrum(self, dtype: Any) -> NDArray[Any]:
-        return self._single if dtype == np.float32 else self._kernel.spectrum
-
-    def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        box, places = self._boxed
-        return box.convolve(box.laid_out(values, places), spectrum).ravel()[places]
-
     def __len__(self) -> int:
         return len(self.members)
 
     @property
-    def points(self) -> Array:
+    def points(self) -> Array:  # type: ignore[override]
         return self.array[self.members]
-
-    @property
-    def matrix(self) -> Array:
-        return dense_matrix(self.points, self.scale)
 
     def submatrix(self, which: Indices) -> Array:
         return dense_matrix(self.array[self.members[which]], self.scale)
 
-    @property
+    @cached_property
     def entry_error(self) -> float:
         return entry_error(self.point_error, self.spacing * self._least)
 
@@ -227,7 +214,7 @@ class LatticeInfluence:
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
         if places is None:
-            return DenseCoupling(self.points, points, self.scale, self.point_error)
+            return super().onto(points)
         together = np.concatenate((points, self.points))
         sites = np.concatenate((places, np.stack(self.places, axis=1)))
         layout = Layout(together, (self.lattice, sites))
@@ -241,12 +228,8 @@ class LatticeInfluence:
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-
-        def sums(pull: Kernel) -> Array:
-            field = box.convolve(box.laid_out(loads, places), 1j * pull.spectrum)
-            return np.asarray(field.ravel()[places])
-
-        each = [sums(pull) for pull in self._pulls(box)]
+        pulls = self._pulls(box)
+        each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
     def _pulls(self, box: SiteBox) -> list[Kernel]:
@@ -255,7 +238,7 @@ class LatticeInfluence:
 
     def separations(self) -> Array:
         if not self._filled:
-            return separations(self.points, self.point_error)
+            return super().separations()
         nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
         return even(nearest, len(self))
 
@@ -267,7 +250,7 @@ class LatticeInfluence:
         a reduced basis these differences have lengths of at least 0.8, 1.6, ... times the spacing.
         """
         if not self._filled:
-            return crowding(self.points, radii)
+            return super().crowding(radii)
         (rows, columns), stride, places = self.box.shape, self.box.stride, self._boxed[1]
         most, worst = 2.0 * float(radii.max()), 0.0
         for reach in range(1, max(rows, columns)):
@@ -301,12 +284,7 @@ class LatticeInfluence:
     @property
     def least_slices(self) -> int:
         """The number of slices that a press needs."""
-        return SLICES + int(self.sites > LARGE)
-
-    @property
-    def sites(self) -> int:
-        """The number of sites of the box."""
-        return math.prod(self.box.shape)
+        return SLICES + int(math.prod(self.box.shape) > LARGE)
 
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
@@ -315,7 +293,7 @@ class LatticeInfluence:
             (docs/theory/operators-lattice.md, "Slices"). By default it is 3, or 4 if the box has
             more than `MANY` sites; friction needs as many
         """
-        slices = slices or SLICES + int(self.sites > MANY)
+        slices = slices or SLICES + int(math.prod(self.box.shape) > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
@@ -405,20 +383,17 @@ def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     assert layout.lattice is not None
     assert layout.sites is not None
     lattice, sites, points = layout.lattice, layout.sites, layout.points
-    away = np.empty((2, len(points)))
 
-    def look(some: slice) -> None:
-        steps = sites[some].astype(np.float64)
-        for k in (0, 1):
-            left = Pair(*two_sum(points[some, k], -lattice.origin[k]))
-            for n in (0, 1):
-                left -= Pair(*two_product(steps[:, n], lattice.basis[n, k]))
-            away[k, some] = left.high
+    def away(k: int, some: slice) -> Pair:
+        left = Pair(*two_sum(points[some, k], -lattice.origin[k]))
+        for n in (0, 1):
+            left -= Pair(*two_product(sites[some, n].astype(np.float64), lattice.basis[n, k]))
+        return left
 
-    threads.each(look, threads.chunks(len(points), CHUNK), threads.worthwhile(len(points)))
+    x, y = (in_parts(len(points), partial(away, k)).high for k in (0, 1))
     most = float(np.abs(sites).max(initial=0))
     largest = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
-    return away[0], away[1], 96 * ROUNDOFF**2 * largest
+    return x, y, 96 * ROUNDOFF**2 * largest
 
 
 def _least_symbol(lattice: Lattice) -> float:

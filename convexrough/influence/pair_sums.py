@@ -42,47 +42,37 @@ PAIRS = 2**22
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Points sorted by the block of the mesh that contains them.
+    """Points sorted by the block of the mesh that contains them."""
 
-    places : (n,) original indices of the sorted points
-    points : (n, 2) [length] the sorted points
-    tails  : (n, 2) [length] exact minus rounded coordinates of the sorted points; None if they are
-        0
-    cells  : (n, 2) mesh cell of each sorted point
-    shares : (n, 2) position of each sorted point in its cell, from 0 to 1
-    keys   : (b,) numbers of the blocks that contain points, sorted
-    starts : (b + 1,) first point of each of these blocks, and the number of all points
-    shape  : numbers of rows and of columns of blocks
-    """
-
-    places: Indices
-    points: Array
-    tails: Array | None
-    cells: Indices
-    shares: Array
-    keys: Indices
-    starts: Indices
-    shape: tuple[int, int]
+    places: Indices  # (n,) original indices of the sorted points
+    points: Array  # (n, 2) [length] the sorted points
+    tails: Array | None  # (n, 2) [length] exact minus rounded coordinates; None if they are 0
+    cells: Indices  # (n, 2) mesh cell of each sorted point
+    shares: Array  # (n, 2) position of each sorted point in its cell, from 0 to 1, rounded once
+    keys: Indices  # (b,) numbers of the blocks that contain points, sorted
+    starts: Indices  # (b + 1,) first point of each of these blocks, and the number of all points
+    shape: tuple[int, int]  # numbers of rows and of columns of blocks
 
     @classmethod
     def of(cls, points: Array, splitting: Splitting, tails: Array | None = None) -> Order:
-        low = points.min(axis=0)
-        cells, shares = _placed(points, low, splitting.spacing, tails)
+        away = Pair(*two_sum(points, -points.min(axis=0)))
+        if tails is not None:
+            away += Pair.exact(tails)
+        away /= Pair.exact(splitting.spacing)
+        corners = np.floor(away.high)
+        corners -= (away.high == corners) & (away.low < 0)
+        corners = np.maximum(corners, 0.0)
+        cells, shares = corners.astype(np.intp), (away.high - corners) + away.low
+
         blocks = cells // splitting.block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
         places = np.argsort(key, kind="stable")
         keys, starts = np.unique(key[places], return_index=True)
-        return cls(
-            places,
-            points[places],
-            None if tails is None else tails[places],
-            cells[places],
-            shares[places],
-            keys,
-            np.append(starts, len(points)).astype(np.intp),
-            (rows, columns),
-        )
+        starts = np.append(starts, len(points)).astype(np.intp)
+        tails = None if tails is None else tails[places]
+        cells, shares = cells[places], shares[places]
+        return cls(places, points[places], tails, cells, shares, keys, starts, (rows, columns))
 
     def back(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (n, ...) at the sorted points, in the original order."""
@@ -99,37 +89,17 @@ class Order:
         return np.asarray(apart[:, 0] + apart[:, 1])
 
 
-def _placed(
-    points: Array, low: Array, spacing: float, tails: Array | None
-) -> tuple[Indices, Array]:
-    """(n, 2) the mesh cell of each point, and (n, 2) its position in the cell, rounded once.
-
-    low : (2,) [length] the origin of the mesh
-    """
-    away = Pair(*two_sum(points, -low))
-    if tails is not None:
-        away += Pair.exact(tails)
-    away /= Pair.exact(spacing)
-    cells = np.floor(away.high)
-    cells -= (away.high == cells) & (away.low < 0)
-    cells = np.maximum(cells, 0.0)
-    return cells.astype(np.intp), (away.high - cells) + away.low
-
-
 @dataclass(frozen=True, eq=False)
 class NearPairs:
     """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
 
-    upper   : (n, n) sparse, the entries for pairs of sorted points i < j
-    own     : the number on the diagonal, -L(0), because a point does not displace itself
-    terms   : largest number of near neighbours of a point
-    nearest : [length] smallest distance between the points of a near pair, except 0
+    Its diagonal is -L(0), because a point does not displace itself.
     """
 
-    upper: Any
-    own: float
-    terms: int
-    nearest: float
+    upper: Any  # (n, n) sparse, the entries for pairs of sorted points i < j
+    own: float  # the number on the diagonal
+    terms: int  # largest number of near neighbours of a point
+    nearest: float  # [length] smallest distance between the points of a near pair, except 0
 
     @classmethod
     def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
@@ -155,8 +125,7 @@ class NearPairs:
         return cls(upper, -splitting.kernel.centre, most, min(nearest))
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        result: NDArray[Any] = self.upper @ loads
-        result += self.upper.T @ loads
+        result = both_ways(self.upper, loads)
         result += loads.dtype.type(self.own) * loads
         return result
 
@@ -171,21 +140,27 @@ class NearPairs:
             start = stop
 
 
+def both_ways(upper: Any, loads: NDArray[Any]) -> NDArray[Any]:
+    """The product of a symmetric matrix, of which `upper` has the entries above the diagonal."""
+    result: NDArray[Any] = upper @ loads
+    result += upper.T @ loads
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Interpolation:
     """The interpolation W from nodes to points.
 
-    x, y    : (n, width) weights in x and in y; each entry of W is the product of a weight in x and
-        one in y. Their low parts, in single precision, serve only sharp products (`sharp_sums`)
-    patches : for each group of consecutive points in one block of mesh cells: the first point, the
-        point after the last, and the indices i and j of the first node
-    shape   : numbers of nodes of the mesh in both directions
+    Each entry of W is the product of a weight in x and one in y. The low parts of weights, in
+    single precision, serve only sharp products (`sharp_sums`).
     """
 
-    x: Pair
-    y: Pair
+    x: Pair  # (n, width) weights in x
+    y: Pair  # (n, width) weights in y
+    #: For each group of consecutive points in one block of mesh cells: the first point, the point
+    #: after the last, and the indices i and j of the first node.
     patches: list[tuple[int, int, int, int]]
-    shape: tuple[int, int]
+    mesh: SiteBox  # the box of the nodes
 
     @classmethod
     def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
@@ -199,17 +174,16 @@ class Interpolation:
         size = len(order.places), splitting.width
         x, y = (Pair(np.empty(size, dtype), np.empty(size, np.float32)) for _ in (0, 1))
         for some in threads.chunks(len(order.places), PLACES):
-            for factor, exactly in zip(
-                (x, y), twofold_weights(order, splitting, some), strict=True
-            ):
-                factor.high[some], factor.low[some] = exactly
+            exactly = twofold_weights(order, splitting, some)
+            for factor, weights in zip((x, y), exactly, strict=True):
+                factor.high[some], factor.low[some] = weights
         extra = splitting.kernel.order - 1
         shape = (rows * splitting.block + extra, columns * splitting.block + extra)
-        return cls(x, y, patches, shape)
+        return cls(x, y, patches, SiteBox(shape, splitting.spacing * np.eye(2)))
 
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P at the nodes of the mesh for loads P (n,), or |W|^T P if `absolute`."""
-        field = np.zeros(self.shape, dtype=loads.dtype)
+        """W^T P for loads P (n,) as a field of the mesh, or |W|^T P if `absolute`."""
+        field = self.mesh.field(loads.dtype)
         x, y = self.x.high, self.y.high
         if absolute:
             x, y = np.abs(x), np.abs(y)
@@ -250,19 +224,13 @@ def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pa
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors.
+    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors."""
 
-    splitting, order : the choice of L and of the mesh; the points sorted by blocks of mesh cells
-    near, weights : the matrix S, and the interpolation W
-    mesh, kernel : the box of the nodes, and the transform of L on it, for products with G
-    """
-
-    splitting: Splitting
-    order: Order
-    near: NearPairs
-    weights: Interpolation
-    mesh: SiteBox
-    kernel: Kernel
+    splitting: Splitting  # the choice of L and of the mesh
+    order: Order  # the points sorted by blocks of mesh cells
+    near: NearPairs  # the matrix S
+    weights: Interpolation  # W
+    kernel: Kernel  # the transform of L on the mesh, for products with G
 
     @classmethod
     def assemble(
@@ -271,20 +239,24 @@ class Product:
         order = Order.of(points, splitting, tails)
         near = NearPairs.assemble(order, splitting, dtype)
         weights = Interpolation.assemble(order, splitting, dtype)
-        mesh = SiteBox(weights.shape, splitting.spacing * np.eye(2))
+        mesh = weights.mesh
         size = float(mesh.padded[0]) * mesh.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
         (kernel,) = mesh.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.norm)
-        return cls(splitting, order, near, weights, mesh, kernel)
+        return cls(splitting, order, near, weights, kernel)
+
+    @property
+    def mesh(self) -> SiteBox:
+        return self.weights.mesh
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums. A second thread computes the product with S at the same time."""
         ordered = loads[self.order.places]
         with ThreadPoolExecutor(1) as other:
             near = other.submit(self.near.apply, ordered)
-            field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
-            total = self.weights.from_nodes(field)
+            field = self.weights.to_nodes(ordered)
+            total = self.weights.from_nodes(self.mesh.convolve(field, self.kernel.spectrum))
             total += near.result()
         return self.order.back(total)
 
@@ -307,35 +279,39 @@ class Product:
         return total / (1.0 - rounding.relative) if rounding.relative < 1 else total + np.inf
 
     @cached_property
-    def _rounding(self) -> tuple[float, float]:
-        """Bounds on errors except those of `_weighing` and of transforms.
+    def _rounding(self) -> tuple[float, float, float, float]:
+        """Bounds on rounding errors except those of transforms.
 
-        The first is a part of the sums, the second is to be multiplied by the largest load.
+        The first is a part of the sums, and the second is to be multiplied by the largest load. The
+        others are relative errors of products with W^T, and with W.
         """
-        kernel = self.splitting.kernel
+        kernel, spacing, width = self.splitting.kernel, self.splitting.spacing, self.splitting.width
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
-        relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
-        relative += kernel.far_error(self.splitting.spacing)
+        relative += kernel.moved(2.0 * ROUNDOFF * spacing) + kernel.far_error(spacing)
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
-        return 1.01 * relative, 1.01 * own
+        each = 2.0 * WEIGHT_ROUNDOFFS + 2.0
+        overlaps = (-(-width // self.splitting.block)) ** 2
+        crowded = float(np.diff(self.order.starts).max())
+        to_mesh = each + min(crowded, BLOCK) + float(overlaps * np.ceil(crowded / BLOCK))
+        from_mesh = each + 2.0 * kernel.order
+        from_mesh += max(kernel.roundoffs, kernel.beyond_roundoffs)  # of each L
+        return 1.01 * relative, 1.01 * own, to_mesh * ROUNDOFF, from_mesh * ROUNDOFF
 
     def rounding(self, loads: Array) -> Rounding:
         """Bound on the error of `apply` in float64, without the bound of `interpolation`.
 
         docs/theory/operators-mesh.md, "Errors".
         """
-        relative, own = self._rounding
-        each = own * float(np.abs(loads).max(initial=0.0))
-        ordered = loads[self.order.places]
+        relative, own, to_mesh, from_mesh = self._rounding
+        ordered, norm = loads[self.order.places], self.kernel.norm
         field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
         sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
-        kernel, soft = self.kernel, self.splitting.kernel
-        to_mesh, from_mesh = self._weighing
-        from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
         # Cauchy's inequality for a row of G, and the sum of a row of |W|.
-        transforms = self.mesh.bound(kernel.norm) + from_mesh * kernel.norm
-        growth = lebesgue(soft.order) ** 2
-        each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
+        growth = lebesgue(self.splitting.kernel.order) ** 2
+        each = own * float(np.abs(loads).max(initial=0.0))
+        each += growth * (
+            (self.mesh.bound(norm) + from_mesh * norm) * field + to_mesh * norm * sizes
+        )
         return Rounding(relative, 1.01 * each)
 
     def slopes(self, values: Array) -> Array:
@@ -344,27 +320,7 @@ class Product:
         There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
         times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
-        ordered = values[self.order.places]
-        total = self._near_slopes(ordered)
-        field = self.weights.to_nodes(ordered)
-        for k, pull in enumerate(self._pulls):
-            total[:, k] += self.weights.from_nodes(self.mesh.convolve(field, 1j * pull.spectrum))
-        return self.order.back(total)
-
-    @cached_property
-    def _pulls(self) -> list[Kernel]:
-        return self.mesh.pulls(self._softer.smooth)
-
-    @property
-    def _softer(self) -> Softened:
-        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
-
-    def _near_slopes(self, ordered: Array) -> Array:
-        """(n, 2) the part of `slopes` by near pairs of sorted points: 1 / r^3 less its smooth part.
-
-        ordered : (n,) the values v_j at the sorted points
-        """
-        points, kernel = self.order.points, self._softer
+        ordered, points, kernel = values[self.order.places], self.order.points, self._softer
         total, n = np.zeros_like(points), len(points)
         for some, here in self.near.in_parts(PAIRS):
             there = self.near.upper.indices[some]
@@ -374,17 +330,18 @@ class Product:
                 pull = weights * apart[:, k]
                 total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
                 total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
-        return total
+        for k, smooth in enumerate(self._pulls):
+            field = self.weights.to_nodes(ordered)
+            total[:, k] += self.weights.from_nodes(self.mesh.convolve(field, 1j * smooth.spectrum))
+        return self.order.back(total)
+
+    @cached_property
+    def _pulls(self) -> list[Kernel]:
+        return self.mesh.pulls(self._softer.smooth)
 
     @property
-    def _weighing(self) -> tuple[float, float]:
-        """Bounds on the relative rounding errors of products with W^T, and with W."""
-        order, width = self.splitting.kernel.order, self.splitting.width
-        weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
-        overlaps = (-(-width // self.splitting.block)) ** 2
-        crowded = float(np.diff(self.order.starts).max())
-        to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)
-        return (weights + float(to_mesh)) * ROUNDOFF, (weights + 2.0 * order) * ROUNDOFF
+    def _softer(self) -> Softened:
+        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:

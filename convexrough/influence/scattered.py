@@ -17,19 +17,20 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import (
     Coupling,
+    Influence,
     JointCoupling,
     Kind,
     Rounding,
     Smoother,
+    entry_error,
     known,
 )
-from convexrough.influence.dense import DenseCoupling, DenseInfluence, dense_matrix, entry_error
+from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
-from convexrough.scene.neighbours import crowding, separations
 
 #: Target of the relative error that interpolation causes in a product. It is the largest part of
 #: the error of `sums`, about 1e-16.
@@ -47,14 +48,13 @@ FEW_PAIRS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
-class ScatteredInfluence:
+class ScatteredInfluence(Influence):
     """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
-    point_error : [length] bound on the error of each coordinate of the points
-    tails       : (n, 2) [length] the exact points minus `points`, or None if all differences are 0
-        or unknown; see `Scene.contact_tails`
-
     For few points, or points in dense clusters, a matrix takes the place of the mesh.
+
+    tails : (n, 2) [length] the exact points minus `points`, or None if all differences are 0 or
+        unknown; see `Scene.contact_tails`
     """
 
     points: Array
@@ -63,11 +63,6 @@ class ScatteredInfluence:
     tails: Array | None = None
 
     name: ClassVar[Kind] = "scattered"
-    stored: ClassVar[bool] = False
-    cheap_sums: ClassVar[bool] = False
-
-    def __len__(self) -> int:
-        return len(self.points)
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
@@ -96,40 +91,20 @@ class ScatteredInfluence:
         moved = entry_error(self._unknown, product.near.nearest)
         return product.above(strengths) * float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
-    @property
-    def matrix(self) -> Array:
-        return dense_matrix(self.points, self.scale)
-
-    def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.points[which], self.scale)
-
-    @property
-    def entry_error(self) -> float:
-        return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
-
     def restricted(self, which: Indices) -> ScatteredInfluence:
         tails = None if self.tails is None else self.tails[which]
         return replace(self, points=self.points[which], tails=tails)
 
     def onto(self, points: Array) -> Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
-            return DenseCoupling(self.points, points, self.scale, self.point_error)
+            return super().onto(points)
         together = np.concatenate((points, self.points))
         return JointCoupling(replace(self, points=together, tails=None), len(points))
 
     def slopes(self, loads: Array) -> Array:
         if self._double is None:
-            return self._dense.slopes(loads)
+            return super().slopes(loads)
         return -self.scale * self._double.slopes(loads)
-
-    def separations(self) -> Array:
-        return separations(self.points, self.point_error)
-
-    def crowding(self, radii: Array) -> float:
-        return crowding(self.points, radii)
-
-    def semidefinite_with(self, radius: float) -> bool:
-        return False
 
     def sums(self, loads: Pair) -> Ball:
         found = self._sums(loads)

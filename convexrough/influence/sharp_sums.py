@@ -23,7 +23,7 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import CHUNK, Pair, rounded, two_product, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.influence.pair_sums import Product, within
+from convexrough.influence.pair_sums import Product, both_ways, within
 from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, exact_series, lebesgue
@@ -169,8 +169,8 @@ class SharpPairs:
         product, kernel = self.product, self.product.splitting.kernel
         first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
         second = np.asarray((ordered.high - first) + ordered.low)
-        exact, left = _applied(self.first, np.stack((first, second), axis=1)).T
-        left = left + _applied(self.second, first + second)
+        exact, left = both_ways(self.first, np.stack((first, second), axis=1)).T
+        left = left + both_ways(self.second, first + second)
         own = ordered * Pair(-self.centre.high, -self.centre.low)
         sizes = np.abs(ordered.high)
         every, around = _sizes(product, sizes)
@@ -180,12 +180,6 @@ class SharpPairs:
         errors = (terms + 4) * ROUNDOFF * (rest + inexact) + self.error * around
         errors += 2.0**-88 * (every + kernel.centre * around)
         return Pair(*two_sum(exact, left)) + own, 1.01 * errors
-
-
-def _applied(upper: Any, loads: Array) -> Array:
-    result: Array = upper @ loads
-    result += upper.T @ loads
-    return result
 
 
 def _sizes(product: Product, strengths: Array) -> tuple[Array, Array]:
@@ -288,7 +282,7 @@ def _to_nodes(product: Product, ordered: Pair) -> tuple[Pair, float]:
     """W^T P for sorted loads P of at most 1, and a bound on the error at every node."""
     met = _met(product)
     bits = (DIGITS - met.bit_length()) // 2
-    exact, left = np.zeros(product.weights.shape), np.zeros(product.weights.shape)
+    exact, left = np.zeros(product.mesh.shape), np.zeros(product.mesh.shape)
     for some, patches, x, y in _weighed(product):
         mine = ordered.at(np.s_[some, None])
         high, low = two_product(mine.high, y.high)
@@ -348,7 +342,7 @@ def _weighed(
 
 def _met(product: Product) -> int:
     """The largest number of points that interpolate from the same node."""
-    order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
+    order, counts = product.splitting.kernel.order, np.zeros(product.mesh.shape, dtype=np.intp)
     np.add.at(counts, tuple(product.order.cells.T), 1)
     for rows in (counts, counts.T):
         rows[:] = rows.cumsum(axis=0)
