@@ -9,20 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import (
-    ENTRY_ROUNDOFFS,
-    Influence,
-    Kind,
-    Rounding,
-    dense_matrix,
-    known,
-)
+from convexrough.influence import coupling
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
-class DenseInfluence(Influence):
+class DenseInfluence(coupling.Influence):
     """The compliance operator as a stored matrix; see `coupling.Influence`."""
 
     points: Array
@@ -31,15 +24,15 @@ class DenseInfluence(Influence):
     sums: MatrixSums
     point_error: float = 0.0
 
-    name: ClassVar[Kind] = "dense"
+    name: ClassVar[coupling.Kind] = "dense"
     stored: ClassVar[bool] = True
 
     @classmethod
     def assemble(
         cls, points: Array, scale: float, point_error: float = 0.0, tails: Array | None = None
     ) -> DenseInfluence:
-        sums = MatrixSums(*known(points, tails, point_error))
-        return cls(points, scale, dense_matrix(points, scale), sums, point_error)
+        sums = MatrixSums(*coupling.known(points, tails, point_error))
+        return cls(points, scale, coupling.dense_matrix(points, scale), sums, point_error)
 
     @property
     def matrix(self) -> Array:
@@ -55,10 +48,10 @@ class DenseInfluence(Influence):
             total += self.entries[:, start : start + size] @ loads[start : start + size]
         return total
 
-    def rounding(self, loads: Array) -> Rounding:
+    def rounding(self, loads: Array) -> coupling.Rounding:
         """Bounds for `apply`, which sums in blocks: Higham, Accuracy and Stability, section 4.2."""
         terms = self._block + -(-len(self) // self._block) + 1
-        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
+        return coupling.Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         inverse = self.entries / self.scale  # 1 / r, because powers of the scale may underflow
@@ -80,7 +73,8 @@ class DenseInfluence(Influence):
     def separations(self) -> Array:
         if len(self) < 2:
             return np.full(len(self), np.inf)
-        nearest: Array = self.scale / self.entries.max(axis=1) * (1.0 - ENTRY_ROUNDOFFS * ROUNDOFF)
+        lower = 1.0 - coupling.ENTRY_ROUNDOFFS * ROUNDOFF
+        nearest: Array = self.scale / self.entries.max(axis=1) * lower
         return np.asarray(np.maximum(nearest - 3.0 * self.point_error, 0.0))
 
     def crowding(self, radii: Array) -> float:

@@ -23,18 +23,8 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, in_parts, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
+from convexrough.influence import coupling
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
-from convexrough.influence.coupling import (
-    Coupling,
-    Influence,
-    JointCoupling,
-    Kind,
-    Rounding,
-    Smoother,
-    cubed,
-    dense_matrix,
-    entry_error,
-)
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, MANY, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
@@ -67,7 +57,7 @@ LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
-class LatticeInfluence(Influence):
+class LatticeInfluence(coupling.Influence):
     """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
     The points in `array` are the exact positions of the summits, multiplied by the factors
@@ -82,7 +72,7 @@ class LatticeInfluence(Influence):
     scale: float
     point_error: float = 0.0
 
-    name: ClassVar[Kind] = "lattice"
+    name: ClassVar[coupling.Kind] = "lattice"
     cheap_sums: ClassVar[bool] = True
 
     @cached_property
@@ -141,12 +131,12 @@ class LatticeInfluence(Influence):
         product *= loads.dtype.type(self._unit)
         return product
 
-    def rounding(self, loads: Array) -> Rounding:
+    def rounding(self, loads: Array) -> coupling.Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
         # sum of site_error / r^2 in a row bounds the change of a component.
         each = self.box.bound(self._kernel.norm) * float(np.linalg.norm(loads))
         each += self._displaced * float(np.abs(loads).max(initial=0.0))
-        return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
+        return coupling.Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """(n,) upper bounds on sum_j strengths_j / r_ij^power, from sums in single precision."""
@@ -191,11 +181,11 @@ class LatticeInfluence(Influence):
         return self.array[self.members]
 
     def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.array[self.members[which]], self.scale)
+        return coupling.dense_matrix(self.array[self.members[which]], self.scale)
 
     @cached_property
     def entry_error(self) -> float:
-        return entry_error(self.point_error, self.spacing * self._least)
+        return coupling.entry_error(self.point_error, self.spacing * self._least)
 
     @property
     def places(self) -> tuple[Indices, Indices]:
@@ -211,7 +201,7 @@ class LatticeInfluence(Influence):
             last = self._keep("part", replace(self, members=members))
         return last
 
-    def onto(self, points: Array) -> Coupling:
+    def onto(self, points: Array) -> coupling.Coupling:
         places = self.lattice.sites(points)
         if places is None:
             return super().onto(points)
@@ -219,7 +209,7 @@ class LatticeInfluence(Influence):
         sites = np.concatenate((places, np.stack(self.places, axis=1)))
         layout = Layout(together, (self.lattice, sites))
         joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
-        return JointCoupling(joint, len(points))
+        return coupling.JointCoupling(joint, len(points))
 
     @property
     def _filled(self) -> bool:
@@ -234,7 +224,7 @@ class LatticeInfluence(Influence):
 
     def _pulls(self, box: SiteBox) -> list[Kernel]:
         """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: box.pulls(cubed))
+        return self._cached("pulls", lambda: box.pulls(coupling.cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -358,7 +348,7 @@ class LatticeInfluence(Influence):
         unit = top / self.spacing
         return Ball.around(change * unit, 1.01 * error * unit)
 
-    def smoother(self, root: Array) -> Smoother:
+    def smoother(self, root: Array) -> coupling.Smoother:
         return block_smoother(np.stack(self.cells), self.box.basis, self._unit, root)
 
 

@@ -309,9 +309,8 @@ class Product:
         # Cauchy's inequality for a row of G, and the sum of a row of |W|.
         growth = lebesgue(self.splitting.kernel.order) ** 2
         each = own * float(np.abs(loads).max(initial=0.0))
-        each += growth * (
-            (self.mesh.bound(norm) + from_mesh * norm) * field + to_mesh * norm * sizes
-        )
+        each += growth * (self.mesh.bound(norm) + from_mesh * norm) * field
+        each += growth * to_mesh * norm * sizes
         return Rounding(relative, 1.01 * each)
 
     def slopes(self, values: Array) -> Array:

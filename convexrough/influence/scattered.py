@@ -15,16 +15,7 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import (
-    Coupling,
-    Influence,
-    JointCoupling,
-    Kind,
-    Rounding,
-    Smoother,
-    entry_error,
-    known,
-)
+from convexrough.influence import coupling
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
@@ -48,7 +39,7 @@ FEW_PAIRS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
-class ScatteredInfluence(Influence):
+class ScatteredInfluence(coupling.Influence):
     """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
     For few points, or points in dense clusters, a matrix takes the place of the mesh.
@@ -62,7 +53,7 @@ class ScatteredInfluence(Influence):
     point_error: float = 0.0
     tails: Array | None = None
 
-    name: ClassVar[Kind] = "scattered"
+    name: ClassVar[coupling.Kind] = "scattered"
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
@@ -73,13 +64,13 @@ class ScatteredInfluence(Influence):
         found *= dtype(self.scale)
         return found
 
-    def rounding(self, loads: Array) -> Rounding:
+    def rounding(self, loads: Array) -> coupling.Rounding:
         if self._double is None:
             return self._dense.rounding(loads)
         rounding = self._double.rounding(loads)
-        points = entry_error(self._unknown, self._double.near.nearest)
+        points = coupling.entry_error(self._unknown, self._double.near.nearest)
         interpolated = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
-        return Rounding(
+        return coupling.Rounding(
             1.01 * (rounding.relative + points),
             1.01 * self.scale * (rounding.each + interpolated),
         )
@@ -88,18 +79,18 @@ class ScatteredInfluence(Influence):
         product = self._product(power, np.float64)
         if product is None:
             return self._dense.falloff(strengths, power)
-        moved = entry_error(self._unknown, product.near.nearest)
+        moved = coupling.entry_error(self._unknown, product.near.nearest)
         return product.above(strengths) * float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
     def restricted(self, which: Indices) -> ScatteredInfluence:
         tails = None if self.tails is None else self.tails[which]
         return replace(self, points=self.points[which], tails=tails)
 
-    def onto(self, points: Array) -> Coupling:
+    def onto(self, points: Array) -> coupling.Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
             return super().onto(points)
         together = np.concatenate((points, self.points))
-        return JointCoupling(replace(self, points=together, tails=None), len(points))
+        return coupling.JointCoupling(replace(self, points=together, tails=None), len(points))
 
     def slopes(self, loads: Array) -> Array:
         if self._double is None:
@@ -119,9 +110,9 @@ class ScatteredInfluence(Influence):
     def _sums(self) -> MatrixSums | MeshSums:
         if len(self) > FEW and self._double is not None:
             return MeshSums(self._double)
-        return MatrixSums(*known(self.points, self.tails, self.point_error))
+        return MatrixSums(*self._known)
 
-    def smoother(self, root: Array) -> Smoother:
+    def smoother(self, root: Array) -> coupling.Smoother:
         return smoother_of_points(self.points, self.scale, root)
 
     @property
@@ -148,6 +139,10 @@ class ScatteredInfluence(Influence):
         return self._products[power, dtype]
 
     @property
+    def _known(self) -> tuple[Pair, float]:
+        return coupling.known(self.points, self.tails, self.point_error)
+
+    @cached_property
     def _unknown(self) -> float:
         """[length] bound on the error of each coordinate of `points` plus `tails`."""
-        return known(self.points, self.tails, self.point_error)[1]
+        return self._known[1]
