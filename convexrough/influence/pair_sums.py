@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from convexrough.roundoff import ROUNDOFF
 #: near neighbours are counted first, to estimate this memory.
 BYTES, SAMPLE = 24, 1000
 
-#: Largest number of points in a patch of `Interpolation`: sums stay short, and fit in the cache.
+#: Largest number of points in a patch of a `Mesh`: sums stay short, and fit in the cache.
 BLOCK = 256
 
 #: Number of points whose weights are computed together: they fit in the cache.
@@ -41,21 +42,25 @@ PAIRS = 2**22
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
-    """Points sorted by the block of the mesh that contains them."""
+class Mesh:
+    """Points, sorted by the block of mesh cells that contains them, with the interpolation W."""
 
+    splitting: Splitting
     places: Indices  # (n,) original indices of the sorted points
     points: Array  # (n, 2) [length] the sorted points
     tails: Array | None  # (n, 2) [length] exact minus rounded coordinates; None if they are 0
     cells: Indices  # (n, 2) mesh cell of each sorted point
     shares: Array  # (n, 2) position of each sorted point in its cell, from 0 to 1, rounded once
-    keys: Indices  # (b,) numbers of the blocks that contain points, sorted
-    starts: Indices  # (b + 1,) first point of each of these blocks, and the number of all points
-    shape: tuple[int, int]  # numbers of rows and of columns of blocks
+    crowded: float  # largest number of points in a block
+    #: For each group of consecutive points in one block: the first point, the point after the last,
+    #: and the indices i and j of the first node.
+    patches: list[tuple[int, int, int, int]]
+    box: SiteBox  # the nodes
+    dtype: Any
 
     @classmethod
-    def of(cls, points: Array, splitting: Splitting, tails: Array | None = None) -> Order:
-        away = Pair(*two_sum(points, -points.min(axis=0)))
+    def of(cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None) -> Mesh:
+        away, block = Pair(*two_sum(points, -points.min(axis=0))), splitting.block
         if tails is not None:
             away += Pair.exact(tails)
         away /= Pair.exact(splitting.spacing)
@@ -64,15 +69,59 @@ class Order:
         corners = np.maximum(corners, 0.0)
         cells, shares = corners.astype(np.intp), (away.high - corners) + away.low
 
-        blocks = cells // splitting.block
+        blocks = cells // block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
         places = np.argsort(key, kind="stable")
         keys, starts = np.unique(key[places], return_index=True)
-        starts = np.append(starts, len(points)).astype(np.intp)
+        edges = pairwise([*starts.tolist(), len(points)])
+        patches = [
+            (first, min(first + BLOCK, stop), key // columns * block, key % columns * block)
+            for key, (start, stop) in zip(keys.tolist(), edges, strict=True)
+            for first in range(start, stop, BLOCK)
+        ]
+        extra, spacing = splitting.kernel.order - 1, splitting.spacing
+        box = SiteBox((rows * block + extra, columns * block + extra), spacing * np.eye(2))
+        crowded = float(np.diff(starts, append=len(points)).max())
         tails = None if tails is None else tails[places]
-        cells, shares = cells[places], shares[places]
-        return cls(places, points[places], tails, cells, shares, keys, starts, (rows, columns))
+        sorted_ = splitting, places, points[places], tails, cells[places], shares[places]
+        return cls(*sorted_, crowded, patches, box, dtype)
+
+    @cached_property
+    def weights(self) -> tuple[Pair, Pair]:
+        """(n, width) weights in x and in y; each entry of W is the product of one of each.
+
+        They are 0 except at the nodes from which a point interpolates. Their low parts, in single
+        precision, serve only sharp products (`sharp_sums`).
+        """
+        size, order = (len(self.points), self.splitting.width), self.splitting.kernel.order
+        x, y = (Pair(np.zeros(size, self.dtype), np.zeros(size, np.float32)) for _ in (0, 1))
+        for some in threads.chunks(size[0], PLACES):
+            for k, factor in enumerate((x, y)):
+                columns = (self.cells[some, k] % self.splitting.block)[:, None] + np.arange(order)
+                exactly = twofold_lagrange(self.shares[some, k], order)
+                for whole, part in zip(factor, exactly, strict=True):
+                    np.put_along_axis(whole[some], columns, part, axis=1)
+        return x, y
+
+    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+        """W^T P for loads P (n,) as a field of the box, or |W|^T P if `absolute`."""
+        field, column, width = self.box.field(loads.dtype), loads[:, None], self.splitting.width
+        x, y = (np.abs(each.high) if absolute else each.high for each in self.weights)
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
+        return field
+
+    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
+        """(n,) W times a field of values at the nodes of the mesh."""
+        (x, _), (y, _) = self.weights
+        result, width = np.empty(len(x), dtype=field.dtype), self.splitting.width
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            along = x[mine] @ field[i : i + width, j : j + width]
+            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
+        return result
 
     def back(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (n, ...) at the sorted points, in the original order."""
@@ -102,19 +151,20 @@ class NearPairs:
     nearest: float  # [length] smallest distance between the points of a near pair, except 0
 
     @classmethod
-    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
+    def assemble(cls, mesh: Mesh) -> NearPairs:
         from scipy.sparse import csr_array
         from scipy.spatial import cKDTree
 
-        n, tree = len(order.points), cKDTree(order.points)
-        some = order.points[:: max(1, n // SAMPLE)]
+        points, splitting = mesh.points, mesh.splitting
+        n, tree = len(points), cKDTree(points)
+        some = points[:: max(1, n // SAMPLE)]
         near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
         checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
         i, j = tree.query_pairs(splitting.cut, output_type="ndarray").T.astype(np.int32)
-        values, nearest = np.empty(len(i), dtype=dtype), [splitting.cut]
+        values, nearest = np.empty(len(i), dtype=mesh.dtype), [splitting.cut]
 
         def compute(some: slice) -> None:
-            squares = order.squares(i[some], j[some])
+            squares = mesh.squares(i[some], j[some])
             values[some] = splitting.kernel.local(squares)
             nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
 
@@ -148,117 +198,35 @@ def both_ways(upper: Any, loads: NDArray[Any]) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Interpolation:
-    """The interpolation W from nodes to points.
-
-    Each entry of W is the product of a weight in x and one in y. The low parts of weights, in
-    single precision, serve only sharp products (`sharp_sums`).
-    """
-
-    x: Pair  # (n, width) weights in x
-    y: Pair  # (n, width) weights in y
-    #: For each group of consecutive points in one block of mesh cells: the first point, the point
-    #: after the last, and the indices i and j of the first node.
-    patches: list[tuple[int, int, int, int]]
-    mesh: SiteBox  # the box of the nodes
-
-    @classmethod
-    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
-        rows, columns = order.shape
-        patches = []
-        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * splitting.block
-        for key, (i, j) in enumerate(corners.tolist()):
-            start, stop = order.starts[key : key + 2].tolist()
-            for first in range(start, stop, BLOCK):
-                patches.append((first, min(first + BLOCK, stop), i, j))
-        size = len(order.places), splitting.width
-        x, y = (Pair(np.empty(size, dtype), np.empty(size, np.float32)) for _ in (0, 1))
-        for some in threads.chunks(len(order.places), PLACES):
-            exactly = twofold_weights(order, splitting, some)
-            for factor, weights in zip((x, y), exactly, strict=True):
-                factor.high[some], factor.low[some] = weights
-        extra = splitting.kernel.order - 1
-        shape = (rows * splitting.block + extra, columns * splitting.block + extra)
-        return cls(x, y, patches, SiteBox(shape, splitting.spacing * np.eye(2)))
-
-    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P for loads P (n,) as a field of the mesh, or |W|^T P if `absolute`."""
-        field = self.mesh.field(loads.dtype)
-        x, y = self.x.high, self.y.high
-        if absolute:
-            x, y = np.abs(x), np.abs(y)
-        width = x.shape[1]
-        column = loads[:, None]
-        for start, stop, i, j in self.patches:
-            mine = slice(start, stop)
-            field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
-        return field
-
-    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
-        """(n,) W times a field of values at the nodes of the mesh."""
-        x, y = self.x.high, self.y.high
-        result, width = np.empty(len(x), dtype=field.dtype), x.shape[1]
-        for start, stop, i, j in self.patches:
-            mine = slice(start, stop)
-            along = x[mine] @ field[i : i + width, j : j + width]
-            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
-        return result
-
-
-def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
-    """The double-double weights (m, width) of some points, in x and in y.
-
-    They are 0 except at the nodes from which a point interpolates.
-    """
-    stencil = np.arange(splitting.kernel.order)
-    factors = []
-    for k in (0, 1):
-        weights = twofold_lagrange(order.shares[some, k], len(stencil))
-        rows = Pair(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
-        columns = (order.cells[some, k] % splitting.block)[:, None] + stencil
-        for row, values in zip(rows, weights, strict=True):
-            np.put_along_axis(row, columns, values, axis=1)
-        factors.append(rows)
-    return factors[0], factors[1]
-
-
-@dataclass(frozen=True, eq=False)
 class Product:
     """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors."""
 
     splitting: Splitting  # the choice of L and of the mesh
-    order: Order  # the points sorted by blocks of mesh cells
+    mesh: Mesh  # the sorted points, and W
     near: NearPairs  # the matrix S
-    weights: Interpolation  # W
     kernel: Kernel  # the transform of L on the mesh, for products with G
 
     @classmethod
     def assemble(
         cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None = None
     ) -> Product:
-        order = Order.of(points, splitting, tails)
-        near = NearPairs.assemble(order, splitting, dtype)
-        weights = Interpolation.assemble(order, splitting, dtype)
-        mesh = weights.mesh
-        size = float(mesh.padded[0]) * mesh.padded[1]
+        mesh = Mesh.of(points, splitting, dtype, tails)
+        near = NearPairs.assemble(mesh)
+        size = float(mesh.box.padded[0]) * mesh.box.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        (kernel,) = mesh.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
+        (kernel,) = mesh.box.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.norm)
-        return cls(splitting, order, near, weights, kernel)
-
-    @property
-    def mesh(self) -> SiteBox:
-        return self.weights.mesh
+        return cls(splitting, mesh, near, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums. A second thread computes the product with S at the same time."""
-        ordered = loads[self.order.places]
+        ordered = loads[self.mesh.places]
         with ThreadPoolExecutor(1) as other:
             near = other.submit(self.near.apply, ordered)
-            field = self.weights.to_nodes(ordered)
-            total = self.weights.from_nodes(self.mesh.convolve(field, self.kernel.spectrum))
+            field = self.mesh.to_nodes(ordered)
+            total = self.mesh.from_nodes(self.mesh.box.convolve(field, self.kernel.spectrum))
             total += near.result()
-        return self.order.back(total)
+        return self.mesh.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on errors of the sums of strengths_j / r_ij^q, for `strengths` (n,) >= 0.
@@ -267,9 +235,9 @@ class Product:
         by entries left out of S. The relative error of farther pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
-        points, ordered = self.order.points, strengths[self.order.places]
+        points, ordered = self.mesh.points, strengths[self.mesh.places]
         near = within(points, ordered, kernel.reach + kernel.sway(spacing))
-        return self.order.back(kernel.pair_error(spacing) * near)
+        return self.mesh.back(kernel.pair_error(spacing) * near)
 
     def above(self, strengths: Array) -> Array:
         """(n,) upper bounds on the sums over j of strengths_j / r_ij^q, for `strengths` >= 0."""
@@ -291,7 +259,7 @@ class Product:
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
         each = 2.0 * WEIGHT_ROUNDOFFS + 2.0
         overlaps = (-(-width // self.splitting.block)) ** 2
-        crowded = float(np.diff(self.order.starts).max())
+        crowded = self.mesh.crowded
         to_mesh = each + min(crowded, BLOCK) + float(overlaps * np.ceil(crowded / BLOCK))
         from_mesh = each + 2.0 * kernel.order
         from_mesh += max(kernel.roundoffs, kernel.beyond_roundoffs)  # of each L
@@ -303,13 +271,13 @@ class Product:
         docs/theory/operators-mesh.md, "Errors".
         """
         relative, own, to_mesh, from_mesh = self._rounding
-        ordered, norm = loads[self.order.places], self.kernel.norm
-        field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
-        sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
+        ordered, norm = loads[self.mesh.places], self.kernel.norm
+        field = float(np.linalg.norm(self.mesh.to_nodes(ordered)))
+        sizes = float(np.linalg.norm(self.mesh.to_nodes(np.abs(ordered), absolute=True)))
         # Cauchy's inequality for a row of G, and the sum of a row of |W|.
         growth = lebesgue(self.splitting.kernel.order) ** 2
         each = own * float(np.abs(loads).max(initial=0.0))
-        each += growth * (self.mesh.bound(norm) + from_mesh * norm) * field
+        each += growth * (self.mesh.box.bound(norm) + from_mesh * norm) * field
         each += growth * to_mesh * norm * sizes
         return Rounding(relative, 1.01 * each)
 
@@ -319,7 +287,7 @@ class Product:
         There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
         times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
-        ordered, points, kernel = values[self.order.places], self.order.points, self._softer
+        ordered, points, kernel = values[self.mesh.places], self.mesh.points, self._softer
         total, n = np.zeros_like(points), len(points)
         for some, here in self.near.in_parts(PAIRS):
             there = self.near.upper.indices[some]
@@ -330,13 +298,13 @@ class Product:
                 total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
                 total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
         for k, smooth in enumerate(self._pulls):
-            field = self.weights.to_nodes(ordered)
-            total[:, k] += self.weights.from_nodes(self.mesh.convolve(field, 1j * smooth.spectrum))
-        return self.order.back(total)
+            field = self.mesh.to_nodes(ordered)
+            total[:, k] += self.mesh.from_nodes(self.mesh.box.convolve(field, 1j * smooth.spectrum))
+        return self.mesh.back(total)
 
     @cached_property
     def _pulls(self) -> list[Kernel]:
-        return self.mesh.pulls(self._softer.smooth)
+        return self.mesh.box.pulls(self._softer.smooth)
 
     @property
     def _softer(self) -> Softened:
