@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -78,10 +79,8 @@ class Ball:
     @classmethod
     def stacked(cls, balls: list[Ball]) -> Ball:
         """Balls of the same shape, stacked along a new first axis."""
-        return cls(
-            Pair(np.stack([b.mid.high for b in balls]), np.stack([b.mid.low for b in balls])),
-            np.stack([b.radius for b in balls]),
-        )
+        stacked: Ball = of_rows(lambda *each: np.stack(each), *balls)
+        return stacked
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -205,8 +204,8 @@ class Ball:
 
 def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
     """Elements of `yes` where the condition is True, else of `no`, as in numpy.where."""
-    high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
-    return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
+    chosen: Ball = of_rows(partial(np.where, condition), yes, no)
+    return chosen
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
@@ -243,7 +242,7 @@ def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
         operands = [part for ball in balls for part in (ball.mid, ball.radius)]
         return Ball(*_finished(*operation(*operands)))
     shape = np.broadcast_shapes(*(ball.shape for ball in balls))
-    flat = [ball if ball.radius.size == 1 else _flat(ball) for ball in balls]
+    flat = [ball if ball.radius.size == 1 else of_rows(np.ravel, ball) for ball in balls]
     high, low, radius = np.empty((3, count))
 
     def compute(some: slice) -> None:
@@ -254,10 +253,6 @@ def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
 
     threads.each(compute, threads.chunks(count, CHUNK), threads.worthwhile(count))
     return Ball(Pair(high.reshape(shape), low.reshape(shape)), radius.reshape(shape))
-
-
-def _flat(ball: Ball) -> Ball:
-    return Ball(Pair(ball.mid.high.ravel(), ball.mid.low.ravel()), ball.radius.ravel())
 
 
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:

@@ -170,8 +170,8 @@ class Slices(NamedTuple):
         first = np.rint(values.high * unit) / unit
         return cls(first, (values.high - first) + values.low)
 
-    def some(self, rows: slice) -> Slices:
-        return Slices(self.first[rows], self.second[rows])
+    def at(self, index: Any) -> Slices:
+        return Slices(self.first[index], self.second[index])
 
 
 def in_slices(
@@ -191,11 +191,8 @@ class SoftValues(Distances):
 
     @classmethod
     def between(cls, product: Product, unit: float) -> SoftValues:
-        mesh, kernel, spacing = (
-            product.mesh.box,
-            product.splitting.kernel,
-            product.splitting.spacing,
-        )
+        mesh, splitting = product.mesh.box, product.splitting
+        kernel, spacing = splitting.kernel, splitting.spacing
         basis = [[Fraction(x) / Fraction(unit) for x in row] for row in mesh.basis.tolist()]
         beyond = Distances.of(basis, max(mesh.shape))
         step, reach = Fraction(spacing) ** 2, Fraction(kernel.reach)
@@ -262,7 +259,7 @@ def _to_nodes(product: Product, ordered: Pair) -> tuple[Pair, float]:
         charges = Slices.of(Pair(high, low), bits)
         factors = Slices.of(x, bits)
         for rows, i, j in patches:
-            first, second = in_slices(lambda a, b: a.T @ b, factors.some(rows), charges.some(rows))
+            first, second = in_slices(lambda a, b: a.T @ b, factors.at(rows), charges.at(rows))
             exact[i, j] += first
             left[i, j] += second
     error = met * ((2 * met + 8) * ROUNDOFF * 2.0**-bits + 4 * TWOFOLD_WEIGHT)
@@ -277,17 +274,14 @@ def _from_nodes(product: Product, on_mesh: Ball) -> tuple[Array, Array, float, f
     high, low = (np.asarray(each).reshape(product.mesh.box.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
-    unit = 2.0 ** (-2 * BITS)
+    unit, dots = 2.0 ** (-2 * BITS), partial(np.einsum, "ij,ij->i")
     exact, left = np.empty(len(product.mesh.places)), np.empty(len(product.mesh.places))
     for some, patches, x, y in _weighed(product):
         across, along = Slices.of(x, BITS), Slices.of(y, BITS)
         for rows, i, j in patches:
-            nodes = Slices(values.first[i, j], values.second[i, j])
-            lines = Slices.of(Pair(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
+            lines = in_slices(np.matmul, across.at(rows), values.at((i, j)))
             here = slice(some.start + rows.start, some.start + rows.stop)
-            exact[here], left[here] = in_slices(
-                partial(np.einsum, "ij,ij->i"), lines, along.some(rows)
-            )
+            exact[here], left[here] = in_slices(dots, Slices.of(Pair(*lines), BITS), along.at(rows))
     # The sum of |weights| is below 4; that of the rests of p weights is below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
