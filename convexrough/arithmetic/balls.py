@@ -327,9 +327,7 @@ def _lost(result: Pair) -> Array:
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, offsets: Ball, approach: Ball) -> Ball:
-    """k P^(2/3) + v - d - D for coefficients k, loads P (0 if negative), displacements v, offsets d
-    and the approach D.
-    """
+    """k P^(2/3) + v - d - D for loads P (0 if negative)."""
     return elementwise(_residual, k, loads, displacement, offsets, approach)
 
 

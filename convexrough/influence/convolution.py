@@ -28,9 +28,8 @@ ROW = 512
 #: transformed in groups of about IN_ROWS numbers, which fit in the cache.
 LAID_OUT, IN_ROWS = 2**17, 2**16
 
-#: A function of i, j and squares: i are differences of the row numbers of two sites, j those of
-#: their column numbers, and squares (len(i), len(j)) the squared distances [spacing^2]. It returns
-#: for each kernel an array of values (len(i), len(j)).
+#: A function of differences i of row numbers and j of column numbers of two sites, and of squared
+#: distances (len(i), len(j)) [spacing^2]. It returns values (len(i), len(j)) of each kernel.
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
 #: A function of the transforms of some fields in a slice of columns, and of this slice. It returns
@@ -40,13 +39,10 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 @dataclass(frozen=True, eq=False)
 class SiteBox:
-    """A rectangle of lattice sites i b1 + j b2, with convolutions on it.
-
-    The unit of length, the spacing, is the length of the shorter vector of the basis.
-    """
+    """A rectangle of lattice sites i b1 + j b2, with convolutions on it."""
 
     shape: tuple[int, int]  # numbers of rows and of columns of sites
-    basis: Array  # (2, 2) [spacing] rows b1 and b2
+    basis: Array  # (2, 2) [spacing] rows b1 and b2; the shorter one has the length 1
     extent: float = np.inf  # [spacing] at least the distance of any two sites with a point
 
     @cached_property
@@ -100,8 +96,7 @@ class SiteBox:
     def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
         """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two occupied sites.
 
-        over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
-            small r (`influence.softened`)
+        over_cube : 1 / r^3 as a function of squared distances, perhaps made smooth at small r
         """
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
@@ -184,10 +179,7 @@ class SiteBox:
         return np.zeros((self.shape[0], self.stride), dtype=dtype)
 
     def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
-        """The `field` with values (n,) at some sites, and zeros elsewhere.
-
-        places : (n,) flat indices of these sites in the field
-        """
+        """The `field` with values (n,) at the flat indices `places` (n,), and zeros elsewhere."""
         field = self.field(values.dtype)
         field.ravel()[places] = values  # where points coincide, the last value remains
         return field
@@ -210,9 +202,7 @@ class SiteBox:
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        This is formula (1) of docs/theory/operators-lattice.md, "Rounding".
-
-        norm : 2-norm of the kernel
+        It is (1) of docs/theory/operators-lattice.md, "Rounding"; `norm` is that of the kernel.
         """
         return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
@@ -229,11 +219,8 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    Each result is in the memory of the field, which saves memory. Columns beyond those of the sites
-    have no meaning in it.
-
-    fields : (rows, stride) each, as `SiteBox.field` makes them, padded with zeros before the
-        transform; they are read one by one
+    Fields are (rows, stride), as `SiteBox.field` makes them, and are read one by one. Each result
+    is in the memory of its field; its columns beyond those of the sites have no meaning.
     """
     from scipy import fft
 

@@ -57,10 +57,7 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """A 2-norm of the residual at which solvers can stop, as it is far below these bounds.
-
-        displacement : A P as computed
-        """
+        """A 2-norm of the residual, far below these bounds for A P, at which solvers can stop."""
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
@@ -80,8 +77,7 @@ class Coupling(ABC):
     def falloff(self, strengths: Array, power: int) -> Array:
         """(m,) upper bounds on sum_j strengths_j / r_ij^power, often a few per cent too large.
 
-        strengths : (n,) not negative
-        power     : 2 or 3
+        The `strengths` (n,) are not negative; `power` is 2 or 3.
         """
 
 
@@ -151,17 +147,11 @@ class Influence(Coupling):
         return neighbours.crowding(self.points, radii)
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite; else False.
-
-        Only the operator on a lattice proves it.
-        """
+        """True if A + (scale / radius) I is proved positive semidefinite: only on a lattice."""
         return False
 
     def smoother(self, root: Array) -> Smoother | None:
-        """A symmetric, positive definite approximation of (I + W A W)^-1, with W = diag(root).
-
-        None if no approximation is available.
-        """
+        """A symmetric, positive definite estimate of (I + W A W)^-1, W = diag(root), or None."""
         return None
 
 
@@ -243,7 +233,7 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
     """The points (n, 2) as double-double numbers, and a bound on the errors of their coordinates.
 
-    tails : the low parts of the numbers; if None, they are 0 and the bound is `point_error`
+    The low parts are `tails`; if these are None, they are 0 and the bound is `point_error`.
     """
     if tails is None:
         return Pair.exact(points), point_error
@@ -251,10 +241,7 @@ def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair,
 
 
 def dense_matrix(points: Array, scale: float) -> Array:
-    """The matrix (n, n) of A_ij = scale / r_ij, with zeros on the diagonal.
-
-    Raises InputError if memory cannot hold it and its copies.
-    """
+    """The matrix (n, n) of A_ij = scale / r_ij; raises InputError if it does not fit in memory."""
     checks.fits_in_memory("asperities that could touch", len(points), 5 * 8, power=2)
     matrix = inverse_distances(points, points)
     matrix *= scale

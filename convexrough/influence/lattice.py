@@ -89,8 +89,7 @@ class LatticeInfluence(coupling.Influence):
     def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
         """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
 
-        If only asperities near the middle carry loads, the transforms are smaller: the extent of
-        the box need only bound the distances of all asperities from the loaded ones.
+        The extent of this box need only bound the distances of all asperities from the loaded ones.
         """
         box, loaded, (i, j) = self.box, loads.nonzero()[0], self.cells
         reach = _farthest(i[loaded], j[loaded], box.shape, box.basis)
@@ -139,7 +138,6 @@ class LatticeInfluence(coupling.Influence):
         return coupling.Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(n,) upper bounds on sum_j strengths_j / r_ij^power, from sums in single precision."""
         (box, places), largest = self._boxed, float(strengths.max(initial=0.0)) or 1.0
         kernel = box.kernel(power, np.float32)
         shares = (strengths / largest).astype(np.float32)
@@ -261,11 +259,8 @@ class LatticeInfluence(coupling.Influence):
         return self.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite.
-
-        The proof uses a lower bound on the symbol (the Fourier transform of the kernel), which is
-        also a lower bound on the eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
-        """
+        # A lower bound on the symbol (the Fourier transform of the kernel) is also one on the
+        # eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
@@ -277,11 +272,9 @@ class LatticeInfluence(coupling.Influence):
         return SLICES + int(math.prod(self.box.shape) > LARGE)
 
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
-        """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
+        """(n,) sums over j of P_j / r_ij, from slices (docs/theory/operators-lattice.md, "Slices").
 
-        slices : number of parts of 10 to 18 bits into which loads and kernel are divided
-            (docs/theory/operators-lattice.md, "Slices"). By default it is 3, or 4 if the box has
-            more than `MANY` sites; friction needs as many
+        By default there are 3 slices, or 4 on more than `MANY` sites; friction needs as many.
         """
         slices = slices or SLICES + int(math.prod(self.box.shape) > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
@@ -313,7 +306,7 @@ class LatticeInfluence(coupling.Influence):
     def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
         """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
-        The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
+        docs/theory/operators-lattice.md, "Points off their sites", derives the expansion.
         """
         layout = self.layout
         x, y, unknown = layout.cached(off_sites) if len(self) <= MOST_KEPT else off_sites(layout)
@@ -366,9 +359,7 @@ def _largest_sum(values: Array, apart: int) -> float:
 def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     """(N,), (N,) [length] x and y deviations of points from their sites, and their error bound.
 
-    The deviation of a point p from its site (i, j) is p - o - i b1 - j b2, with the origin o and
-    the basis b1, b2 of the lattice. It is computed in double-double arithmetic and rounded at the
-    end.
+    That of a point p is p - o - i b1 - j b2 with the lattice's origin o, rounded at the end.
     """
     assert layout.lattice is not None
     assert layout.sites is not None

@@ -91,8 +91,7 @@ class Mesh:
     def weights(self) -> tuple[Pair, Pair]:
         """(n, width) weights in x and in y; each entry of W is the product of one of each.
 
-        They are 0 except at the nodes from which a point interpolates. Their low parts, in single
-        precision, serve only sharp products (`sharp_sums`).
+        Their low parts, in single precision, serve only sharp products (`sharp_sums`).
         """
         size, order = (len(self.points), self.splitting.width), self.splitting.kernel.order
         x, y = (Pair(np.zeros(size, self.dtype), np.zeros(size, np.float32)) for _ in (0, 1))
@@ -140,13 +139,10 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
-
-    Its diagonal is -L(0), because a point does not displace itself.
-    """
+    """The matrix S, for pairs within the distance `Splitting.cut`."""
 
     upper: Any  # (n, n) sparse, the entries for pairs of sorted points i < j
-    own: float  # the number on the diagonal
+    own: float  # the number on the diagonal: -L(0), because a point does not displace itself
     terms: int  # largest number of near neighbours of a point
     nearest: float  # [length] smallest distance between the points of a near pair, except 0
 
@@ -266,10 +262,7 @@ class Product:
         return 1.01 * relative, 1.01 * own, to_mesh * ROUNDOFF, from_mesh * ROUNDOFF
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bound on the error of `apply` in float64, without the bound of `interpolation`.
-
-        docs/theory/operators-mesh.md, "Errors".
-        """
+        """Bound on errors of `apply` except `interpolation` (docs/theory/operators-mesh.md)."""
         relative, own, to_mesh, from_mesh = self._rounding
         ordered, norm = loads[self.mesh.places], self.kernel.norm
         field = float(np.linalg.norm(self.mesh.to_nodes(ordered)))

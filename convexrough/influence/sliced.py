@@ -37,21 +37,16 @@ MOST_BITS = 48
 
 @dataclass(frozen=True)
 class Distances:
-    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
+    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0."""
 
-    The first two slices of `gram` have so few bits that their products with i^2, i j and j^2 are
-    exact, and so are sums of these products.
-    """
-
-    gram: Array  # (3, 3) three slices (rows) of b1 b1, 2 b1 b2 and b2 b2 (columns)
+    #: (3, 3) slices (rows) of b1 b1, 2 b1 b2 and b2 b2 (columns). The first two have so few bits
+    #: that sums of their products with i^2, i j and j^2 are exact.
+    gram: Array
     error: float  # bound on the relative error of each value
 
     @classmethod
     def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
-        """The distances for |i| and |j| below `largest`.
-
-        basis : reduced basis, in a unit of 0.5 to 1 times the length of the shorter vector
-        """
+        """For |i|, |j| below `largest`, in a unit of 0.5 to 1 times the shorter of both vectors."""
         (a, b), (c, d) = basis
         bits = 52 - (4 * largest * largest).bit_length()
         slices = np.zeros((3, 3))
@@ -133,10 +128,7 @@ class Sliced:
             more -= 1
 
     def sums(self, loads: Pair, at: Indices) -> Ball:
-        """(n,) the sums over j of g_ij P_j, divided by `unit`; g is the kernel.
-
-        at : (n,) indices of the loads' sites in the flattened array that is transformed
-        """
+        """(n,) sums over j of g_ij P_j / unit with the kernel g, for loads at flat indices `at`."""
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
         if top == 0.0:
@@ -172,10 +164,7 @@ class Sliced:
         return Ball.around(in_parts(len(at), add_up), 1.01 * radius * unit + TINY)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads for which levels are exact, and the number of bits of the first slice.
-
-        shares : (n,) loads divided by a power of two, at most 1
-        """
+        """Slices of loads up to 1 for which levels are exact, and the bits of the first slice."""
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
         bits = min(guess, MOST_BITS)
@@ -203,8 +192,6 @@ class Sliced:
 
 
 def _operations(count: int) -> int:
-    """The number that replaces 4 in (1) of docs/theory/operators-lattice.md.
-
-    Up to `count` products are added up before the inverse transform, and last slices are rounded.
-    """
+    # Replaces 4 in (1) of docs/theory/operators-lattice.md: up to `count` products are added up
+    # before the inverse transform, and last slices are rounded.
     return 2 * count + 6

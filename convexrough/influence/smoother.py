@@ -149,10 +149,7 @@ def _low_pass(size: tuple[int, int], basis: Array) -> Single:
 
 
 def _block_spectrum(size: tuple[int, int], basis: Array, count: float, workers: int) -> Single:
-    """The spectrum, in a periodic box, of about the mean of 1 / r over pairs of blocks.
-
-    count : mean number of touching asperities in a block
-    """
+    """The spectrum of the mean of 1 / r over pairs of blocks, about, for `count` points in each."""
     from scipy import fft
 
     i, j = (BLOCK * np.fft.ifftshift(np.arange(n) - n // 2) for n in size)

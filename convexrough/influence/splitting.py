@@ -42,10 +42,7 @@ class Splitting:
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
-        """The fastest splitting with an estimated relative error of products of `tolerance`.
-
-        None if sums over all pairs are faster.
-        """
+        """The fastest splitting with about this relative error; None if a matrix is faster."""
         n = len(points)
         extent = np.ptp(points, axis=0) if n else np.zeros(2)
         if n < 2 or not extent.any():
