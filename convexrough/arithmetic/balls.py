@@ -98,28 +98,24 @@ class Ball:
     @property
     def value(self) -> Array:
         """The midpoints, rounded to float64."""
-        high: Array = self.mid.high
-        return high
+        return np.asarray(self.mid.high)
 
     @property
     def error(self) -> Array:
         """Bounds on the distance of the numbers of each ball from `value`."""
-        error: Array = (self.radius + np.abs(self.mid.low)) * UP
-        return error
+        return np.asarray((self.radius + np.abs(self.mid.low)) * UP)
 
     @property
     @quietly
     def lower(self) -> Array:
         """Lower bounds on the numbers of each ball."""
-        low: Array = self.mid.high - (self.radius - self.mid.low)
-        return np.asarray(low - self._margin)
+        return np.asarray(self.mid.high - (self.radius - self.mid.low) - self._margin)
 
     @property
     @quietly
     def upper(self) -> Array:
         """Upper bounds on the numbers of each ball."""
-        high: Array = self.mid.high + (self.radius + self.mid.low)
-        return np.asarray(high + self._margin)
+        return np.asarray(self.mid.high + (self.radius + self.mid.low) + self._margin)
 
     @property
     def _margin(self) -> Array:
@@ -129,8 +125,7 @@ class Ball:
     @property
     def size(self) -> Array:
         """Upper bounds on the absolute values of the numbers of each ball."""
-        size: Array = np.abs(self.mid.high) * UP + self.radius
-        return np.asarray(size * UP)
+        return np.asarray((np.abs(self.mid.high) * UP + self.radius) * UP)
 
     @property
     def positive(self) -> NDArray[np.bool_]:

@@ -254,10 +254,7 @@ def _row_by_row(
     def work(some: slice) -> None:
         into[some] = transform(given[some])
 
-    if given.size <= IN_ROWS:
-        work(slice(None))
-    else:
-        threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
+    threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:

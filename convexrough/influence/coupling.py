@@ -140,7 +140,14 @@ class Influence(Coupling):
 
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distances of asperities to their nearest neighbours."""
-        return neighbours.separations(self.points, self.point_error)
+        if len(self) < 2:
+            return np.full(len(self), np.inf)
+        return np.maximum(self._nearest - 3.0 * self.point_error, 0.0)
+
+    @property
+    def _nearest(self) -> Array:
+        """(n,) [length] distances of points to their nearest neighbours, perhaps rounded down."""
+        return neighbours.nearest_distances(self.points)
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij; the `radii` a (n,) are contact radii, 0 where open."""

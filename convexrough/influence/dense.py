@@ -55,9 +55,7 @@ class DenseInfluence(coupling.Influence):
 
     def falloff(self, strengths: Array, power: int) -> Array:
         inverse = self.entries / self.scale  # 1 / r, because powers of the scale may underflow
-        raised = inverse * inverse
-        for _ in range(power - 2):
-            raised *= inverse
+        raised = inverse * inverse if power == 2 else inverse * inverse * inverse
         loss = 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
         return np.asarray((raised @ strengths) * (1.0 + loss))
 
@@ -70,12 +68,10 @@ class DenseInfluence(coupling.Influence):
         entries, sums = self.submatrix(which), self.sums.restricted(which)
         return replace(self, points=self.points[which], entries=entries, sums=sums)
 
-    def separations(self) -> Array:
-        if len(self) < 2:
-            return np.full(len(self), np.inf)
+    @property
+    def _nearest(self) -> Array:
         lower = 1.0 - coupling.ENTRY_ROUNDOFFS * ROUNDOFF
-        nearest: Array = self.scale / self.entries.max(axis=1) * lower
-        return np.asarray(np.maximum(nearest - 3.0 * self.point_error, 0.0))
+        return np.asarray(self.scale / self.entries.max(axis=1) * lower)
 
     def crowding(self, radii: Array) -> float:
         if len(radii) < 2:

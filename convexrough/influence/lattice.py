@@ -216,13 +216,9 @@ class LatticeInfluence(coupling.Influence):
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-        pulls = self._pulls(box)
+        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
         each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
-
-    def _pulls(self, box: SiteBox) -> list[Kernel]:
-        """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: box.pulls(coupling.cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -317,7 +313,8 @@ class LatticeInfluence(coupling.Influence):
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
-        shares, pulls = loads / top, self._pulls(box)
+        shares = loads / top
+        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)

@@ -320,6 +320,4 @@ def within(points: Array, strengths: Array, distance: float) -> Array:
     low_j, high_j = (np.clip(np.arange(columns) + s, 0, columns) for s in (-parts, parts + 1))
     boxes = sums[np.ix_(high_i, high_j)] - sums[np.ix_(low_i, high_j)]
     boxes += sums[np.ix_(low_i, low_j)] - sums[np.ix_(high_i, low_j)]
-    slack = 1e-12 * sums[-1, -1]  # rounding of the differences
-    bounds: Array = boxes.ravel()[place] + slack
-    return bounds
+    return np.asarray(boxes.ravel()[place] + 1e-12 * sums[-1, -1])  # rounding of the differences

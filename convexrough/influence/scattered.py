@@ -70,10 +70,8 @@ class ScatteredInfluence(coupling.Influence):
         rounding = self._double.rounding(loads)
         points = coupling.entry_error(self._unknown, self._double.near.nearest)
         interpolated = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
-        return coupling.Rounding(
-            1.01 * (rounding.relative + points),
-            1.01 * self.scale * (rounding.each + interpolated),
-        )
+        each = 1.01 * self.scale * (rounding.each + interpolated)
+        return coupling.Rounding(1.01 * (rounding.relative + points), each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         product = self._product(power, np.float64)

@@ -37,5 +37,4 @@ def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     if 0 < crowding < np.inf:
         s = s + share * (radii / crowding)
     with np.errstate(divide="ignore"):
-        values: Array = influence.scale / s
-    return values
+        return np.asarray(influence.scale / s)

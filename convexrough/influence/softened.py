@@ -3,7 +3,8 @@
 L denotes the smooth kernel. Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial:
 the series of 1 / r^q in t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives
 at r = a. All terms of the series are positive, so nothing cancels. docs/theory/operators-mesh.md
-derives the bounds, in "The smooth part", "Derivatives of L" and "Interpolation".
+derives the bounds, in "The smooth part", "Derivatives of L", "Interpolation", "Rounding" and
+"Rounding errors of L".
 """
 
 from __future__ import annotations
