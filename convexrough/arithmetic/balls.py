@@ -208,10 +208,8 @@ def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
-    if isinstance(first, Ball):
-        pairs, radii = [each.mid for each in values], [each.radius for each in values]
-        return Ball(of_rows(function, *pairs), function(*radii))
-    return type(first)(*(of_rows(function, *parts) for parts in zip(*values, strict=True)))
+    rows = ((each.mid, each.radius) for each in values) if isinstance(first, Ball) else values
+    return type(first)(*(of_rows(function, *parts) for parts in zip(*rows, strict=True)))
 
 
 def joined(balls: Sequence[Ball]) -> Ball:

@@ -80,7 +80,14 @@ class SiteBox:
     @cached_property
     def loss(self) -> float:
         """Bound on the error of a two-dimensional transform, in roundoffs of the 2-norm."""
-        return float(sum(_pass_roundoffs(length) for length in self.padded))
+        loss = 0.0
+        for length in self.padded:
+            for radix, cost in PASS_ROUNDOFFS.items():
+                while length % radix == 0:
+                    length //= radix
+                    loss += cost
+            assert length == 1  # next_fast_len returns only products of these radices
+        return loss
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
         """The kernel 1 / |i b1 + j b2|^power for all differences of occupied sites; 0 at (0, 0)."""
@@ -103,17 +110,17 @@ class SiteBox:
             weights = over_cube(squares)
             return [weights * away for away in self._differences(i, j)]
 
-        return self.kernels(values, np.float64, odd=True)
+        return self.kernels(values, np.float64, 2, odd=True)
 
-    def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
-        """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
+    def kernels(
+        self, values: Values, dtype: Any, count: int = 1, *, odd: bool = False
+    ) -> list[Kernel]:
+        """`count` kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
         from scipy import fft
 
         rows, columns = self.padded
         last = rows // 2 + 1  # the transform of row -i is, up to sign, conjugate to that of row i
         shape, whole = (last, columns // 2 + 1), np.result_type(dtype, np.complex64)
-        nowhere = np.zeros(0, dtype=np.intp)
-        count = len(values(nowhere, nowhere, np.zeros((0, 0))))
         halves = [np.empty(shape, dtype=whole) for _ in range(count)]
         squares = np.empty((count, last))  # sums of squares of each row
 
@@ -265,13 +272,3 @@ def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
 def _least(sites: int, twice: int, length: float) -> int:
     """A padded number of sites: above `length`, at least `sites`, but never above `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
-
-
-def _pass_roundoffs(length: int) -> int:
-    total = 0
-    for radix, cost in PASS_ROUNDOFFS.items():
-        while length % radix == 0:
-            length //= radix
-            total += cost
-    assert length == 1  # next_fast_len returns only products of these radices
-    return total

@@ -41,7 +41,7 @@ ENTRY_ROUNDOFFS = 24
 #: Number of array elements in a block, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
-#: Fraction of occupied sites of a box below which a k-d tree finds neighbours. A heuristic: it
+#: Fraction of occupied sites of a box up to which a k-d tree finds neighbours. A heuristic: it
 #: affects speed, and the lower bounds on nearest distances, from which shells are computed
 #: (docs/theory/convexity.md).
 FILLED = 0.2
@@ -97,7 +97,7 @@ class LatticeInfluence(coupling.Influence):
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = self._keep("boxed", (reach, box, i * np.intp(box.stride) + j))
+            last = self._cached("boxed", lambda: (reach, box, i * np.intp(box.stride) + j))
         return last[1:]
 
     @property
@@ -194,10 +194,9 @@ class LatticeInfluence(coupling.Influence):
 
     def restricted(self, which: Indices) -> LatticeInfluence:
         members = self.members[which]
-        last: LatticeInfluence | None = self._kept.get("part")
-        if last is None or not np.array_equal(last.members, members):
-            last = self._keep("part", replace(self, members=members))
-        return last
+        if "part" in self._kept and not np.array_equal(self._kept["part"].members, members):
+            del self._kept["part"]
+        return self._cached("part", lambda: replace(self, members=members))
 
     def onto(self, points: Array) -> coupling.Coupling:
         places = self.lattice.sites(points)
@@ -209,11 +208,6 @@ class LatticeInfluence(coupling.Influence):
         joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
         return coupling.JointCoupling(joint, len(points))
 
-    @property
-    def _filled(self) -> bool:
-        """True if asperities occupy more than the fraction `FILLED` of the sites of the box."""
-        return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
-
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
         pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
@@ -221,7 +215,7 @@ class LatticeInfluence(coupling.Influence):
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
     def separations(self) -> Array:
-        if not self._filled:
+        if len(self) <= FILLED * math.prod(self.box.shape):
             return super().separations()
         nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
         return even(nearest, len(self))
@@ -233,7 +227,7 @@ class LatticeInfluence(coupling.Influence):
         1, then all with 2, and so on, until no farther pair can exceed the largest ratio found. On
         a reduced basis these differences have lengths of at least 0.8, 1.6, ... times the spacing.
         """
-        if not self._filled:
+        if len(self) <= FILLED * math.prod(self.box.shape):
             return super().crowding(radii)
         (rows, columns), stride, places = self.box.shape, self.box.stride, self._boxed[1]
         most, worst = 2.0 * float(radii.max()), 0.0
@@ -280,9 +274,7 @@ class LatticeInfluence(coupling.Influence):
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object that `make` returns, computed once unless there are many asperities."""
-        return self._kept[name] if name in self._kept else self._keep(name, make())
-
-    def _keep(self, name: object, made: Made) -> Made:
+        made: Made = self._kept[name] if name in self._kept else make()
         if len(self) <= MOST_KEPT:
             self._kept[name] = made
         return made

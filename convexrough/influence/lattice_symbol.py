@@ -90,13 +90,11 @@ class _Symbol:
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
         """(m,) f in the middles c of parts of the dual lattice, and lower bounds on f in each part.
 
-        Each bound is the larger of two bounds. All points of a part are within rho of c, and no
-        second derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a
-        bound. For the other bound, each cosine is replaced by -1, and each |k + G| by an upper
-        bound, because E decreases.
-
-        cells : (m, 2) middles c in units of g1 and g2
-        size  : side of the parts in these units
+        The middles are `cells` (m, 2), and the sides of parts `size`, in units of g1 and g2. Each
+        bound is the larger of two bounds. All points of a part are within rho of c, and no second
+        derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a bound.
+        For the other bound, each cosine is replaced by -1, and each |k + G| by an upper bound,
+        because E decreases.
         """
         from scipy.special import erfc
 

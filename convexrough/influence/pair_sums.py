@@ -128,14 +128,6 @@ class Mesh:
         result[self.places] = values
         return result
 
-    def squares(self, i: Indices, j: Indices) -> Array:
-        """(m,) [length^2] squared distances of the sorted points i (m,) from sorted points j."""
-        apart = self.points[i] - self.points[j]
-        if self.tails is not None:
-            apart += self.tails[i] - self.tails[j]
-        apart *= apart
-        return np.asarray(apart[:, 0] + apart[:, 1])
-
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
@@ -160,7 +152,11 @@ class NearPairs:
         values, nearest = np.empty(len(i), dtype=mesh.dtype), [splitting.cut]
 
         def compute(some: slice) -> None:
-            squares = mesh.squares(i[some], j[some])
+            apart = points[i[some]] - points[j[some]]
+            if mesh.tails is not None:
+                apart += mesh.tails[i[some]] - mesh.tails[j[some]]
+            apart *= apart
+            squares = apart[:, 0] + apart[:, 1]
             values[some] = splitting.kernel.local(squares)
             nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
 
@@ -280,7 +276,8 @@ class Product:
         There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
         times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
-        ordered, points, kernel = values[self.mesh.places], self.mesh.points, self._softer
+        ordered, points = values[self.mesh.places], self.mesh.points
+        kernel, pulls = self._softer
         total, n = np.zeros_like(points), len(points)
         for some, here in self.near.in_parts(PAIRS):
             there = self.near.upper.indices[some]
@@ -290,18 +287,15 @@ class Product:
                 pull = weights * apart[:, k]
                 total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
                 total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
-        for k, smooth in enumerate(self._pulls):
+        for k, smooth in enumerate(pulls):
             field = self.mesh.to_nodes(ordered)
             total[:, k] += self.mesh.from_nodes(self.mesh.box.convolve(field, 1j * smooth.spectrum))
         return self.mesh.back(total)
 
     @cached_property
-    def _pulls(self) -> list[Kernel]:
-        return self.mesh.box.pulls(self._softer.smooth)
-
-    @property
-    def _softer(self) -> Softened:
-        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
+    def _softer(self) -> tuple[Softened, list[Kernel]]:
+        soft = Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
+        return soft, self.mesh.box.pulls(soft.smooth)
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:

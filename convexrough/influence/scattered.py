@@ -129,8 +129,8 @@ class ScatteredInfluence(coupling.Influence):
     def _product(self, power: int, dtype: Any) -> Product | None:
         """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
         if (power, dtype) not in self._products:
-            tolerance = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
-            tolerance = tolerance if power == 1 else FALLOFF_TOLERANCE
+            accuracy = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
+            tolerance = accuracy if power == 1 else FALLOFF_TOLERANCE
             splitting = Splitting.choose(self.points, power, tolerance)
             found = splitting and Product.assemble(self.points, splitting, dtype, self.tails)
             self._products[power, dtype] = found or None

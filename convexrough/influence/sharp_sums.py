@@ -288,9 +288,7 @@ def _from_nodes(product: Product, on_mesh: Ball) -> tuple[Array, Array, float, f
     return exact / unit, left / unit, unit / scale, rounding / unit
 
 
-def _weighed(
-    product: Product,
-) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
+def _weighed(product: Product) -> Iterator[tuple[slice, list[Any], Pair, Pair]]:
     """For each group of patches: its points, the slices of each patch, and the weights in x and y.
 
     The slices of a patch select its points within the group, and its nodes in x and in y.

@@ -120,7 +120,7 @@ class Sliced:
             return cut(values.at(i, j), bits, more, count)
 
         while True:
-            kernels = box.kernels(slices, np.float64)
+            kernels = box.kernels(slices, np.float64, count)
             largest = max(each.norm for each in kernels[:-1])
             # For any loads, slices after the first are at most 2^(more - 1).
             if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
