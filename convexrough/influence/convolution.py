@@ -21,12 +21,10 @@ from convexrough.roundoff import ROUNDOFF
 #: passes of radix 2, which have a larger error.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed in groups that have this many bytes in each row and fit in the cache.
-ROW = 512
-
-#: Rows of a kernel are computed in groups of about LAID_OUT numbers, and rows of a field are
-#: transformed in groups of about IN_ROWS numbers, which fit in the cache.
-LAID_OUT, IN_ROWS = 2**17, 2**16
+#: Columns are transformed in groups that have ROW bytes in each row. Rows of a kernel are computed
+#: in groups of about LAID_OUT numbers, and rows of a field are transformed in groups of about
+#: IN_ROWS numbers. All groups fit in the cache.
+ROW, LAID_OUT, IN_ROWS = 512, 2**17, 2**16
 
 #: A function of differences i of row numbers and j of column numbers of two sites, and of squared
 #: distances (len(i), len(j)) [spacing^2]. It returns values (len(i), len(j)) of each kernel.

@@ -77,8 +77,8 @@ class LatticeInfluence(coupling.Influence):
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) flat indices of the asperities' sites in a field of the box."""
-        basis, (i, j) = self.lattice.basis / self.spacing, self.places
+        """The smallest box of sites that holds the asperities, and (n,) their flat indices."""
+        basis, (i, j) = self.lattice.basis / self.lattice.spacing, self.places
         if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
         i, j = i - i.min(), j - j.min()
@@ -102,7 +102,6 @@ class LatticeInfluence(coupling.Influence):
 
     @property
     def box(self) -> SiteBox:
-        """The smallest box of sites that holds the asperities."""
         return self._boxed[0]
 
     @property
@@ -111,15 +110,10 @@ class LatticeInfluence(coupling.Influence):
         rows, columns = np.divmod(self._boxed[1], self.box.stride)
         return rows, columns
 
-    @cached_property
-    def spacing(self) -> float:
-        """[length] the shortest distance between two sites."""
-        return self.lattice.spacing
-
     @property
     def site_error(self) -> float:
         """[spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i."""
-        return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.spacing
+        return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.lattice.spacing
 
     def apply(self, loads: Array) -> Array:
         single = loads.dtype == np.float32
@@ -143,13 +137,13 @@ class LatticeInfluence(coupling.Influence):
         shares = (strengths / largest).astype(np.float32)
         total = box.convolve_at(places, shares, kernel.spectrum).astype(np.float64)
         total += box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
-        stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
+        stretched = (1.0 + 1e-6) / (self._least * self.lattice.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
     @property
     def _unit(self) -> float:
         """The entry A_ij for two sites at the distance `spacing`."""
-        return self.scale / self.spacing
+        return self.scale / self.lattice.spacing
 
     @property
     def _least(self) -> float:
@@ -183,7 +177,7 @@ class LatticeInfluence(coupling.Influence):
 
     @cached_property
     def entry_error(self) -> float:
-        return coupling.entry_error(self.point_error, self.spacing * self._least)
+        return coupling.entry_error(self.point_error, self.lattice.spacing * self._least)
 
     @property
     def places(self) -> tuple[Indices, Indices]:
@@ -212,13 +206,12 @@ class LatticeInfluence(coupling.Influence):
         box, places = self._boxed_for(loads)
         pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
         each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
-        return -self.scale / self.spacing**2 * np.stack(each, axis=1)
+        return -self.scale / self.lattice.spacing**2 * np.stack(each, axis=1)
 
     def separations(self) -> Array:
         if len(self) <= FILLED * math.prod(self.box.shape):
             return super().separations()
-        nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
-        return even(nearest, len(self))
+        return even(self._at_least(1.0) if len(self) > 1 else np.inf, len(self))
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
@@ -246,15 +239,15 @@ class LatticeInfluence(coupling.Influence):
 
     def _at_least(self, length: float) -> float:
         """[length] lower bound on the distance of points on sites this far apart [spacing]."""
-        return self.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
+        return self.lattice.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
 
     def semidefinite_with(self, radius: float) -> bool:
         # A lower bound on the symbol (the Fourier transform of the kernel) is also one on the
         # eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
-        if radius * LEAST_NEGATIVE > self.spacing:
+        if radius * LEAST_NEGATIVE > self.lattice.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
-        return -least * radius * (1.0 + SAFETY) <= self.spacing
+        return -least * radius * (1.0 + SAFETY) <= self.lattice.spacing
 
     @property
     def least_slices(self) -> int:
@@ -285,10 +278,10 @@ class LatticeInfluence(coupling.Influence):
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:
-        unit = float(2.0 ** np.floor(np.log2(self.spacing)))
+        unit = float(2.0 ** np.floor(np.log2(self.lattice.spacing)))
         basis = [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
         distances = Distances.of(basis, max(box.shape))
-        norm = self._kernel.norm * unit / self.spacing
+        norm = self._kernel.norm * unit / self.lattice.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
     def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
@@ -298,7 +291,7 @@ class LatticeInfluence(coupling.Influence):
         """
         layout = self.layout
         x, y, unknown = layout.cached(off_sites) if len(self) <= MOST_KEPT else off_sites(layout)
-        shrunk = [float(factor) / self.spacing for factor in self.lattice.shrink]
+        shrunk = [float(factor) / self.lattice.spacing for factor in self.lattice.shrink]
         x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
         most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-9)
         unknown = max(shrunk) * unknown + 8 * ROUNDOFF * most
@@ -327,7 +320,7 @@ class LatticeInfluence(coupling.Influence):
         error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * size
-        unit = top / self.spacing
+        unit = top / self.lattice.spacing
         return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> coupling.Smoother:

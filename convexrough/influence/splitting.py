@@ -44,8 +44,7 @@ class Splitting:
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
         """The fastest splitting with about this relative error; None if a matrix is faster."""
         n = len(points)
-        extent = np.ptp(points, axis=0) if n else np.zeros(2)
-        if n < 2 or not extent.any():
+        if n < 2 or not (extent := np.ptp(points, axis=0)).any():
             return None
         sums, widest = _Sums.of(points, power), float(np.hypot(*extent))
         best: Splitting | None = None
