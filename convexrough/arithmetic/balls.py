@@ -206,7 +206,7 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     """The result of `function` on arrays, or on each of the arrays of pairs and balls."""
     first = values[0]
-    if isinstance(first, np.ndarray):
+    if not isinstance(first, (Ball, tuple)):
         return function(*values)
     rows = ((each.mid, each.radius) for each in values) if isinstance(first, Ball) else values
     return type(first)(*(of_rows(function, *parts) for parts in zip(*rows, strict=True)))

@@ -76,8 +76,8 @@ class Mesh:
         keys, starts = np.unique(key[places], return_index=True)
         edges = pairwise([*starts.tolist(), len(points)])
         patches = [
-            (first, min(first + BLOCK, stop), key // columns * block, key % columns * block)
-            for key, (start, stop) in zip(keys.tolist(), edges, strict=True)
+            (first, min(first + BLOCK, stop), k // columns * block, k % columns * block)
+            for k, (start, stop) in zip(keys.tolist(), edges, strict=True)
             for first in range(start, stop, BLOCK)
         ]
         extra, spacing = splitting.kernel.order - 1, splitting.spacing
