@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -79,8 +78,8 @@ class Ball:
     @classmethod
     def stacked(cls, balls: list[Ball]) -> Ball:
         """Balls of the same shape, stacked along a new first axis."""
-        stacked: Ball = of_rows(lambda *each: np.stack(each), *balls)
-        return stacked
+        mids = (np.stack(parts) for parts in zip(*(ball.mid for ball in balls), strict=True))
+        return cls(Pair(*mids), np.stack([ball.radius for ball in balls]))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -98,7 +97,8 @@ class Ball:
     @property
     def value(self) -> Array:
         """The midpoints, rounded to float64."""
-        return np.asarray(self.mid.high)
+        high: Array = self.mid.high
+        return high
 
     @property
     def error(self) -> Array:
@@ -199,17 +199,19 @@ class Ball:
 
 def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
     """Elements of `yes` where the condition is True, else of `no`, as in numpy.where."""
-    chosen: Ball = of_rows(partial(np.where, condition), yes, no)
-    return chosen
+    high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
+    return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     """The result of `function` on arrays, or on each of the arrays of pairs and balls."""
     first = values[0]
-    if not isinstance(first, (Ball, tuple)):
-        return function(*values)
-    rows = ((each.mid, each.radius) for each in values) if isinstance(first, Ball) else values
-    return type(first)(*(of_rows(function, *parts) for parts in zip(*rows, strict=True)))
+    if isinstance(first, Ball):
+        mid = of_rows(function, *[each.mid for each in values])
+        return Ball(mid, function(*[each.radius for each in values]))
+    if isinstance(first, tuple):
+        return type(first)(*[of_rows(function, *parts) for parts in zip(*values, strict=True)])
+    return function(*values)
 
 
 def joined(balls: Sequence[Ball]) -> Ball:
