@@ -36,9 +36,8 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
     n, error, layout = len(which), scene.point_error, scene.asperities.layout
     if kind == "lattice" or (kind is None and n > FEW_ASPERITIES):
-        if scene.lattice is not None:
-            whole, lattice = scene.contact_points, scene.lattice
-            return LatticeInfluence(whole, which, layout, lattice, scale, error)
+        if (lattice := scene.lattice) is not None:
+            return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
         if kind == "lattice":
             expected = "contact points on a two-dimensional lattice"
             if layout.lattice is not None:

@@ -106,10 +106,12 @@ class Mesh:
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W^T P for loads P (n,) as a field of the box, or |W|^T P if `absolute`."""
         field, column, width = self.box.field(loads.dtype), loads[:, None], self.splitting.width
-        x, y = (np.abs(each.high) if absolute else each.high for each in self.weights)
         for start, stop, i, j in self.patches:
             mine = slice(start, stop)
-            field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
+            x, y = (each.high[mine] for each in self.weights)
+            if absolute:
+                x, y = np.abs(x), np.abs(y)
+            field[i : i + width, j : j + width] += x.T @ (column[mine] * y)
         return field
 
     def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
@@ -276,8 +278,7 @@ class Product:
         There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
         times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
-        ordered, points = values[self.mesh.places], self.mesh.points
-        kernel, pulls = self._softer
+        ordered, points, kernel = values[self.mesh.places], self.mesh.points, self._softer
         total, n = np.zeros_like(points), len(points)
         for some, here in self.near.in_parts(PAIRS):
             there = self.near.upper.indices[some]
@@ -287,15 +288,18 @@ class Product:
                 pull = weights * apart[:, k]
                 total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
                 total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
-        for k, smooth in enumerate(pulls):
+        for k, smooth in enumerate(self._pulls):
             field = self.mesh.to_nodes(ordered)
             total[:, k] += self.mesh.from_nodes(self.mesh.box.convolve(field, 1j * smooth.spectrum))
         return self.mesh.back(total)
 
     @cached_property
-    def _softer(self) -> tuple[Softened, list[Kernel]]:
-        soft = Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
-        return soft, self.mesh.box.pulls(soft.smooth)
+    def _pulls(self) -> list[Kernel]:
+        return self.mesh.box.pulls(self._softer.smooth)
+
+    @property
+    def _softer(self) -> Softened:
+        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:

@@ -108,7 +108,7 @@ class ScatteredInfluence(coupling.Influence):
     def _sums(self) -> MatrixSums | MeshSums:
         if len(self) > FEW and self._double is not None:
             return MeshSums(self._double)
-        return MatrixSums(*self._known)
+        return MatrixSums(*coupling.known(self.points, self.tails, self.point_error))
 
     def smoother(self, root: Array) -> coupling.Smoother:
         return smoother_of_points(self.points, self.scale, root)
@@ -136,11 +136,7 @@ class ScatteredInfluence(coupling.Influence):
             self._products[power, dtype] = found or None
         return self._products[power, dtype]
 
-    @property
-    def _known(self) -> tuple[Pair, float]:
-        return coupling.known(self.points, self.tails, self.point_error)
-
     @cached_property
     def _unknown(self) -> float:
         """[length] bound on the error of each coordinate of `points` plus `tails`."""
-        return self._known[1]
+        return coupling.known(self.points, self.tails, self.point_error)[1]
