@@ -78,10 +78,8 @@ class Ball:
     @classmethod
     def stacked(cls, balls: list[Ball]) -> Ball:
         """Balls of the same shape, stacked along a new first axis."""
-        return cls(
-            Pair(np.stack([b.mid.high for b in balls]), np.stack([b.mid.low for b in balls])),
-            np.stack([b.radius for b in balls]),
-        )
+        mids = (np.stack(parts) for parts in zip(*(ball.mid for ball in balls), strict=True))
+        return cls(Pair(*mids), np.stack([ball.radius for ball in balls]))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -105,22 +103,19 @@ class Ball:
     @property
     def error(self) -> Array:
         """Bounds on the distance of the numbers of each ball from `value`."""
-        error: Array = (self.radius + np.abs(self.mid.low)) * UP
-        return error
+        return np.asarray((self.radius + np.abs(self.mid.low)) * UP)
 
     @property
     @quietly
     def lower(self) -> Array:
         """Lower bounds on the numbers of each ball."""
-        low: Array = self.mid.high - (self.radius - self.mid.low)
-        return np.asarray(low - self._margin)
+        return np.asarray(self.mid.high - (self.radius - self.mid.low) - self._margin)
 
     @property
     @quietly
     def upper(self) -> Array:
         """Upper bounds on the numbers of each ball."""
-        high: Array = self.mid.high + (self.radius + self.mid.low)
-        return np.asarray(high + self._margin)
+        return np.asarray(self.mid.high + (self.radius + self.mid.low) + self._margin)
 
     @property
     def _margin(self) -> Array:
@@ -130,8 +125,7 @@ class Ball:
     @property
     def size(self) -> Array:
         """Upper bounds on the absolute values of the numbers of each ball."""
-        size: Array = np.abs(self.mid.high) * UP + self.radius
-        return np.asarray(size * UP)
+        return np.asarray((np.abs(self.mid.high) * UP + self.radius) * UP)
 
     @property
     def positive(self) -> NDArray[np.bool_]:
@@ -212,12 +206,12 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     """The result of `function` on arrays, or on each of the arrays of pairs and balls."""
     first = values[0]
-    if isinstance(first, np.ndarray):
-        return function(*values)
     if isinstance(first, Ball):
-        pairs, radii = [each.mid for each in values], [each.radius for each in values]
-        return Ball(of_rows(function, *pairs), function(*radii))
-    return type(first)(*(of_rows(function, *parts) for parts in zip(*values, strict=True)))
+        mid = of_rows(function, *[each.mid for each in values])
+        return Ball(mid, function(*[each.radius for each in values]))
+    if isinstance(first, tuple):
+        return type(first)(*[of_rows(function, *parts) for parts in zip(*values, strict=True)])
+    return function(*values)
 
 
 def joined(balls: Sequence[Ball]) -> Ball:
@@ -243,7 +237,7 @@ def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
         operands = [part for ball in balls for part in (ball.mid, ball.radius)]
         return Ball(*_finished(*operation(*operands)))
     shape = np.broadcast_shapes(*(ball.shape for ball in balls))
-    flat = [ball if ball.radius.size == 1 else _flat(ball) for ball in balls]
+    flat = [ball if ball.radius.size == 1 else of_rows(np.ravel, ball) for ball in balls]
     high, low, radius = np.empty((3, count))
 
     def compute(some: slice) -> None:
@@ -254,10 +248,6 @@ def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
 
     threads.each(compute, threads.chunks(count, CHUNK), threads.worthwhile(count))
     return Ball(Pair(high.reshape(shape), low.reshape(shape)), radius.reshape(shape))
-
-
-def _flat(ball: Ball) -> Ball:
-    return Ball(Pair(ball.mid.high.ravel(), ball.mid.low.ravel()), ball.radius.ravel())
 
 
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
@@ -332,9 +322,7 @@ def _lost(result: Pair) -> Array:
 
 
 def residual(k: Ball, loads: Ball, displacement: Ball, offsets: Ball, approach: Ball) -> Ball:
-    """k P^(2/3) + v - d - D for coefficients k, loads P (0 if negative), displacements v, offsets d
-    and the approach D.
-    """
+    """k P^(2/3) + v - d - D for loads P (0 if negative)."""
     return elementwise(_residual, k, loads, displacement, offsets, approach)
 
 

@@ -34,24 +34,21 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     """
     if kind is not None and kind not in KINDS:
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
-    n, error = len(which), scene.point_error
-    lattice = scene.lattice if kind == "lattice" or (kind is None and n > FEW_ASPERITIES) else None
-    if lattice is not None:
-        layout = scene.asperities.layout
-        return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
+    n, error, layout = len(which), scene.point_error, scene.asperities.layout
+    if kind == "lattice" or (kind is None and n > FEW_ASPERITIES):
+        if (lattice := scene.lattice) is not None:
+            return LatticeInfluence(scene.contact_points, which, layout, lattice, scale, error)
+        if kind == "lattice":
+            expected = "contact points on a two-dimensional lattice"
+            if layout.lattice is not None:
+                expected += '; try equal tip radii, geometry "summit", or influence "scattered"'
+            raise InputError("influence", found="lattice", expected=expected)
     points = scene.contact_points[which]
     tails = None if scene.contact_tails is None else scene.contact_tails[which]
-    if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
+    if kind == "dense" or (kind is None and n <= FEW_SCATTERED):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
-            part = scene.asperities.layout.cached(_whole).restricted(which)
-            return DenseInfluence.of(points, scale, scale * part.matrix, part.sums)
-        return DenseInfluence.assemble(points, scale, error, tails)
-    if kind == "lattice":
-        expected = "contact points on a two-dimensional lattice"
-        if scene.asperities.lattice is not None:
-            expected += '; try equal tip radii, geometry "summit", or influence "scattered"'
-        raise InputError("influence", found="lattice", expected=expected)
-    if kind is None and n <= FEW_SCATTERED:
+            part = layout.cached(_whole).restricted(which)
+            return DenseInfluence(points, scale, scale * part.matrix, part.sums)
         return DenseInfluence.assemble(points, scale, error, tails)
     return ScatteredInfluence(points, scale, error, tails)
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,13 @@ from convexrough.roundoff import ROUNDOFF
 #: passes of radix 2, which have a larger error.
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed in groups that have this many bytes in each row and fit in the cache.
-ROW = 512
+#: Columns are transformed in groups that have ROW bytes in each row. Rows of a kernel are computed
+#: in groups of about LAID_OUT numbers, and rows of a field are transformed in groups of about
+#: IN_ROWS numbers. All groups fit in the cache.
+ROW, LAID_OUT, IN_ROWS = 512, 2**17, 2**16
 
-#: Rows of a kernel are computed in groups of about LAID_OUT numbers, and rows of a field are
-#: transformed in groups of about IN_ROWS numbers, which fit in the cache.
-LAID_OUT, IN_ROWS = 2**17, 2**16
-
-#: A function of i, j and squares: i are differences of the row numbers of two sites, j those of
-#: their column numbers, and squares (len(i), len(j)) the squared distances [spacing^2]. It returns
-#: for each kernel an array of values (len(i), len(j)).
+#: A function of differences i of row numbers and j of column numbers of two sites, and of squared
+#: distances (len(i), len(j)) [spacing^2]. It returns values (len(i), len(j)) of each kernel.
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
 #: A function of the transforms of some fields in a slice of columns, and of this slice. It returns
@@ -39,17 +37,11 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 @dataclass(frozen=True, eq=False)
 class SiteBox:
-    """A rectangle of lattice sites i b1 + j b2, with convolutions on it.
+    """A rectangle of lattice sites i b1 + j b2, with convolutions on it."""
 
-    shape  : numbers of rows and of columns of sites
-    basis  : (2, 2) [spacing] rows b1 and b2; the spacing is the length of the shorter one
-    extent : [spacing] upper bound on the distance between any two occupied sites (sites with a
-        point)
-    """
-
-    shape: tuple[int, int]
-    basis: Array
-    extent: float = np.inf
+    shape: tuple[int, int]  # numbers of rows and of columns of sites
+    basis: Array  # (2, 2) [spacing] rows b1 and b2; the shorter one has the length 1
+    extent: float = np.inf  # [spacing] at least the distance of any two sites with a point
 
     @cached_property
     def padded(self) -> tuple[int, int]:
@@ -86,7 +78,14 @@ class SiteBox:
     @cached_property
     def loss(self) -> float:
         """Bound on the error of a two-dimensional transform, in roundoffs of the 2-norm."""
-        return float(sum(_pass_roundoffs(length) for length in self.padded))
+        loss = 0.0
+        for length in self.padded:
+            for radix, cost in PASS_ROUNDOFFS.items():
+                while length % radix == 0:
+                    length //= radix
+                    loss += cost
+            assert length == 1  # next_fast_len returns only products of these radices
+        return loss
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
         """The kernel 1 / |i b1 + j b2|^power for all differences of occupied sites; 0 at (0, 0)."""
@@ -102,30 +101,28 @@ class SiteBox:
     def pulls(self, over_cube: Callable[[Array], Array]) -> list[Kernel]:
         """The odd kernels x / r^3 and y / r^3 for all differences (x, y) of two occupied sites.
 
-        over_cube : 1 / r^3 as a function of squared distances, or this function made smooth at
-            small r (`influence.softened`)
+        over_cube : 1 / r^3 as a function of squared distances, perhaps made smooth at small r
         """
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
             weights = over_cube(squares)
-            x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
-            return [weights * x, weights * y]
+            return [weights * away for away in self._differences(i, j)]
 
-        return self.kernels(values, np.float64, odd=True)
+        return self.kernels(values, np.float64, 2, odd=True)
 
-    def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
-        """Kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
+    def kernels(
+        self, values: Values, dtype: Any, count: int = 1, *, odd: bool = False
+    ) -> list[Kernel]:
+        """`count` kernels with K(-d) = K(d), or K(-d) = -K(d) if `odd`, from their `values`."""
         from scipy import fft
 
         rows, columns = self.padded
         last = rows // 2 + 1  # the transform of row -i is, up to sign, conjugate to that of row i
         shape, whole = (last, columns // 2 + 1), np.result_type(dtype, np.complex64)
-        nowhere = np.zeros(0, dtype=np.intp)
-        count = len(values(nowhere, nowhere, np.zeros((0, 0))))
         halves = [np.empty(shape, dtype=whole) for _ in range(count)]
         squares = np.empty((count, last))  # sums of squares of each row
 
-        def transform(taken: slice) -> None:
+        def along_rows(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # row i stands for row -i, too
             laid_out = self._laid_out(values, taken, count)
@@ -134,9 +131,18 @@ class SiteBox:
                 waves = fft.rfft(each.astype(dtype, copy=False), axis=1)
                 half[taken] = -1j * waves if odd else waves
 
-        threads.each(transform, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
+        def along_columns(half: NDArray[Any]) -> NDArray[Any]:
+            spectrum = np.empty((rows, shape[1]), dtype=half.real.dtype)
+
+            def transform(each: slice) -> None:
+                spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
+
+            threads.each(transform, in_blocks(half), self.workers)
+            return spectrum
+
+        threads.each(along_rows, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
         norms = np.sqrt(squares.sum(axis=1)).tolist()
-        return [Kernel(self._spectrum(halves.pop(0)), norm) for norm in norms]
+        return [Kernel(along_columns(halves.pop(0)), norm) for norm in norms]
 
     def _laid_out(self, values: Values, taken: slice, count: int) -> list[Array]:
         """The values of `count` kernels in some rows of the padded box.
@@ -144,105 +150,73 @@ class SiteBox:
         If several differences of sites share an entry of the box, its value is that of the shortest
         difference. Beyond `extent` values are 0.
         """
-        shape = taken.stop - taken.start, self.padded[1]
-        squares, found = np.full(shape, np.inf), [np.zeros(shape) for _ in range(count)]
-        for within, places, i, j in self._images(taken):
-            shorter = self._lengths(i, j)
-            nearer = shorter < squares[within, places]
-            np.copyto(squares[within, places], shorter, where=nearer)
+        (rows, columns), (height, width) = self.shape, self.padded
+        squares = np.full((taken.stop - taken.start, width), np.inf)
+        found = [np.zeros_like(squares) for _ in range(count)]
+        right = slice(columns), np.arange(columns)
+        left = slice(width + 1 - columns, width), np.arange(1 - columns, 0)
+        for shift, (across, j) in product((0, height), (right, left)):
+            first = max(taken.start, shift + 1 - rows)
+            last = max(first, min(taken.stop, shift + rows))
+            i = np.arange(first, last) - shift
+            here = slice(first - taken.start, last - taken.start), across
+            shorter, y = self._differences(i, j)
+            shorter *= shorter
+            y *= y
+            shorter += y
+            nearer = shorter < squares[here]
+            np.copyto(squares[here], shorter, where=nearer)
             for whole, part in zip(found, values(i, j, shorter), strict=True):
-                np.copyto(whole[within, places], part, where=nearer)
+                np.copyto(whole[here], part, where=nearer)
         if self.extent < np.inf:
             beyond = squares > self.extent**2
             for whole in found:
                 whole[beyond] = 0.0
         return found
 
-    def _spectrum(self, half: NDArray[Any]) -> NDArray[Any]:
-        """The transform of an even kernel, from the transforms of its rows 0, 1, ...
+    def _differences(self, i: Indices, j: Indices) -> tuple[Array, Array]:
+        """(len(i), len(j)) [spacing] the coordinates x and y of i b1 + j b2."""
+        x, y = (np.add.outer(i * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1))
+        return x, y
 
-        For an odd kernel, `half` is -i times these transforms, and the result is the imaginary part
-        of the transform.
-        """
-        from scipy import fft
-
-        rows = self.padded[0]
-        spectrum = np.empty((rows, half.shape[1]), dtype=half.real.dtype)
-
-        def transform(each: slice) -> None:
-            spectrum[:, each] = fft.hfft(half[:, each], rows, axis=0)
-
-        threads.each(transform, in_blocks(half), self.workers)
-        return spectrum
-
-    def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Yield blocks of the rows `taken` of the padded box.
-
-        A block is a slice of these rows, counted from the first, a slice of columns, and the
-        differences i and j of sites that belong to these rows and columns.
-        """
-        (rows, columns), (height, width) = self.shape, self.padded
-        right, left = np.arange(columns), np.arange(1 - columns, 0)
-        for shift in (0, height):
-            first = max(taken.start, shift + 1 - rows)
-            last = max(first, min(taken.stop, shift + rows))
-            within, i = (
-                slice(first - taken.start, last - taken.start),
-                np.arange(first, last) - shift,
-            )
-            yield within, slice(columns), i, right
-            yield within, slice(width + 1 - columns, width), i, left
-
-    def _lengths(self, i: Indices, j: Indices) -> Array:
-        """(len(i), len(j)) [spacing^2] the squared lengths |i b1 + j b2|^2."""
-        x: Array = np.add.outer(i * self.basis[0, 0], j * self.basis[1, 0])
-        y: Array = np.add.outer(i * self.basis[0, 1], j * self.basis[1, 1])
-        x *= x
-        y *= y
-        x += y
-        return x
+    def field(self, dtype: Any) -> NDArray[Any]:
+        """Zeros at all sites, in an array (rows, stride) with room for the transform of rows."""
+        return np.zeros((self.shape[0], self.stride), dtype=dtype)
 
     def laid_out(self, values: NDArray[Any], places: Indices) -> NDArray[Any]:
-        """The field (rows, stride) with values (n,) at some sites, and zeros elsewhere.
-
-        places : (n,) flat indices of these sites in the field
-        """
-        field = np.zeros((self.shape[0], self.stride), dtype=values.dtype)
+        """The `field` with values (n,) at the flat indices `places` (n,), and zeros elsewhere."""
+        field = self.field(values.dtype)
         field.ravel()[places] = values  # where points coincide, the last value remains
         return field
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field (rows, columns) with a kernel.
-
-        A field of the shape (rows, stride) is overwritten by the result, which saves memory.
-        """
+        """The convolution of a `field` with a kernel, in the memory of the field."""
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             waves[0] *= spectrum[:, each]
             return waves
 
-        return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
+        return through_waves([field], self.padded, self.workers, multiply)[0]
+
+    def convolve_at(
+        self, places: Indices, values: NDArray[Any], spectrum: NDArray[Any]
+    ) -> NDArray[Any]:
+        """(n,) the convolution at the sites with the flat indices `places` of values there."""
+        return self.convolve(self.laid_out(values, places), spectrum).ravel()[places]
 
     def bound(self, norm: float, roundoff: float = ROUNDOFF, operations: int = 4) -> float:
         """Bound on each component of the error of `convolve`, divided by the 2-norm of the field.
 
-        This is formula (1) of docs/theory/operators-lattice.md, "Rounding".
-
-        norm : 2-norm of the kernel
+        It is (1) of docs/theory/operators-lattice.md, "Rounding"; `norm` is that of the kernel.
         """
         return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * self.loss + operations) * norm
 
 
-@dataclass(frozen=True, eq=False)
-class Kernel:
-    """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary.
+class Kernel(NamedTuple):
+    """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary."""
 
-    spectrum : the transform, or the imaginary part of the transform
-    norm     : the 2-norm of the kernel
-    """
-
-    spectrum: NDArray[Any]
-    norm: float
+    spectrum: NDArray[Any]  # the transform, or the imaginary part of the transform
+    norm: float  # the 2-norm of the kernel
 
 
 def through_waves(
@@ -250,25 +224,16 @@ def through_waves(
 ) -> list[NDArray[Any]]:
     """Transform fields, pass the transforms to `mix`, and transform back what it returns.
 
-    In the results, columns beyond those of a given field have no meaning.
-
-    fields : (rows, columns) each, padded with zeros before the transform; they are read one by one.
-        A field of the shape (rows, stride), with `SiteBox.stride`, is overwritten by its result,
-        which saves memory
+    Fields are (rows, stride), as `SiteBox.field` makes them, and are read one by one. Each result
+    is in the memory of its field; its columns beyond those of the sites have no meaning.
     """
     from scipy import fft
 
     height, width = padded
-    stride = 2 * (width // 2 + 1)
     halves: list[NDArray[Any]] = []  # the transforms of rows
-    placed: list[bool] = []  # True if in the memory of the field
     for field in fields:
-        if field.shape[1] == stride:
-            halves.append(field.view(np.complex64 if field.dtype == np.float32 else np.complex128))
-            _row_by_row(partial(fft.rfft, axis=1), field[:, :width], halves[-1], workers)
-        else:
-            halves.append(fft.rfft(field, width, axis=1, workers=workers))
-        placed.append(field.shape[1] == stride)
+        halves.append(field.view(np.result_type(field.dtype, np.complex64)))
+        _row_by_row(partial(fft.rfft, axis=1), field[:, :width], halves[-1], workers)
     rows = len(halves[0])
 
     def work(each: slice) -> None:
@@ -277,13 +242,9 @@ def through_waves(
             half[:, each] = fft.ifft(full, axis=0, overwrite_x=True)[:rows]
 
     threads.each(work, in_blocks(halves[0]), workers)
-    found = []
-    for half, in_place in zip(halves, placed, strict=True):
-        if in_place:
-            found.append(half.view(half.real.dtype))
-            _row_by_row(partial(fft.irfft, n=width, axis=1), half, found[-1][:, :width], workers)
-        else:
-            found.append(fft.irfft(half, width, axis=1, overwrite_x=True, workers=workers))
+    found = [half.view(half.real.dtype) for half in halves]
+    for half, field in zip(halves, found, strict=True):
+        _row_by_row(partial(fft.irfft, n=width, axis=1), half, field[:, :width], workers)
     return found
 
 
@@ -298,10 +259,7 @@ def _row_by_row(
     def work(some: slice) -> None:
         into[some] = transform(given[some])
 
-    if given.size <= IN_ROWS:
-        work(slice(None))
-    else:
-        threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
+    threads.each(work, threads.chunks(len(given), max(1, IN_ROWS // given.shape[1])), workers)
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
@@ -312,13 +270,3 @@ def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
 def _least(sites: int, twice: int, length: float) -> int:
     """A padded number of sites: above `length`, at least `sites`, but never above `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
-
-
-def _pass_roundoffs(length: int) -> int:
-    total = 0
-    for radix, cost in PASS_ROUNDOFFS.items():
-        while length % radix == 0:
-            length //= radix
-            total += cost
-    assert length == 1  # next_fast_len returns only products of these radices
-    return total

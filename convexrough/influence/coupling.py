@@ -9,21 +9,30 @@ P the loads, r_ij the distance of the points i and j.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from functools import cached_property
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
+from convexrough.roundoff import ROUNDOFF
+from convexrough.scene import neighbours
 
 #: Bound on the relative error of a computed 1 / (pi E* r) for exact points, in units of the
 #: roundoff. In these units, the error of a difference of coordinates is at most 1; that of its
 #: square 3, of the sum of squares 4, of the root 3, and of the result 8.
 ENTRY_ROUNDOFFS = 8
+
+#: A matrix of 1 / r between asperities and other points is cached if it has at most this many
+#: entries; for larger matrices a cache saves no time.
+KEPT = 2**16
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
@@ -48,124 +57,164 @@ class Rounding(NamedTuple):
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
-        """A 2-norm of the residual at which solvers can stop, as it is far below these bounds.
-
-        displacement : A P as computed
-        """
+        """A 2-norm of the residual, far below these bounds for A P, at which solvers can stop."""
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.each * math.sqrt(len(displacement))
 
 
-class Coupling(Protocol):
+class Coupling(ABC):
     """A linear map from loads at the asperities to displacements at some points."""
 
+    @abstractmethod
     def apply(self, loads: Array) -> Array:
         """(m,) A P for loads (n,); in float32 if the loads are float32 and float32 is faster."""
-        ...
 
+    @abstractmethod
     def rounding(self, loads: Array) -> Rounding:
         """Bound on the error of `apply` for float64 loads."""
-        ...
 
+    @abstractmethod
     def falloff(self, strengths: Array, power: int) -> Array:
         """(m,) upper bounds on sum_j strengths_j / r_ij^power, often a few per cent too large.
 
-        strengths : (n,) not negative
-        power     : 2 or 3
+        The `strengths` (n,) are not negative; `power` is 2 or 3.
         """
-        ...
 
 
-class Influence(Coupling, Protocol):
-    """The compliance operator A among asperities, A_ij = scale / r_ij.
+class Influence(Coupling):
+    """The compliance operator A among asperities, A_ij = scale / r_ij."""
 
-    name   : "dense", "lattice" or "scattered"
-    points : (n, 2) [length] the contact points
-    scale  : 1 / (pi E*) with the contact modulus E*, in the units of loads and displacements
-    stored : True if the matrix is stored; if False, products with float32 loads are cheaper
-    cheap_sums : True if `sums` takes only a few times as long as `apply`. Then Newton's method ends
-        early, and `normal.refine` makes the last steps with `sums`
-    """
+    name: ClassVar[Kind]
+    #: True if the matrix is stored; if False, products with float32 loads are cheaper.
+    stored: ClassVar[bool] = False
+    #: True if `sums` takes only a few times as long as `apply`. Then Newton's method ends early,
+    #: and `normal.refine` makes the last steps with `sums`.
+    cheap_sums: ClassVar[bool] = False
 
-    @property
-    def name(self) -> Kind: ...
-    @property
-    def points(self) -> Array: ...
-    @property
-    def scale(self) -> float: ...
-    @property
-    def stored(self) -> bool: ...
-    @property
-    def cheap_sums(self) -> bool: ...
+    points: Array  # (n, 2) [length] the contact points
+    scale: float  # 1 / (pi E*) with the contact modulus E*, in the units of loads, displacements
+    point_error: float  # [length] bound on the error of each coordinate of `points`
+
+    #: (n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
+    sums: Callable[[Pair], Ball]
+
+    def __len__(self) -> int:
+        return len(self.points)
 
     @property
     def matrix(self) -> Array:
         """(n, n) A as a matrix, which must fit in memory."""
-        ...
+        return dense_matrix(self.points, self.scale)
 
     def submatrix(self, which: Indices) -> Array:
         """(m, m) A among some of the asperities, as a new array."""
-        ...
+        return dense_matrix(self.points[which], self.scale)
 
-    @property
+    @cached_property
     def entry_error(self) -> float:
         """Bound on the relative error of each entry of `matrix`."""
-        ...
+        if self.point_error == 0:
+            return entry_error(0.0, np.inf)
+        return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
 
-    def __len__(self) -> int: ...
-
+    @abstractmethod
     def restricted(self, which: Indices) -> Influence:
         """The operator among some of the asperities."""
-        ...
 
     def onto(self, points: Array) -> Coupling:
         """The map from loads to displacements at other points; a load at such a point adds 0."""
-        ...
+        return DirectCoupling(self.points, points, self.scale, self.point_error)
 
     def slopes(self, loads: Array) -> Array:
         """(n, 2) derivatives of (A P)_i with respect to the contact point c_i of asperity i.
 
         They are -scale sum_j (c_i - c_j) P_j / r_ij^3, without a bound on the rounding error.
         """
-        ...
+        points, total = self.points, np.empty((len(self), 2))
+        for some in _rows(len(self), len(self)):
+            weights = cubed(squared_distances(points[some], points)) * loads
+            for k in (0, 1):
+                apart = np.subtract.outer(points[some, k], points[:, k])
+                total[some, k] = (weights * apart).sum(axis=1)
+        return -self.scale * total
 
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distances of asperities to their nearest neighbours."""
-        ...
+        if len(self) < 2:
+            return np.full(len(self), np.inf)
+        return np.maximum(self._nearest - 3.0 * self.point_error, 0.0)
+
+    @property
+    def _nearest(self) -> Array:
+        """(n,) [length] distances of points to their nearest neighbours, perhaps rounded down."""
+        return neighbours.nearest_distances(self.points)
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij; the `radii` a (n,) are contact radii, 0 where open."""
-        ...
+        return neighbours.crowding(self.points, radii)
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite; else False.
-
-        Only the operator on a lattice proves it.
-        """
-        ...
-
-    def sums(self, loads: Pair) -> Ball:
-        """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`."""
-        ...
+        """True if A + (scale / radius) I is proved positive semidefinite: only on a lattice."""
+        return False
 
     def smoother(self, root: Array) -> Smoother | None:
-        """A symmetric, positive definite approximation of (I + W A W)^-1, with W = diag(root).
-
-        None if no approximation is available.
-        """
-        ...
+        """A symmetric, positive definite estimate of (I + W A W)^-1, W = diag(root), or None."""
+        return None
 
 
 @dataclass(frozen=True, eq=False)
-class JointCoupling:
-    """The map from loads on the last points of an operator to displacements of the first points.
+class DirectCoupling(Coupling):
+    """The map from loads at `points` (n, 2) to displacements at `targets` (m, 2), pair by pair."""
 
-    joint : the operator among all points
-    targets : number of first points; displacements are computed at these points
-    """
+    points: Array
+    targets: Array
+    scale: float
+    point_error: float
 
-    joint: Influence
-    targets: int
+    def apply(self, loads: Array) -> Array:
+        return self.scale * self._sums(loads, 1)
+
+    def rounding(self, loads: Array) -> Rounding:
+        terms = len(self.points) + 1
+        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0)
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
+        return self._sums(strengths, power) * (1.0 + 1.01 * loss)
+
+    def _sums(self, values: Array, power: int) -> Array:
+        total = np.empty(len(self.targets))
+        for block, inverse in self._blocks():
+            total[block] = (inverse if power == 1 else inverse**power) @ values
+        return total
+
+    @cached_property
+    def _whole(self) -> Array:
+        return inverse_distances(self.targets, self.points)
+
+    def _blocks(self) -> Iterator[tuple[slice, Array]]:
+        """Blocks of rows of the matrix 1 / r, each with its slice; a small matrix is one block."""
+        if len(self.points) * len(self.targets) <= KEPT:
+            yield slice(None), self._whole
+            return
+        for block in _rows(len(self.targets), len(self.points)):
+            yield block, inverse_distances(self.targets[block], self.points)
+
+    @cached_property
+    def _entry_error(self) -> float:
+        if self.point_error == 0:
+            return entry_error(0.0, np.inf)
+        largest = [float(inverse.max(initial=0.0)) for _, inverse in self._blocks()]
+        closest = max(largest, default=0.0)
+        return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCoupling(Coupling):
+    """The map from loads on the last points of an operator to displacements of the first points."""
+
+    joint: Influence  # among all points
+    targets: int  # number of first points; displacements are computed at these points
 
     def apply(self, loads: Array) -> Array:
         return self.joint.apply(self._all(loads))[: self.targets]
@@ -191,11 +240,31 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
     """The points (n, 2) as double-double numbers, and a bound on the errors of their coordinates.
 
-    tails : the low parts of the numbers; if None, they are 0 and the bound is `point_error`
+    The low parts are `tails`; if these are None, they are 0 and the bound is `point_error`.
     """
     if tails is None:
         return Pair.exact(points), point_error
     return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))
+
+
+def dense_matrix(points: Array, scale: float) -> Array:
+    """The matrix (n, n) of A_ij = scale / r_ij; raises InputError if it does not fit in memory."""
+    checks.fits_in_memory("asperities that could touch", len(points), 5 * 8, power=2)
+    matrix = inverse_distances(points, points)
+    matrix *= scale
+    return matrix
+
+
+def entry_error(point_error: float, nearest: float) -> float:
+    """Bound on the relative error of a computed scale / r, for distances r >= `nearest`."""
+    x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
+    moved = x / (1.0 - x) if x < 1 else np.inf
+    return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
+
+
+def _rows(count: int, columns: int) -> Iterator[slice]:
+    """Slices of the rows of a matrix, of about 2^22 entries each."""
+    return threads.chunks(count, max(1, 2**22 // max(1, columns)))
 
 
 def squared_distances(points: Array, others: Array) -> Array:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -21,25 +21,16 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import Pair, two_product, two_sum
+from convexrough.arithmetic.pairs import Pair, in_parts, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
+from convexrough.influence import coupling
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
-from convexrough.influence.coupling import (
-    Coupling,
-    JointCoupling,
-    Kind,
-    Rounding,
-    Smoother,
-    cubed,
-)
-from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, MANY, SLICES, Distances, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import Layout
-from convexrough.scene.neighbours import crowding, separations
 
 Made = TypeVar("Made")
 
@@ -50,7 +41,7 @@ ENTRY_ROUNDOFFS = 24
 #: Number of array elements in a block, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
-#: Fraction of occupied sites of a box below which a k-d tree finds neighbours. A heuristic: it
+#: Fraction of occupied sites of a box up to which a k-d tree finds neighbours. A heuristic: it
 #: affects speed, and the lower bounds on nearest distances, from which shells are computed
 #: (docs/theory/convexity.md).
 FILLED = 0.2
@@ -66,34 +57,28 @@ LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
-class LatticeInfluence:
+class LatticeInfluence(coupling.Influence):
     """The compliance operator of asperities on a lattice; see `coupling.Influence`.
 
-    array       : (N, 2) [length] contact points, with an error of at most `point_error` in each
-        coordinate
-    members     : (n,) indices of the operator's asperities in `array`
-    layout      : the exact positions of the summits. Multiplied by the factors `lattice.shrink`
-        along x and y, and rounded, they are the points in `array`. The factors are 1 in the
-        geometry "summit", and R / (R + tip radius) in "closest", with the radius R of the sphere
-    lattice     : the lattice of the points
-    scale       : 1 / (pi E*), which is A_ij r_ij
+    The points in `array` are the exact positions of the summits, multiplied by the factors
+    `lattice.shrink` along x and y, and rounded. The factors are 1 in the geometry "summit", and
+    R / (R + tip radius) in "closest", with the radius R of the sphere.
     """
 
-    array: Array
-    members: Indices
-    layout: Layout
-    lattice: Lattice
+    array: Array  # (N, 2) [length] contact points
+    members: Indices  # (n,) indices of the operator's asperities in `array`
+    layout: Layout  # the exact positions of the summits
+    lattice: Lattice  # that of the points in `array`
     scale: float
     point_error: float = 0.0
 
-    name: ClassVar[Kind] = "lattice"
-    stored: ClassVar[bool] = False
+    name: ClassVar[coupling.Kind] = "lattice"
     cheap_sums: ClassVar[bool] = True
 
     @cached_property
     def _boxed(self) -> tuple[SiteBox, Indices]:
-        """The box, and (n,) flat indices of the asperities' sites in a field of the box."""
-        basis, (i, j) = self.lattice.basis / self.spacing, self.places
+        """The smallest box of sites that holds the asperities, and (n,) their flat indices."""
+        basis, (i, j) = self.lattice.basis / self.lattice.spacing, self.places
         if len(i) == 0:
             return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
         i, j = i - i.min(), j - j.min()
@@ -104,8 +89,7 @@ class LatticeInfluence:
     def _boxed_for(self, loads: Array) -> tuple[SiteBox, Indices]:
         """The box and the indices of `_boxed`, but with transforms that suffice for these loads.
 
-        If only asperities near the middle carry loads, the transforms are smaller: the extent of
-        the box need only bound the distances of all asperities from the loaded ones.
+        The extent of this box need only bound the distances of all asperities from the loaded ones.
         """
         box, loaded, (i, j) = self.box, loads.nonzero()[0], self.cells
         reach = _farthest(i[loaded], j[loaded], box.shape, box.basis)
@@ -113,12 +97,11 @@ class LatticeInfluence:
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = self._keep("boxed", (reach, box, i * np.intp(box.stride) + j))
+            last = self._cached("boxed", lambda: (reach, box, i * np.intp(box.stride) + j))
         return last[1:]
 
     @property
     def box(self) -> SiteBox:
-        """The smallest box of sites that holds the asperities."""
         return self._boxed[0]
 
     @property
@@ -127,43 +110,40 @@ class LatticeInfluence:
         rows, columns = np.divmod(self._boxed[1], self.box.stride)
         return rows, columns
 
-    @cached_property
-    def spacing(self) -> float:
-        """[length] the shortest distance between two sites."""
-        return self.lattice.spacing
-
     @property
     def site_error(self) -> float:
         """[spacing] bound on |(x_i - x_j) - (s_i - s_j)|, where s_i is the site of point x_i."""
-        return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.spacing
+        return 2.0 * math.sqrt(2.0) * self.lattice.site_error / self.lattice.spacing
 
     def apply(self, loads: Array) -> Array:
-        dtype = np.float32 if loads.dtype == np.float32 else np.float64
-        product = self._convolve(loads.astype(dtype, copy=False), self._spectrum(dtype))
-        product *= dtype(self._unit)
+        single = loads.dtype == np.float32
+        loads = loads if single else loads.astype(np.float64, copy=False)
+        box, places = self._boxed
+        spectrum = self._single if single else self._kernel.spectrum
+        product = box.convolve_at(places, loads, spectrum)
+        product *= loads.dtype.type(self._unit)
         return product
 
-    def rounding(self, loads: Array) -> Rounding:
+    def rounding(self, loads: Array) -> coupling.Rounding:
         # Deviations of points from their sites change 1/r by at most site_error / r^2. The largest
         # sum of site_error / r^2 in a row bounds the change of a component.
         each = self.box.bound(self._kernel.norm) * float(np.linalg.norm(loads))
         each += self._displaced * float(np.abs(loads).max(initial=0.0))
-        return Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
+        return coupling.Rounding(1.01 * ENTRY_ROUNDOFFS * ROUNDOFF, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(n,) upper bounds on sum_j strengths_j / r_ij^power, from sums in single precision."""
-        kernel = self.box.kernel(power, np.float32)
-        largest = float(strengths.max(initial=0.0)) or 1.0
+        (box, places), largest = self._boxed, float(strengths.max(initial=0.0)) or 1.0
+        kernel = box.kernel(power, np.float32)
         shares = (strengths / largest).astype(np.float32)
-        total = self._convolve(shares, kernel.spectrum).astype(np.float64)
-        total += self.box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
-        stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
+        total = box.convolve_at(places, shares, kernel.spectrum).astype(np.float64)
+        total += box.bound(kernel.norm, 2.0**-24) * float(np.linalg.norm(shares))
+        stretched = (1.0 + 1e-6) / (self._least * self.lattice.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
     @property
     def _unit(self) -> float:
         """The entry A_ij for two sites at the distance `spacing`."""
-        return self.scale / self.spacing
+        return self.scale / self.lattice.spacing
 
     @property
     def _least(self) -> float:
@@ -185,30 +165,19 @@ class LatticeInfluence:
             return self._kernel.spectrum.astype(np.float32)
         return self.box.kernel(1, np.float32).spectrum
 
-    def _spectrum(self, dtype: Any) -> NDArray[Any]:
-        return self._single if dtype == np.float32 else self._kernel.spectrum
-
-    def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        box, places = self._boxed
-        return box.convolve(box.laid_out(values, places), spectrum).ravel()[places]
-
     def __len__(self) -> int:
         return len(self.members)
 
     @property
-    def points(self) -> Array:
+    def points(self) -> Array:  # type: ignore[override]
         return self.array[self.members]
 
-    @property
-    def matrix(self) -> Array:
-        return dense_matrix(self.points, self.scale)
-
     def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.array[self.members[which]], self.scale)
+        return coupling.dense_matrix(self.array[self.members[which]], self.scale)
 
-    @property
+    @cached_property
     def entry_error(self) -> float:
-        return entry_error(self.point_error, self.spacing * self._least)
+        return coupling.entry_error(self.point_error, self.lattice.spacing * self._least)
 
     @property
     def places(self) -> tuple[Indices, Indices]:
@@ -219,45 +188,30 @@ class LatticeInfluence:
 
     def restricted(self, which: Indices) -> LatticeInfluence:
         members = self.members[which]
-        last: LatticeInfluence | None = self._kept.get("part")
-        if last is None or not np.array_equal(last.members, members):
-            last = self._keep("part", replace(self, members=members))
-        return last
+        if "part" in self._kept and not np.array_equal(self._kept["part"].members, members):
+            del self._kept["part"]
+        return self._cached("part", lambda: replace(self, members=members))
 
-    def onto(self, points: Array) -> Coupling:
+    def onto(self, points: Array) -> coupling.Coupling:
         places = self.lattice.sites(points)
         if places is None:
-            return DenseCoupling(self.points, points, self.scale, self.point_error)
+            return super().onto(points)
         together = np.concatenate((points, self.points))
         sites = np.concatenate((places, np.stack(self.places, axis=1)))
         layout = Layout(together, (self.lattice, sites))
         joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
-        return JointCoupling(joint, len(points))
-
-    @property
-    def _filled(self) -> bool:
-        """True if asperities occupy more than the fraction `FILLED` of the sites of the box."""
-        return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
+        return coupling.JointCoupling(joint, len(points))
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-
-        def sums(pull: Kernel) -> Array:
-            field = box.convolve(box.laid_out(loads, places), 1j * pull.spectrum)
-            return np.asarray(field.ravel()[places])
-
-        each = [sums(pull) for pull in self._pulls(box)]
-        return -self.scale / self.spacing**2 * np.stack(each, axis=1)
-
-    def _pulls(self, box: SiteBox) -> list[Kernel]:
-        """The kernels d_x / |d|^3 and d_y / |d|^3 of the difference d of two sites [spacing]."""
-        return self._cached("pulls", lambda: box.pulls(cubed))
+        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
+        each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
+        return -self.scale / self.lattice.spacing**2 * np.stack(each, axis=1)
 
     def separations(self) -> Array:
-        if not self._filled:
-            return separations(self.points, self.point_error)
-        nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
-        return even(nearest, len(self))
+        if len(self) <= FILLED * math.prod(self.box.shape):
+            return super().separations()
+        return even(self._at_least(1.0) if len(self) > 1 else np.inf, len(self))
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij, for contact radii a.
@@ -266,8 +220,8 @@ class LatticeInfluence:
         1, then all with 2, and so on, until no farther pair can exceed the largest ratio found. On
         a reduced basis these differences have lengths of at least 0.8, 1.6, ... times the spacing.
         """
-        if not self._filled:
-            return crowding(self.points, radii)
+        if len(self) <= FILLED * math.prod(self.box.shape):
+            return super().crowding(radii)
         (rows, columns), stride, places = self.box.shape, self.box.stride, self._boxed[1]
         most, worst = 2.0 * float(radii.max()), 0.0
         for reach in range(1, max(rows, columns)):
@@ -285,37 +239,27 @@ class LatticeInfluence:
 
     def _at_least(self, length: float) -> float:
         """[length] lower bound on the distance of points on sites this far apart [spacing]."""
-        return self.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
+        return self.lattice.spacing * (length - self.site_error) * (1.0 - 8 * ROUNDOFF)
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if A + (scale / radius) I is proved positive semidefinite.
-
-        The proof uses a lower bound on the symbol (the Fourier transform of the kernel), which is
-        also a lower bound on the eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
-        """
-        if radius * LEAST_NEGATIVE > self.spacing:
+        # A lower bound on the symbol (the Fourier transform of the kernel) is also one on the
+        # eigenvalues of A (docs/theory/operators-lattice.md, "The symbol").
+        if radius * LEAST_NEGATIVE > self.lattice.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
-        return -least * radius * (1.0 + SAFETY) <= self.spacing
+        return -least * radius * (1.0 + SAFETY) <= self.lattice.spacing
 
     @property
     def least_slices(self) -> int:
         """The number of slices that a press needs."""
-        return SLICES + int(self.sites > LARGE)
-
-    @property
-    def sites(self) -> int:
-        """The number of sites of the box."""
-        return math.prod(self.box.shape)
+        return SLICES + int(math.prod(self.box.shape) > LARGE)
 
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
-        """(n,) sums over j of P_j / r_ij [force / length], with many more digits than `apply`.
+        """(n,) sums over j of P_j / r_ij, from slices (docs/theory/operators-lattice.md, "Slices").
 
-        slices : number of parts of 10 to 18 bits into which loads and kernel are divided
-            (docs/theory/operators-lattice.md, "Slices"). By default it is 3, or 4 if the box has
-            more than `MANY` sites; friction needs as many
+        By default there are 3 slices, or 4 on more than `MANY` sites; friction needs as many.
         """
-        slices = slices or SLICES + int(self.sites > MANY)
+        slices = slices or SLICES + int(math.prod(self.box.shape) > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._cached(slices, lambda: self._slice(box, slices))
@@ -323,9 +267,7 @@ class LatticeInfluence:
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """The object that `make` returns, computed once unless there are many asperities."""
-        return self._kept[name] if name in self._kept else self._keep(name, make())
-
-    def _keep(self, name: object, made: Made) -> Made:
+        made: Made = self._kept[name] if name in self._kept else make()
         if len(self) <= MOST_KEPT:
             self._kept[name] = made
         return made
@@ -336,27 +278,28 @@ class LatticeInfluence:
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:
-        unit = float(2.0 ** np.floor(np.log2(self.spacing)))
+        unit = float(2.0 ** np.floor(np.log2(self.lattice.spacing)))
         basis = [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
         distances = Distances.of(basis, max(box.shape))
-        norm = self._kernel.norm * unit / self.spacing
+        norm = self._kernel.norm * unit / self.lattice.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
     def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
         """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
 
-        The expansion is derived in docs/theory/operators-lattice.md, "Points off their sites".
+        docs/theory/operators-lattice.md, "Points off their sites", derives the expansion.
         """
         layout = self.layout
         x, y, unknown = layout.cached(off_sites) if len(self) <= MOST_KEPT else off_sites(layout)
-        shrunk = [float(factor) / self.spacing for factor in self.lattice.shrink]
+        shrunk = [float(factor) / self.lattice.spacing for factor in self.lattice.shrink]
         x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
         most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-9)
         unknown = max(shrunk) * unknown + 8 * ROUNDOFF * most
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
-        shares, pulls = loads / top, self._pulls(box)
+        shares = loads / top
+        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
@@ -377,10 +320,10 @@ class LatticeInfluence:
         error = 2.0 * box.bound(norm, operations=10) * most * float(np.linalg.norm(shares))
         error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
         error += 4 * ROUNDOFF * size
-        unit = top / self.spacing
+        unit = top / self.lattice.spacing
         return Ball.around(change * unit, 1.01 * error * unit)
 
-    def smoother(self, root: Array) -> Smoother:
+    def smoother(self, root: Array) -> coupling.Smoother:
         return block_smoother(np.stack(self.cells), self.box.basis, self._unit, root)
 
 
@@ -398,27 +341,22 @@ def _largest_sum(values: Array, apart: int) -> float:
 def off_sites(layout: Layout) -> tuple[Array, Array, float]:
     """(N,), (N,) [length] x and y deviations of points from their sites, and their error bound.
 
-    The deviation of a point p from its site (i, j) is p - o - i b1 - j b2, with the origin o and
-    the basis b1, b2 of the lattice. It is computed in double-double arithmetic and rounded at the
-    end.
+    That of a point p is p - o - i b1 - j b2 with the lattice's origin o, rounded at the end.
     """
     assert layout.lattice is not None
     assert layout.sites is not None
     lattice, sites, points = layout.lattice, layout.sites, layout.points
-    away = np.empty((2, len(points)))
 
-    def look(some: slice) -> None:
-        steps = sites[some].astype(np.float64)
-        for k in (0, 1):
-            left = Pair(*two_sum(points[some, k], -lattice.origin[k]))
-            for n in (0, 1):
-                left -= Pair(*two_product(steps[:, n], lattice.basis[n, k]))
-            away[k, some] = left.high
+    def away(k: int, some: slice) -> Pair:
+        left = Pair(*two_sum(points[some, k], -lattice.origin[k]))
+        for n in (0, 1):
+            left -= Pair(*two_product(sites[some, n].astype(np.float64), lattice.basis[n, k]))
+        return left
 
-    threads.each(look, threads.chunks(len(points), CHUNK), threads.worthwhile(len(points)))
+    x, y = (in_parts(len(points), partial(away, k)).high for k in (0, 1))
     most = float(np.abs(sites).max(initial=0))
     largest = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
-    return away[0], away[1], 96 * ROUNDOFF**2 * largest
+    return x, y, 96 * ROUNDOFF**2 * largest
 
 
 def _least_symbol(lattice: Lattice) -> float:

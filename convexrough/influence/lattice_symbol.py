@@ -90,18 +90,16 @@ class _Symbol:
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
         """(m,) f in the middles c of parts of the dual lattice, and lower bounds on f in each part.
 
-        Each bound is the larger of two bounds. All points of a part are within rho of c, and no
-        second derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a
-        bound. For the other bound, each cosine is replaced by -1, and each |k + G| by an upper
-        bound, because E decreases.
-
-        cells : (m, 2) middles c in units of g1 and g2
-        size  : side of the parts in these units
+        The middles are `cells` (m, 2), and the sides of parts `size`, in units of g1 and g2. Each
+        bound is the larger of two bounds. All points of a part are within rho of c, and no second
+        derivative of f is below -bend there. So f(c) - |grad f(c)| rho - bend rho^2 / 2 is a bound.
+        For the other bound, each cosine is replaced by -1, and each |k + G| by an upper bound,
+        because E decreases.
         """
         from scipy.special import erfc
 
-        rho = size / 2.0 * max(np.hypot(*(self.dual[0] + self.dual[1])),
-                               np.hypot(*(self.dual[0] - self.dual[1])))  # fmt: skip
+        g1, g2 = self.dual
+        rho = size / 2.0 * max(np.hypot(*(g1 + g2)), np.hypot(*(g1 - g2)))
         own = 2.0 * self.alpha / np.sqrt(np.pi)
         weights = erfc(self.alpha * self.distances) / self.distances
         waves = cells @ self.dual
@@ -131,12 +129,7 @@ class _Symbol:
 
 def _points(basis: Array, radius: float) -> Array:
     """The points i b1 + j b2 (n, 2) within this radius of 0."""
-    i, j = (np.arange(-n, n + 1) for n in _counts(basis, radius))
+    most = (int(np.ceil(radius * float(np.hypot(*each)))) for each in np.linalg.inv(basis).T)
+    i, j = (np.arange(-n, n + 1) for n in most)
     points = np.stack(np.meshgrid(i, j, indexing="ij"), axis=-1).reshape(-1, 2) @ basis
     return np.asarray(points[np.hypot(*points.T) <= radius * (1.0 + 1e-9)])
-
-
-def _counts(basis: Array, radius: float) -> list[int]:
-    """Upper bounds on |i| and |j| for points i b1 + j b2 within this radius."""
-    columns = np.linalg.inv(basis).T
-    return [int(np.ceil(radius * float(np.hypot(*column)))) for column in columns]

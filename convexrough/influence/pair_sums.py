@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from convexrough.roundoff import ROUNDOFF
 #: near neighbours are counted first, to estimate this memory.
 BYTES, SAMPLE = 24, 1000
 
-#: Largest number of points in a patch of `Interpolation`: sums stay short, and fit in the cache.
+#: Largest number of points in a patch of a `Mesh`: sums stay short, and fit in the cache.
 BLOCK = 256
 
 #: Number of points whose weights are computed together: they fit in the cache.
@@ -41,48 +42,87 @@ PAIRS = 2**22
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
-    """Points sorted by the block of the mesh that contains them.
+class Mesh:
+    """Points, sorted by the block of mesh cells that contains them, with the interpolation W."""
 
-    places : (n,) original indices of the sorted points
-    points : (n, 2) [length] the sorted points
-    tails  : (n, 2) [length] exact minus rounded coordinates of the sorted points; None if they are
-        0
-    cells  : (n, 2) mesh cell of each sorted point
-    shares : (n, 2) position of each sorted point in its cell, from 0 to 1
-    keys   : (b,) numbers of the blocks that contain points, sorted
-    starts : (b + 1,) first point of each of these blocks, and the number of all points
-    shape  : numbers of rows and of columns of blocks
-    """
-
-    places: Indices
-    points: Array
-    tails: Array | None
-    cells: Indices
-    shares: Array
-    keys: Indices
-    starts: Indices
-    shape: tuple[int, int]
+    splitting: Splitting
+    places: Indices  # (n,) original indices of the sorted points
+    points: Array  # (n, 2) [length] the sorted points
+    tails: Array | None  # (n, 2) [length] exact minus rounded coordinates; None if they are 0
+    cells: Indices  # (n, 2) mesh cell of each sorted point
+    shares: Array  # (n, 2) position of each sorted point in its cell, from 0 to 1, rounded once
+    crowded: float  # largest number of points in a block
+    #: For each group of consecutive points in one block: the first point, the point after the last,
+    #: and the indices i and j of the first node.
+    patches: list[tuple[int, int, int, int]]
+    box: SiteBox  # the nodes
+    dtype: Any
 
     @classmethod
-    def of(cls, points: Array, splitting: Splitting, tails: Array | None = None) -> Order:
-        low = points.min(axis=0)
-        cells, shares = _placed(points, low, splitting.spacing, tails)
-        blocks = cells // splitting.block
+    def of(cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None) -> Mesh:
+        away, block = Pair(*two_sum(points, -points.min(axis=0))), splitting.block
+        if tails is not None:
+            away += Pair.exact(tails)
+        away /= Pair.exact(splitting.spacing)
+        corners = np.floor(away.high)
+        corners -= (away.high == corners) & (away.low < 0)
+        corners = np.maximum(corners, 0.0)
+        cells, shares = corners.astype(np.intp), (away.high - corners) + away.low
+
+        blocks = cells // block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
         places = np.argsort(key, kind="stable")
         keys, starts = np.unique(key[places], return_index=True)
-        return cls(
-            places,
-            points[places],
-            None if tails is None else tails[places],
-            cells[places],
-            shares[places],
-            keys,
-            np.append(starts, len(points)).astype(np.intp),
-            (rows, columns),
-        )
+        edges = pairwise([*starts.tolist(), len(points)])
+        patches = [
+            (first, min(first + BLOCK, stop), k // columns * block, k % columns * block)
+            for k, (start, stop) in zip(keys.tolist(), edges, strict=True)
+            for first in range(start, stop, BLOCK)
+        ]
+        extra, spacing = splitting.kernel.order - 1, splitting.spacing
+        box = SiteBox((rows * block + extra, columns * block + extra), spacing * np.eye(2))
+        crowded = float(np.diff(starts, append=len(points)).max())
+        tails = None if tails is None else tails[places]
+        sorted_ = splitting, places, points[places], tails, cells[places], shares[places]
+        return cls(*sorted_, crowded, patches, box, dtype)
+
+    @cached_property
+    def weights(self) -> tuple[Pair, Pair]:
+        """(n, width) weights in x and in y; each entry of W is the product of one of each.
+
+        Their low parts, in single precision, serve only sharp products (`sharp_sums`).
+        """
+        size, order = (len(self.points), self.splitting.width), self.splitting.kernel.order
+        x, y = (Pair(np.zeros(size, self.dtype), np.zeros(size, np.float32)) for _ in (0, 1))
+        for some in threads.chunks(size[0], PLACES):
+            for k, factor in enumerate((x, y)):
+                columns = (self.cells[some, k] % self.splitting.block)[:, None] + np.arange(order)
+                exactly = twofold_lagrange(self.shares[some, k], order)
+                for whole, part in zip(factor, exactly, strict=True):
+                    np.put_along_axis(whole[some], columns, part, axis=1)
+        return x, y
+
+    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+        """W^T P for loads P (n,) as a field of the box, or |W|^T P if `absolute`."""
+        field, column, width = self.box.field(loads.dtype), loads[:, None], self.splitting.width
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            x, y = (each.high[mine] for each in self.weights)
+            if absolute:
+                x, y = np.abs(x), np.abs(y)
+            field[i : i + width, j : j + width] += x.T @ (column[mine] * y)
+        return field
+
+    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
+        """(n,) W times a field of values at the nodes of the mesh."""
+        (x, _), (y, _) = self.weights
+        result, width = np.empty(len(x), dtype=field.dtype), self.splitting.width
+        for start, stop, i, j in self.patches:
+            mine = slice(start, stop)
+            along = x[mine] @ field[i : i + width, j : j + width]
+            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
+        return result
 
     def back(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (n, ...) at the sorted points, in the original order."""
@@ -90,61 +130,35 @@ class Order:
         result[self.places] = values
         return result
 
-    def squares(self, i: Indices, j: Indices) -> Array:
-        """(m,) [length^2] squared distances of the sorted points i (m,) from sorted points j."""
-        apart = self.points[i] - self.points[j]
-        if self.tails is not None:
-            apart += self.tails[i] - self.tails[j]
-        apart *= apart
-        return np.asarray(apart[:, 0] + apart[:, 1])
-
-
-def _placed(
-    points: Array, low: Array, spacing: float, tails: Array | None
-) -> tuple[Indices, Array]:
-    """(n, 2) the mesh cell of each point, and (n, 2) its position in the cell, rounded once.
-
-    low : (2,) [length] the origin of the mesh
-    """
-    away = Pair(*two_sum(points, -low))
-    if tails is not None:
-        away += Pair.exact(tails)
-    away /= Pair.exact(spacing)
-    cells = np.floor(away.high)
-    cells -= (away.high == cells) & (away.low < 0)
-    cells = np.maximum(cells, 0.0)
-    return cells.astype(np.intp), (away.high - cells) + away.low
-
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """The matrix S of docs/theory/operators-mesh.md, for pairs within the distance `Splitting.cut`.
+    """The matrix S, for pairs within the distance `Splitting.cut`."""
 
-    upper   : (n, n) sparse, the entries for pairs of sorted points i < j
-    own     : the number on the diagonal, -L(0), because a point does not displace itself
-    terms   : largest number of near neighbours of a point
-    nearest : [length] smallest distance between the points of a near pair, except 0
-    """
-
-    upper: Any
-    own: float
-    terms: int
-    nearest: float
+    upper: Any  # (n, n) sparse, the entries for pairs of sorted points i < j
+    own: float  # the number on the diagonal: -L(0), because a point does not displace itself
+    terms: int  # largest number of near neighbours of a point
+    nearest: float  # [length] smallest distance between the points of a near pair, except 0
 
     @classmethod
-    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
+    def assemble(cls, mesh: Mesh) -> NearPairs:
         from scipy.sparse import csr_array
         from scipy.spatial import cKDTree
 
-        n, tree = len(order.points), cKDTree(order.points)
-        some = order.points[:: max(1, n // SAMPLE)]
+        points, splitting = mesh.points, mesh.splitting
+        n, tree = len(points), cKDTree(points)
+        some = points[:: max(1, n // SAMPLE)]
         near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
         checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
         i, j = tree.query_pairs(splitting.cut, output_type="ndarray").T.astype(np.int32)
-        values, nearest = np.empty(len(i), dtype=dtype), [splitting.cut]
+        values, nearest = np.empty(len(i), dtype=mesh.dtype), [splitting.cut]
 
         def compute(some: slice) -> None:
-            squares = order.squares(i[some], j[some])
+            apart = points[i[some]] - points[j[some]]
+            if mesh.tails is not None:
+                apart += mesh.tails[i[some]] - mesh.tails[j[some]]
+            apart *= apart
+            squares = apart[:, 0] + apart[:, 1]
             values[some] = splitting.kernel.local(squares)
             nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
 
@@ -155,8 +169,7 @@ class NearPairs:
         return cls(upper, -splitting.kernel.centre, most, min(nearest))
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        result: NDArray[Any] = self.upper @ loads
-        result += self.upper.T @ loads
+        result = both_ways(self.upper, loads)
         result += loads.dtype.type(self.own) * loads
         return result
 
@@ -171,122 +184,43 @@ class NearPairs:
             start = stop
 
 
-@dataclass(frozen=True, eq=False)
-class Interpolation:
-    """The interpolation W from nodes to points.
-
-    x, y    : (n, width) weights in x and in y; each entry of W is the product of a weight in x and
-        one in y. Their low parts, in single precision, serve only sharp products (`sharp_sums`)
-    patches : for each group of consecutive points in one block of mesh cells: the first point, the
-        point after the last, and the indices i and j of the first node
-    shape   : numbers of nodes of the mesh in both directions
-    """
-
-    x: Pair
-    y: Pair
-    patches: list[tuple[int, int, int, int]]
-    shape: tuple[int, int]
-
-    @classmethod
-    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
-        rows, columns = order.shape
-        patches = []
-        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * splitting.block
-        for key, (i, j) in enumerate(corners.tolist()):
-            start, stop = order.starts[key : key + 2].tolist()
-            for first in range(start, stop, BLOCK):
-                patches.append((first, min(first + BLOCK, stop), i, j))
-        size = len(order.places), splitting.width
-        x, y = (Pair(np.empty(size, dtype), np.empty(size, np.float32)) for _ in (0, 1))
-        for some in threads.chunks(len(order.places), PLACES):
-            for factor, exactly in zip(
-                (x, y), twofold_weights(order, splitting, some), strict=True
-            ):
-                factor.high[some], factor.low[some] = exactly
-        extra = splitting.kernel.order - 1
-        shape = (rows * splitting.block + extra, columns * splitting.block + extra)
-        return cls(x, y, patches, shape)
-
-    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P at the nodes of the mesh for loads P (n,), or |W|^T P if `absolute`."""
-        field = np.zeros(self.shape, dtype=loads.dtype)
-        x, y = self.x.high, self.y.high
-        if absolute:
-            x, y = np.abs(x), np.abs(y)
-        width = x.shape[1]
-        column = loads[:, None]
-        for start, stop, i, j in self.patches:
-            mine = slice(start, stop)
-            field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
-        return field
-
-    def from_nodes(self, field: NDArray[Any]) -> NDArray[Any]:
-        """(n,) W times a field of values at the nodes of the mesh."""
-        x, y = self.x.high, self.y.high
-        result, width = np.empty(len(x), dtype=field.dtype), x.shape[1]
-        for start, stop, i, j in self.patches:
-            mine = slice(start, stop)
-            along = x[mine] @ field[i : i + width, j : j + width]
-            np.einsum("ij,ij->i", along, y[mine], out=result[mine])
-        return result
-
-
-def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
-    """The double-double weights (m, width) of some points, in x and in y.
-
-    They are 0 except at the nodes from which a point interpolates.
-    """
-    stencil = np.arange(splitting.kernel.order)
-    factors = []
-    for k in (0, 1):
-        weights = twofold_lagrange(order.shares[some, k], len(stencil))
-        rows = Pair(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
-        columns = (order.cells[some, k] % splitting.block)[:, None] + stencil
-        for row, values in zip(rows, weights, strict=True):
-            np.put_along_axis(row, columns, values, axis=1)
-        factors.append(rows)
-    return factors[0], factors[1]
+def both_ways(upper: Any, loads: NDArray[Any]) -> NDArray[Any]:
+    """The product of a symmetric matrix, of which `upper` has the entries above the diagonal."""
+    result: NDArray[Any] = upper @ loads
+    result += upper.T @ loads
+    return result
 
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors.
+    """The map from loads P_j to the sums over j of P_j / r_ij^q, with bounds on its errors."""
 
-    splitting, order : the choice of L and of the mesh; the points sorted by blocks of mesh cells
-    near, weights : the matrix S, and the interpolation W
-    mesh, kernel : the box of the nodes, and the transform of L on it, for products with G
-    """
-
-    splitting: Splitting
-    order: Order
-    near: NearPairs
-    weights: Interpolation
-    mesh: SiteBox
-    kernel: Kernel
+    splitting: Splitting  # the choice of L and of the mesh
+    mesh: Mesh  # the sorted points, and W
+    near: NearPairs  # the matrix S
+    kernel: Kernel  # the transform of L on the mesh, for products with G
 
     @classmethod
     def assemble(
         cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None = None
     ) -> Product:
-        order = Order.of(points, splitting, tails)
-        near = NearPairs.assemble(order, splitting, dtype)
-        weights = Interpolation.assemble(order, splitting, dtype)
-        mesh = SiteBox(weights.shape, splitting.spacing * np.eye(2))
-        size = float(mesh.padded[0]) * mesh.padded[1]
+        mesh = Mesh.of(points, splitting, dtype, tails)
+        near = NearPairs.assemble(mesh)
+        size = float(mesh.box.padded[0]) * mesh.box.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        (kernel,) = mesh.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
+        (kernel,) = mesh.box.kernels(lambda i, j, r2: [splitting.kernel.smooth(r2)], np.float64)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.norm)
-        return cls(splitting, order, near, weights, mesh, kernel)
+        return cls(splitting, mesh, near, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums. A second thread computes the product with S at the same time."""
-        ordered = loads[self.order.places]
+        ordered = loads[self.mesh.places]
         with ThreadPoolExecutor(1) as other:
             near = other.submit(self.near.apply, ordered)
-            field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
-            total = self.weights.from_nodes(field)
+            field = self.mesh.to_nodes(ordered)
+            total = self.mesh.from_nodes(self.mesh.box.convolve(field, self.kernel.spectrum))
             total += near.result()
-        return self.order.back(total)
+        return self.mesh.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on errors of the sums of strengths_j / r_ij^q, for `strengths` (n,) >= 0.
@@ -295,9 +229,9 @@ class Product:
         by entries left out of S. The relative error of farther pairs is part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
-        points, ordered = self.order.points, strengths[self.order.places]
+        points, ordered = self.mesh.points, strengths[self.mesh.places]
         near = within(points, ordered, kernel.reach + kernel.sway(spacing))
-        return self.order.back(kernel.pair_error(spacing) * near)
+        return self.mesh.back(kernel.pair_error(spacing) * near)
 
     def above(self, strengths: Array) -> Array:
         """(n,) upper bounds on the sums over j of strengths_j / r_ij^q, for `strengths` >= 0."""
@@ -307,35 +241,35 @@ class Product:
         return total / (1.0 - rounding.relative) if rounding.relative < 1 else total + np.inf
 
     @cached_property
-    def _rounding(self) -> tuple[float, float]:
-        """Bounds on errors except those of `_weighing` and of transforms.
+    def _rounding(self) -> tuple[float, float, float, float]:
+        """Bounds on rounding errors except those of transforms.
 
-        The first is a part of the sums, the second is to be multiplied by the largest load.
+        The first is a part of the sums, and the second is to be multiplied by the largest load. The
+        others are relative errors of products with W^T, and with W.
         """
-        kernel = self.splitting.kernel
+        kernel, spacing, width = self.splitting.kernel, self.splitting.spacing, self.splitting.width
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
-        relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
-        relative += kernel.far_error(self.splitting.spacing)
+        relative += kernel.moved(2.0 * ROUNDOFF * spacing) + kernel.far_error(spacing)
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
-        return 1.01 * relative, 1.01 * own
+        each = 2.0 * WEIGHT_ROUNDOFFS + 2.0
+        overlaps = (-(-width // self.splitting.block)) ** 2
+        crowded = self.mesh.crowded
+        to_mesh = each + min(crowded, BLOCK) + float(overlaps * np.ceil(crowded / BLOCK))
+        from_mesh = each + 2.0 * kernel.order
+        from_mesh += max(kernel.roundoffs, kernel.beyond_roundoffs)  # of each L
+        return 1.01 * relative, 1.01 * own, to_mesh * ROUNDOFF, from_mesh * ROUNDOFF
 
     def rounding(self, loads: Array) -> Rounding:
-        """Bound on the error of `apply` in float64, without the bound of `interpolation`.
-
-        docs/theory/operators-mesh.md, "Errors".
-        """
-        relative, own = self._rounding
-        each = own * float(np.abs(loads).max(initial=0.0))
-        ordered = loads[self.order.places]
-        field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
-        sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
-        kernel, soft = self.kernel, self.splitting.kernel
-        to_mesh, from_mesh = self._weighing
-        from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
+        """Bound on errors of `apply` except `interpolation` (docs/theory/operators-mesh.md)."""
+        relative, own, to_mesh, from_mesh = self._rounding
+        ordered, norm = loads[self.mesh.places], self.kernel.norm
+        field = float(np.linalg.norm(self.mesh.to_nodes(ordered)))
+        sizes = float(np.linalg.norm(self.mesh.to_nodes(np.abs(ordered), absolute=True)))
         # Cauchy's inequality for a row of G, and the sum of a row of |W|.
-        transforms = self.mesh.bound(kernel.norm) + from_mesh * kernel.norm
-        growth = lebesgue(soft.order) ** 2
-        each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
+        growth = lebesgue(self.splitting.kernel.order) ** 2
+        each = own * float(np.abs(loads).max(initial=0.0))
+        each += growth * (self.mesh.box.bound(norm) + from_mesh * norm) * field
+        each += growth * to_mesh * norm * sizes
         return Rounding(relative, 1.01 * each)
 
     def slopes(self, values: Array) -> Array:
@@ -344,27 +278,7 @@ class Product:
         There are no error bounds. The smooth part of the kernel, -grad L, is the distance vector
         times a `Softened` kernel for 1 / r^3, whose order is one less than that of L.
         """
-        ordered = values[self.order.places]
-        total = self._near_slopes(ordered)
-        field = self.weights.to_nodes(ordered)
-        for k, pull in enumerate(self._pulls):
-            total[:, k] += self.weights.from_nodes(self.mesh.convolve(field, 1j * pull.spectrum))
-        return self.order.back(total)
-
-    @cached_property
-    def _pulls(self) -> list[Kernel]:
-        return self.mesh.pulls(self._softer.smooth)
-
-    @property
-    def _softer(self) -> Softened:
-        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
-
-    def _near_slopes(self, ordered: Array) -> Array:
-        """(n, 2) the part of `slopes` by near pairs of sorted points: 1 / r^3 less its smooth part.
-
-        ordered : (n,) the values v_j at the sorted points
-        """
-        points, kernel = self.order.points, self._softer
+        ordered, points, kernel = values[self.mesh.places], self.mesh.points, self._softer
         total, n = np.zeros_like(points), len(points)
         for some, here in self.near.in_parts(PAIRS):
             there = self.near.upper.indices[some]
@@ -374,17 +288,18 @@ class Product:
                 pull = weights * apart[:, k]
                 total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
                 total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
-        return total
+        for k, smooth in enumerate(self._pulls):
+            field = self.mesh.to_nodes(ordered)
+            total[:, k] += self.mesh.from_nodes(self.mesh.box.convolve(field, 1j * smooth.spectrum))
+        return self.mesh.back(total)
+
+    @cached_property
+    def _pulls(self) -> list[Kernel]:
+        return self.mesh.box.pulls(self._softer.smooth)
 
     @property
-    def _weighing(self) -> tuple[float, float]:
-        """Bounds on the relative rounding errors of products with W^T, and with W."""
-        order, width = self.splitting.kernel.order, self.splitting.width
-        weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
-        overlaps = (-(-width // self.splitting.block)) ** 2
-        crowded = float(np.diff(self.order.starts).max())
-        to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)
-        return (weights + float(to_mesh)) * ROUNDOFF, (weights + 2.0 * order) * ROUNDOFF
+    def _softer(self) -> Softened:
+        return Softened(3, self.splitting.kernel.order - 1, self.splitting.kernel.reach)
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:
@@ -403,6 +318,4 @@ def within(points: Array, strengths: Array, distance: float) -> Array:
     low_j, high_j = (np.clip(np.arange(columns) + s, 0, columns) for s in (-parts, parts + 1))
     boxes = sums[np.ix_(high_i, high_j)] - sums[np.ix_(low_i, high_j)]
     boxes += sums[np.ix_(low_i, low_j)] - sums[np.ix_(high_i, low_j)]
-    slack = 1e-12 * sums[-1, -1]  # rounding of the differences
-    bounds: Array = boxes.ravel()[place] + slack
-    return bounds
+    return np.asarray(boxes.ravel()[place] + 1e-12 * sums[-1, -1])  # rounding of the differences

@@ -15,21 +15,13 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import (
-    Coupling,
-    JointCoupling,
-    Kind,
-    Rounding,
-    Smoother,
-    known,
-)
-from convexrough.influence.dense import DenseCoupling, DenseInfluence, dense_matrix, entry_error
+from convexrough.influence import coupling
+from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.influence.smoother import smoother_of_points
 from convexrough.influence.splitting import Splitting
-from convexrough.scene.neighbours import crowding, separations
 
 #: Target of the relative error that interpolation causes in a product. It is the largest part of
 #: the error of `sums`, about 1e-16.
@@ -47,14 +39,13 @@ FEW_PAIRS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
-class ScatteredInfluence:
+class ScatteredInfluence(coupling.Influence):
     """The compliance operator of asperities at arbitrary points; see `coupling.Influence`.
 
-    point_error : [length] bound on the error of each coordinate of the points
-    tails       : (n, 2) [length] the exact points minus `points`, or None if all differences are 0
-        or unknown; see `Scene.contact_tails`
-
     For few points, or points in dense clusters, a matrix takes the place of the mesh.
+
+    tails : (n, 2) [length] the exact points minus `points`, or None if all differences are 0 or
+        unknown; see `Scene.contact_tails`
     """
 
     points: Array
@@ -62,12 +53,7 @@ class ScatteredInfluence:
     point_error: float = 0.0
     tails: Array | None = None
 
-    name: ClassVar[Kind] = "scattered"
-    stored: ClassVar[bool] = False
-    cheap_sums: ClassVar[bool] = False
-
-    def __len__(self) -> int:
-        return len(self.points)
+    name: ClassVar[coupling.Kind] = "scattered"
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
@@ -78,58 +64,36 @@ class ScatteredInfluence:
         found *= dtype(self.scale)
         return found
 
-    def rounding(self, loads: Array) -> Rounding:
+    def rounding(self, loads: Array) -> coupling.Rounding:
         if self._double is None:
             return self._dense.rounding(loads)
         rounding = self._double.rounding(loads)
-        points = entry_error(self._unknown, self._double.near.nearest)
+        points = coupling.entry_error(self._unknown, self._double.near.nearest)
         interpolated = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
-        return Rounding(
-            1.01 * (rounding.relative + points),
-            1.01 * self.scale * (rounding.each + interpolated),
-        )
+        each = 1.01 * self.scale * (rounding.each + interpolated)
+        return coupling.Rounding(1.01 * (rounding.relative + points), each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         product = self._product(power, np.float64)
         if product is None:
             return self._dense.falloff(strengths, power)
-        moved = entry_error(self._unknown, product.near.nearest)
+        moved = coupling.entry_error(self._unknown, product.near.nearest)
         return product.above(strengths) * float((1.0 + moved) ** power) * (1.0 + 1e-6)
-
-    @property
-    def matrix(self) -> Array:
-        return dense_matrix(self.points, self.scale)
-
-    def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.points[which], self.scale)
-
-    @property
-    def entry_error(self) -> float:
-        return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
 
     def restricted(self, which: Indices) -> ScatteredInfluence:
         tails = None if self.tails is None else self.tails[which]
         return replace(self, points=self.points[which], tails=tails)
 
-    def onto(self, points: Array) -> Coupling:
+    def onto(self, points: Array) -> coupling.Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
-            return DenseCoupling(self.points, points, self.scale, self.point_error)
+            return super().onto(points)
         together = np.concatenate((points, self.points))
-        return JointCoupling(replace(self, points=together, tails=None), len(points))
+        return coupling.JointCoupling(replace(self, points=together, tails=None), len(points))
 
     def slopes(self, loads: Array) -> Array:
         if self._double is None:
-            return self._dense.slopes(loads)
+            return super().slopes(loads)
         return -self.scale * self._double.slopes(loads)
-
-    def separations(self) -> Array:
-        return separations(self.points, self.point_error)
-
-    def crowding(self, radii: Array) -> float:
-        return crowding(self.points, radii)
-
-    def semidefinite_with(self, radius: float) -> bool:
-        return False
 
     def sums(self, loads: Pair) -> Ball:
         found = self._sums(loads)
@@ -144,9 +108,9 @@ class ScatteredInfluence:
     def _sums(self) -> MatrixSums | MeshSums:
         if len(self) > FEW and self._double is not None:
             return MeshSums(self._double)
-        return MatrixSums(*known(self.points, self.tails, self.point_error))
+        return MatrixSums(*coupling.known(self.points, self.tails, self.point_error))
 
-    def smoother(self, root: Array) -> Smoother:
+    def smoother(self, root: Array) -> coupling.Smoother:
         return smoother_of_points(self.points, self.scale, root)
 
     @property
@@ -165,14 +129,14 @@ class ScatteredInfluence:
     def _product(self, power: int, dtype: Any) -> Product | None:
         """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
         if (power, dtype) not in self._products:
-            tolerance = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
-            tolerance = tolerance if power == 1 else FALLOFF_TOLERANCE
+            accuracy = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
+            tolerance = accuracy if power == 1 else FALLOFF_TOLERANCE
             splitting = Splitting.choose(self.points, power, tolerance)
             found = splitting and Product.assemble(self.points, splitting, dtype, self.tails)
             self._products[power, dtype] = found or None
         return self._products[power, dtype]
 
-    @property
+    @cached_property
     def _unknown(self) -> float:
         """[length] bound on the error of each coordinate of `points` plus `tails`."""
-        return known(self.points, self.tails, self.point_error)[1]
+        return coupling.known(self.points, self.tails, self.point_error)[1]

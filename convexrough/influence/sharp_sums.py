@@ -23,7 +23,7 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import CHUNK, Pair, rounded, two_product, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.influence.pair_sums import Product, within
+from convexrough.influence.pair_sums import Product, both_ways, within
 from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, exact_series, lebesgue
@@ -32,7 +32,7 @@ from convexrough.roundoff import ROUNDOFF
 #: Numbers of bits of a float64 number and of a first slice.
 DIGITS, BITS = 53, 24
 
-#: Number of patches (`pair_sums.Interpolation`) processed together; their data fit in the cache.
+#: Number of patches (`pair_sums.Mesh`) processed together; their data fit in the cache.
 PATCHES = 64
 
 #: Whole numbers in units of 2^-FIXED are used to compute L.
@@ -64,116 +64,84 @@ def soft_values(values: Any, scale: Fraction) -> Pair:
     return Pair(*np.array([Pair.nearest(value * unit) for value in values]).T)
 
 
-@dataclass(frozen=True, eq=False)
-class SoftTable:
-    """L as a function of r^2 within the reach, by Taylor's series at the nearest node.
+def soft_table(kernel: Softened) -> tuple[Callable[[Pair], Pair], Pair, float]:
+    """L as a function of r^2 within the reach, L(0), and a bound on the error of each L.
 
-    step   : [length^2] difference of r^2 between nodes, a power of two
-    values : (m,) L at the nodes
-    terms  : (TERMS - 1, m) coefficients of the further terms of the series in r^2 / step, in
-        float64
-    error  : bound on the error of each L
+    The function is Taylor's series at the nearest of many nodes. Low parts of its values are at
+    most a hundredth of high parts.
     """
+    step = 2.0 ** math.floor(math.log2(kernel.reach**2 / NODES))
+    count = math.ceil(kernel.reach**2 / step) + 1
+    values, *others = soft_terms(kernel, Fraction(step), count, TERMS)
+    scales = (step / kernel.reach**2) ** np.arange(1, TERMS)[:, None] / kernel.reach
+    slopes = np.array(others).astype(np.float64) * 2.0**-FIXED * scales
+    nodes = soft_values(values, 1 / Fraction(kernel.reach))
 
-    step: float
-    values: Pair
-    terms: Array
-    error: float
-
-    @classmethod
-    def of(cls, kernel: Softened) -> SoftTable:
-        step = 2.0 ** math.floor(math.log2(kernel.reach**2 / NODES))
-        nodes = math.ceil(kernel.reach**2 / step) + 1
-        values, *others = soft_terms(kernel, Fraction(step), nodes, TERMS)
-        scales = (step / kernel.reach**2) ** np.arange(1, TERMS)[:, None] / kernel.reach
-        slopes = np.array(others).astype(np.float64) * 2.0**-FIXED * scales
-        # The errors by rounding and by truncation of the series are both largest at r = 0.
-        ends = [
-            abs(float(term[0])) for term in soft_terms(kernel, Fraction(1), 1, kernel.order + 1)
-        ]
-        away = step / (2.0 * kernel.reach**2)
-        sizes = [end * 2.0**-FIXED * away**k / kernel.reach for k, end in enumerate(ends)]
-        error = 16.0 * ROUNDOFF * sum(sizes[1:]) + 1.01 * sum(sizes[TERMS:])
-        return cls(step, soft_values(values, 1 / Fraction(kernel.reach)), slopes, error)
-
-    def at(self, squares: Pair) -> Pair:
-        """L at squared distances [length^2]; low parts are at most a hundredth of high parts."""
-        node = np.rint(squares.high / self.step).astype(np.intp)
-        away = ((squares.high - node * self.step) + squares.low) / self.step
-        value = self.terms[-1][node]
-        for terms in self.terms[-2::-1]:
+    def soft(squares: Pair) -> Pair:
+        node = np.rint(squares.high / step).astype(np.intp)
+        away = ((squares.high - node * step) + squares.low) / step
+        value = slopes[-1][node]
+        for terms in slopes[-2::-1]:
             value *= away
             value += terms[node]
-        return Pair(self.values.high[node], self.values.low[node] + value * away)
+        return Pair(nodes.high[node], nodes.low[node] + value * away)
+
+    # The errors by rounding and by truncation of the series are both largest at r = 0.
+    ends = (abs(float(term[0])) for term in soft_terms(kernel, Fraction(1), 1, kernel.order + 1))
+    away = step / (2.0 * kernel.reach**2)
+    sizes = [end * 2.0**-FIXED * away**k / kernel.reach for k, end in enumerate(ends)]
+    error = 16.0 * ROUNDOFF * sum(sizes[1:]) + 1.01 * sum(sizes[TERMS:])
+    return soft, nodes.at(0), error
 
 
-@dataclass(frozen=True, eq=False)
 class SharpPairs:
     """The matrix S = first + second, with entries 1 / r - L for near pairs.
 
-    Entries of `first` are multiples of a unit, so that sums of them are exact.
-
-    first, second : (n, n) sparse, the entries for pairs of sorted points i < j
-    unit   : unit of the entries of `first`, a power of two
-    loads  : unit of the first slices of loads, for loads of at most 1, a power of two
-    sums   : (n,) bounds on the row sums of |S|
-    centre : L(0)
-    error  : bound on the error of an entry that is not due to 1 / r
+    Entries of `first` are multiples of `unit`, and first slices of loads, for loads of at most 1,
+    of `loads`. Both are powers of two, so that sums of their products are exact.
     """
 
-    product: Product
-    first: Any
-    second: Any
-    unit: float
-    loads: float
-    sums: Array
-    centre: Pair
-    error: float
-
-    @classmethod
-    def of(cls, product: Product) -> SharpPairs:
+    def __init__(self, product: Product) -> None:
         from scipy.sparse import csr_array
 
-        upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
-        ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
-        sums, _ = _sizes(product, ones)
+        upper, mesh, terms = product.near.upper, product.mesh, max(product.near.terms, 1)
+        self.product = product
+        self.sums, _ = _sizes(product, np.ones(len(mesh.points)))  # bounds on row sums of |S|
         # Sums of first slices must be exact up to 16 times the median of `sums`.
         bits = (49 - terms.bit_length()) // 2
-        unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
-        table = SoftTable.of(kernel)
-        points = Pair.exact(order.points)
-        if order.tails is not None:
-            points = Pair(order.points, order.tails)
+        most = math.floor(math.log2(float(np.median(self.sums)) / terms))
+        self.unit, self.loads = 2.0 ** (most - bits), 2.0**-bits
+        soft, self.centre, error = soft_table(product.splitting.kernel)
+        self.error = error + 4.0 * ROUNDOFF * self.unit  # of an entry, without that of 1 / r
+        points = Pair.exact(mesh.points)
+        if mesh.tails is not None:
+            points = Pair(mesh.points, mesh.tails)
         first, second = np.empty_like(upper.data), np.empty_like(upper.data)
 
         def cut(part: tuple[slice, Indices]) -> None:
             some, here = part
             squares = squared_distances(points.at(here), points.at(upper.indices[some]))
-            inverse, soft = squares.inverse_root(), table.at(squares)
-            high, low = two_sum(inverse.high, -soft.high)
-            low += inverse.low - soft.low
-            first[some] = rounded(high + low, np.asarray(unit))
+            inverse, smooth = squares.inverse_root(), soft(squares)
+            high, low = two_sum(inverse.high, -smooth.high)
+            low += inverse.low - smooth.low
+            first[some] = rounded(high + low, np.asarray(self.unit))
             second[some] = (high - first[some]) + low
 
         threads.each(cut, product.near.in_parts(CHUNK), threads.worthwhile(len(first)))
-        low, high = (
+        self.first, self.second = (
             csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
-            for part in (second, first)
+            for part in (first, second)
         )
-        centre = Pair(*(part[0] for part in table.values))
-        error = table.error + 4.0 * ROUNDOFF * unit
-        return cls(product, high, low, unit, 2.0**-bits, sums, centre, error)
 
     def __call__(self, ordered: Pair) -> tuple[Pair, Array]:
         """(n,) the product of S and sorted loads of at most 1, and bounds on its errors."""
         product, kernel = self.product, self.product.splitting.kernel
         first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
         second = np.asarray((ordered.high - first) + ordered.low)
-        exact, left = _applied(self.first, np.stack((first, second), axis=1)).T
-        left = left + _applied(self.second, first + second)
+        exact, left = both_ways(self.first, np.stack((first, second), axis=1)).T
+        left = left + both_ways(self.second, first + second)
         own = ordered * Pair(-self.centre.high, -self.centre.low)
-        sizes = np.abs(ordered.high)
-        every, around = _sizes(product, sizes)
+        every, around = _sizes(product, np.abs(ordered.high))
         terms = product.near.terms
         rest = self.loads * self.sums + self.unit * terms
         inexact = np.where(every + rest < 2.0**52 * self.unit * self.loads, 0.0, every + rest)
@@ -182,17 +150,11 @@ class SharpPairs:
         return Pair(*two_sum(exact, left)) + own, 1.01 * errors
 
 
-def _applied(upper: Any, loads: Array) -> Array:
-    result: Array = upper @ loads
-    result += upper.T @ loads
-    return result
-
-
 def _sizes(product: Product, strengths: Array) -> tuple[Array, Array]:
     """(n,) bounds on the sums of |S_ij| s_j over j, and of s_j over near j, for strengths s."""
     near, kernel = product.near, product.splitting.kernel
     ordered = near.apply(strengths) + kernel.centre * strengths
-    around = within(product.order.points, strengths, product.splitting.cut)
+    around = within(product.mesh.points, strengths, product.splitting.cut)
     return 1.01 * (ordered + 2.0 * kernel.centre * around), around
 
 
@@ -208,8 +170,8 @@ class Slices(NamedTuple):
         first = np.rint(values.high * unit) / unit
         return cls(first, (values.high - first) + values.low)
 
-    def some(self, rows: slice) -> Slices:
-        return Slices(self.first[rows], self.second[rows])
+    def at(self, index: Any) -> Slices:
+        return Slices(self.first[index], self.second[index])
 
 
 def in_slices(
@@ -223,16 +185,14 @@ def in_slices(
 
 @dataclass(frozen=True)
 class SoftValues(Distances):
-    """The values of the smooth kernel L between nodes of a mesh, times the unit of length.
+    """The values of the smooth kernel L between nodes of a mesh, times the unit of length."""
 
-    near : the values within the reach, at the index i^2 + j^2 for nodes that differ by (i, j)
-    """
-
-    near: Pair
+    near: Pair  # within the reach, at the index i^2 + j^2 for nodes that differ by (i, j)
 
     @classmethod
     def between(cls, product: Product, unit: float) -> SoftValues:
-        mesh, kernel, spacing = product.mesh, product.splitting.kernel, product.splitting.spacing
+        mesh, splitting = product.mesh.box, product.splitting
+        kernel, spacing = splitting.kernel, splitting.spacing
         basis = [[Fraction(x) / Fraction(unit) for x in row] for row in mesh.basis.tolist()]
         beyond = Distances.of(basis, max(mesh.shape))
         step, reach = Fraction(spacing) ** 2, Fraction(kernel.reach)
@@ -251,9 +211,9 @@ class MeshSums:
     """The sums over j of P_j / r_ij for exact points, by the mesh and near pairs of `product`."""
 
     def __init__(self, product: Product) -> None:
-        mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
+        mesh, unit = product.mesh.box, 2.0 ** math.floor(math.log2(product.splitting.spacing))
         self.product = product
-        self.pairs = SharpPairs.of(product)
+        self.pairs = SharpPairs(product)
         values, norm = SoftValues.between(product, unit), unit * product.kernel.norm
         self.sliced = Sliced.of(mesh, values, norm, unit, SLICES)
         self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.stride, range(mesh.shape[1]))
@@ -265,13 +225,13 @@ class MeshSums:
             return Ball.exact(loads)
         size = 2.0 ** np.ceil(np.log2(top))
         shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
-        ordered = shares.at(product.order.places)
+        ordered = shares.at(product.mesh.places)
         field, node_error = _to_nodes(product, ordered)
         nodes = Pair(field.high.ravel(), field.low.ravel())
         on_mesh = self.sliced.sums(nodes, self.places.ravel())
         exact, left, unit, rounding = _from_nodes(product, on_mesh)
         near, errors = self.pairs(ordered)
-        back = np.argsort(product.order.places)
+        back = np.argsort(product.mesh.places)
         total = (Pair(*two_sum(exact * unit, left * unit)) + near).at(back)
 
         field_error = node_error * math.sqrt(field.high.size)
@@ -279,7 +239,10 @@ class MeshSums:
         error *= lebesgue(product.splitting.kernel.order) ** 2
         sizes = np.abs(shares.high)
         whole = total.high if shares.high.min() >= 0 else product.apply(sizes)
-        error += _relative(product) * float(whole.max()) + rounding * unit
+        # Distant pairs lose by interpolation and by rounded positions.
+        kernel, spacing = product.splitting.kernel, product.splitting.spacing
+        relative = kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)
+        error += relative * float(whole.max()) + rounding * unit
         radius = errors[back] + product.interpolation(sizes) + error
         return Ball.around(Pair(total.high * size, total.low * size), 1.01 * radius * size)
 
@@ -288,7 +251,7 @@ def _to_nodes(product: Product, ordered: Pair) -> tuple[Pair, float]:
     """W^T P for sorted loads P of at most 1, and a bound on the error at every node."""
     met = _met(product)
     bits = (DIGITS - met.bit_length()) // 2
-    exact, left = np.zeros(product.weights.shape), np.zeros(product.weights.shape)
+    exact, left = np.zeros(product.mesh.box.shape), np.zeros(product.mesh.box.shape)
     for some, patches, x, y in _weighed(product):
         mine = ordered.at(np.s_[some, None])
         high, low = two_product(mine.high, y.high)
@@ -296,7 +259,7 @@ def _to_nodes(product: Product, ordered: Pair) -> tuple[Pair, float]:
         charges = Slices.of(Pair(high, low), bits)
         factors = Slices.of(x, bits)
         for rows, i, j in patches:
-            first, second = in_slices(lambda a, b: a.T @ b, factors.some(rows), charges.some(rows))
+            first, second = in_slices(lambda a, b: a.T @ b, factors.at(rows), charges.at(rows))
             exact[i, j] += first
             left[i, j] += second
     error = met * ((2 * met + 8) * ROUNDOFF * 2.0**-bits + 4 * TWOFOLD_WEIGHT)
@@ -308,55 +271,44 @@ def _from_nodes(product: Product, on_mesh: Ball) -> tuple[Array, Array, float, f
 
     The other two results are this unit, and a bound on the error in this unit.
     """
-    high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
+    high, low = (np.asarray(each).reshape(product.mesh.box.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
-    unit = 2.0 ** (-2 * BITS)
-    exact, left = np.empty(len(product.order.places)), np.empty(len(product.order.places))
+    unit, dots = 2.0 ** (-2 * BITS), partial(np.einsum, "ij,ij->i")
+    exact, left = np.empty(len(product.mesh.places)), np.empty(len(product.mesh.places))
     for some, patches, x, y in _weighed(product):
         across, along = Slices.of(x, BITS), Slices.of(y, BITS)
         for rows, i, j in patches:
-            nodes = Slices(values.first[i, j], values.second[i, j])
-            lines = Slices.of(Pair(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
+            lines = in_slices(np.matmul, across.at(rows), values.at((i, j)))
             here = slice(some.start + rows.start, some.start + rows.stop)
-            exact[here], left[here] = in_slices(
-                partial(np.einsum, "ij,ij->i"), lines, along.some(rows)
-            )
+            exact[here], left[here] = in_slices(dots, Slices.of(Pair(*lines), BITS), along.at(rows))
     # The sum of |weights| is below 4; that of the rests of p weights is below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
     return exact / unit, left / unit, unit / scale, rounding / unit
 
 
-def _weighed(
-    product: Product,
-) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
+def _weighed(product: Product) -> Iterator[tuple[slice, list[Any], Pair, Pair]]:
     """For each group of patches: its points, the slices of each patch, and the weights in x and y.
 
     The slices of a patch select its points within the group, and its nodes in x and in y.
     """
-    weights, width = product.weights, product.splitting.width
-    for k in range(0, len(weights.patches), PATCHES):
-        patches = weights.patches[k : k + PATCHES]
+    (x, y), width = product.mesh.weights, product.splitting.width
+    for k in range(0, len(product.mesh.patches), PATCHES):
+        patches = product.mesh.patches[k : k + PATCHES]
         start, some = patches[0][0], slice(patches[0][0], patches[-1][1])
         places = [
             (slice(a - start, b - start), slice(i, i + width), slice(j, j + width))
             for a, b, i, j in patches
         ]
-        yield some, places, weights.x.at(some), weights.y.at(some)
+        yield some, places, x.at(some), y.at(some)
 
 
 def _met(product: Product) -> int:
     """The largest number of points that interpolate from the same node."""
-    order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
-    np.add.at(counts, tuple(product.order.cells.T), 1)
+    order, counts = product.splitting.kernel.order, np.zeros(product.mesh.box.shape, dtype=np.intp)
+    np.add.at(counts, tuple(product.mesh.cells.T), 1)
     for rows in (counts, counts.T):
         rows[:] = rows.cumsum(axis=0)
         rows[order:] -= rows[:-order].copy()
     return int(counts.max())
-
-
-def _relative(product: Product) -> float:
-    """Bound on the relative error of distant pairs by interpolation and by rounded positions."""
-    kernel, spacing = product.splitting.kernel, product.splitting.spacing
-    return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)

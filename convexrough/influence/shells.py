@@ -18,12 +18,9 @@ def shells(influence: Influence) -> Array:
 
     A value is 0 for a single asperity, and infinite for points that may coincide.
     """
-
-    def about(separations: Array) -> Array:
-        with np.errstate(divide="ignore"):
-            return np.asarray(2.0 * influence.scale / separations)
-
-    return evenly(about, influence.separations())
+    separations = influence.separations()
+    with np.errstate(divide="ignore"):
+        return evenly(lambda apart: 2.0 * influence.scale / apart, separations)
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
@@ -37,5 +34,4 @@ def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     if 0 < crowding < np.inf:
         s = s + share * (radii / crowding)
     with np.errstate(divide="ignore"):
-        values: Array = influence.scale / s
-    return values
+        return np.asarray(influence.scale / s)

@@ -37,23 +37,16 @@ MOST_BITS = 48
 
 @dataclass(frozen=True)
 class Distances:
-    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
+    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0."""
 
-    gram  : (3, 3) three slices (rows) of the scalar products b1 b1, 2 b1 b2 and b2 b2 (columns).
-        The first two slices have so few bits that their products with i^2, i j and j^2 are exact,
-        and so are sums of these products
-    error : bound on the relative error of each value
-    """
-
+    #: (3, 3) slices (rows) of b1 b1, 2 b1 b2 and b2 b2 (columns). The first two have so few bits
+    #: that sums of their products with i^2, i j and j^2 are exact.
     gram: Array
-    error: float
+    error: float  # bound on the relative error of each value
 
     @classmethod
     def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
-        """The distances for |i| and |j| below `largest`.
-
-        basis : reduced basis, in a unit of 0.5 to 1 times the length of the shorter vector
-        """
+        """For |i|, |j| below `largest`, in a unit of 0.5 to 1 times the shorter of both vectors."""
         (a, b), (c, d) = basis
         bits = 52 - (4 * largest * largest).bit_length()
         slices = np.zeros((3, 3))
@@ -72,16 +65,15 @@ class Distances:
 
     def at(self, i: Indices, j: Indices) -> Pair:
         """(len(i), len(j)) values at the differences (i, j) of sites."""
-        squares, cross = np.square(j, dtype=np.float64), j.astype(np.float64)
+        i, j = i.astype(np.float64), j.astype(np.float64)
         parts = []
         for one, both, two in self.gram.tolist():
-            part = np.multiply.outer(i * both, cross)
-            part += squares * two
-            part += (np.square(i, dtype=np.float64) * one)[:, None]
+            part = np.multiply.outer(i * both, j)
+            part += j * j * two
+            part += (i * i * one)[:, None]
             parts.append(part)
         high, low = two_sum(parts[0], parts[1])
-        high, low = two_sum(high, low + parts[2])
-        return Pair(high, low).inverse_root()
+        return Pair(*two_sum(high, low + parts[2])).inverse_root()
 
 
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
@@ -102,22 +94,15 @@ def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A kernel on a box of sites, divided into slices for products with any loads.
-
-    unit    : [length] the unit of distances, a power of two
-    kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more), with the fields
-        `bits` and `more`
-    error   : bound on the relative error of the values
-    budget  : largest product of the 2-norms of a slice of loads and a slice of the kernel
-    """
+    """A kernel on a box of sites, divided into slices for products with any loads."""
 
     box: SiteBox
-    unit: float
-    kernels: list[Kernel]
+    unit: float  # [length] the unit of distances, a power of two
+    kernels: list[Kernel]  # the slices K_1, K_2, ...
     bits: int
-    more: int
-    error: float
-    budget: float
+    more: int  # the unit of K_{t+1} is 2^-(bits + t more)
+    error: float  # bound on the relative error of the values
+    budget: float  # largest product of the 2-norms of a slice of loads and a slice of the kernel
 
     @classmethod
     def of(cls, box: SiteBox, values: Distances, norm: float, unit: float, count: int) -> Sliced:
@@ -131,11 +116,11 @@ class Sliced:
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
         more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)
 
-        def kernels_with(more: int) -> list[Kernel]:
-            return box.kernels(lambda i, j, _: cut(values.at(i, j), bits, more, count), np.float64)
+        def slices(i: Indices, j: Indices, _: Array) -> list[Array]:
+            return cut(values.at(i, j), bits, more, count)
 
         while True:
-            kernels = kernels_with(more)
+            kernels = box.kernels(slices, np.float64, count)
             largest = max(each.norm for each in kernels[:-1])
             # For any loads, slices after the first are at most 2^(more - 1).
             if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
@@ -143,10 +128,7 @@ class Sliced:
             more -= 1
 
     def sums(self, loads: Pair, at: Indices) -> Ball:
-        """(n,) the sums over j of g_ij P_j, divided by `unit`; g is the kernel.
-
-        at : (n,) indices of the loads' sites in the flattened array that is transformed
-        """
+        """(n,) sums over j of g_ij P_j / unit with the kernel g, for loads at flat indices `at`."""
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
         if top == 0.0:
@@ -175,29 +157,20 @@ class Sliced:
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
         # Cauchy's inequality bounds the effect of errors of values and of operations on pairs.
-        whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
+        norms = (k.norm * 2.0 ** -(t * self.more) for t, k in enumerate(self.kernels))
+        whole = 1.01 * 2.0**-self.bits * sum(norms) * float(np.linalg.norm(shares.high))
         radius = self.box.bound(left, operations=_operations(count)) * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
         return Ball.around(in_parts(len(at), add_up), 1.01 * radius * unit + TINY)
 
-    @property
-    def norm(self) -> float:
-        """An upper bound on the 2-norm of the kernel."""
-        norms = (k.norm * 2.0 ** -(t * self.more) for t, k in enumerate(self.kernels))
-        return 2.0**-self.bits * sum(norms)
-
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads for which levels are exact, and the number of bits of the first slice.
-
-        shares : (n,) loads divided by a power of two, at most 1
-        """
-        count = len(self.kernels)
+        """Slices of loads up to 1 for which levels are exact, and the bits of the first slice."""
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
         bits = min(guess, MOST_BITS)
         while float(np.linalg.norm(np.rint(shares.high * 2.0**bits))) > most:
             bits -= 1
-        return cut(shares, bits, self.more, count), bits
+        return cut(shares, bits, self.more, len(self.kernels)), bits
 
     def _levels(self, waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
         """The transforms of the levels of whole numbers, and of the sum of all other products."""
@@ -219,8 +192,6 @@ class Sliced:
 
 
 def _operations(count: int) -> int:
-    """The number that replaces 4 in (1) of docs/theory/operators-lattice.md.
-
-    Up to `count` products are added up before the inverse transform, and last slices are rounded.
-    """
+    # Replaces 4 in (1) of docs/theory/operators-lattice.md: up to `count` products are added up
+    # before the inverse transform, and last slices are rounded.
     return 2 * count + 6

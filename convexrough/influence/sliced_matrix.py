@@ -47,19 +47,14 @@ LARGEST = 2.0**300
 
 @dataclass(frozen=True, eq=False)
 class SlicedMatrix:
-    """Some rows of the matrix 1 / r_ij, as first + second + rest; 0 where two points coincide.
+    """Some rows of the matrix 1 / r_ij, as first + second + rest; 0 where two points coincide."""
 
-    slices : (m, n) the three parts
-    blocks : the columns of each block, and the number of bits of first slices of its loads
-    exponent : the matrix is that of points divided by 2^exponent, so that their extent is about 1
-    losses : (3 blocks, m) three factors for each block, to be multiplied by its largest load, its
-        largest rest of a load after two slices, and its largest rest after one slice. The sum of
-        these products over all blocks bounds the error of a product with loads
-    """
-
-    slices: tuple[Array, Array, Array]
-    blocks: list[tuple[slice, int]]
-    exponent: int
+    slices: tuple[Array, Array, Array]  # (m, n) the three parts
+    blocks: list[tuple[slice, int]]  # columns, and the number of bits of first slices of loads
+    exponent: int  # the matrix is that of points divided by 2^exponent; their extent is about 1
+    #: (3 blocks, m) three factors for each block, to be multiplied by its largest load, its largest
+    #: rest of a load after two slices, and its largest rest after one slice. The sum of these
+    #: products over all blocks bounds the error of a product with loads.
     losses: Array
 
     @classmethod
@@ -146,13 +141,11 @@ class MatrixSums:
     """The sums over j of P_j / r_ij of points (n, 2).
 
     A matrix of up to `KEPT` rows is cached. A larger matrix is computed again for each product.
-
-    point_error : [length] bound on the error of each coordinate
-    part_of     : the sums of more points, and the increasing indices of these points among them
     """
 
     points: Pair
-    point_error: float = 0.0
+    point_error: float = 0.0  # [length] bound on the error of each coordinate
+    #: The sums of more points, and the increasing indices of these points among them.
     part_of: tuple[MatrixSums, Indices] | None = None
 
     def restricted(self, which: Indices) -> MatrixSums:
@@ -168,10 +161,8 @@ class MatrixSums:
         n = len(self.points.high)
         if n <= KEPT:
             return self._matrix @ loads
-        parts = (
-            SlicedMatrix.of(self.points, rows, self.point_error) @ loads
-            for rows in threads.chunks(n, KEPT**2 // n)
-        )
+        chunks = threads.chunks(n, KEPT**2 // n)
+        parts = (SlicedMatrix.of(self.points, some, self.point_error) @ loads for some in chunks)
         found: Ball = of_rows(lambda *each: np.concatenate(each, axis=-1), *parts)
         return found
 
@@ -203,16 +194,15 @@ def inverse_distances(points: Pair, others: Pair) -> Pair:
 
 def squared_distances(points: Pair, others: Pair) -> Pair:
     """Squared distances of points from others; the last axis of both arrays is x, y."""
-    x, y = (_square(points.at(np.s_[..., k]), others.at(np.s_[..., k])) for k in (0, 1))
+    squares = []
+    for k in (0, 1):
+        here, there = points.at(np.s_[..., k]), others.at(np.s_[..., k])
+        if here.low.any() or there.low.any():
+            apart = here - there
+        else:  # with fewer terms
+            apart = Pair(*two_sum(here.high, -there.high))
+        high, rest = two_square(apart.high)
+        squares.append(Pair(high, rest + (apart.high + apart.high) * apart.low))
+    x, y = squares
     square, rest = two_sum(x.high, y.high)
     return Pair(square, rest + (x.low + y.low))
-
-
-def _square(here: Pair, there: Pair) -> Pair:
-    """Squared differences of one coordinate, with fewer terms if all low parts are 0."""
-    if here.low.any() or there.low.any():
-        apart = here - there
-    else:
-        apart = Pair(*two_sum(here.high, -there.high))
-    high, rest = two_square(apart.high)
-    return Pair(high, rest + (apart.high + apart.high) * apart.low)

@@ -77,14 +77,18 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     basis : reduced, with a shorter vector of length 1
     scale : the product A_ij r_ij, with the distances r_ij in the unit of `basis`
     """
+    from scipy.fft import next_fast_len
+
     i, j = cells // BLOCK
-    shape = rows, columns = int(i.max()) + 1, int(j.max()) + 1
-    block = i * columns + j
+    rows, columns = int(i.max()) + 1, int(j.max()) + 1
     workers = threads.worthwhile(4 * rows * columns)
+    size = next_fast_len(rows, real=True), next_fast_len(columns, real=True)
+    stride = 2 * (size[1] // 2 + 1)  # as in a `SiteBox.field`
+    block = i * stride + j
 
     def sums(values: NDArray[Any]) -> Single:
-        """The sum of values (n,) over each block."""
-        return np.bincount(block, values, rows * columns).astype(np.float32).reshape(shape)
+        """The field of the sums of values (n,) over each block."""
+        return np.bincount(block, values, rows * stride).astype(np.float32).reshape(rows, stride)
 
     total = sums(root * root)  # W^2 summed over each block
     touching = total > 0
@@ -92,18 +96,19 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
     sharing = float(counts @ counts / counts.sum())
     # Estimates A W r within a block of many asperities, for r with random signs.
     rough = scale / BLOCK * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / BLOCK**2, 1.0)))
-    size, spectrum = _block_spectrum(shape, basis, float(counts.mean()), workers)
+    spectrum = _block_spectrum(size, basis, float(counts.mean()), workers)
     passed = _low_pass(size, basis)
 
     def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
         waves[0] *= passed[:, each]
         return waves
 
-    mean = through_waves([total], size, workers, average)[0][:, :columns]
-    mean = np.maximum(mean, np.float32(1e-3) * mean.max())  # d; rounding may make it negative
+    mean = through_waves([total], size, workers, average)[0]
+    least = np.float32(1e-3) * mean[:, :columns].max()
+    mean = np.maximum(mean, least)  # d; rounding may make it negative
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)
-    q = w / np.sqrt(mean).ravel()[block]
+    q = w / np.sqrt(mean.ravel()[block])
 
     middle = np.float32(np.sqrt(np.median(mean[touching])))
     displacement = np.float32(scale) * middle * spectrum  # b^(1/2) A, for each wave
@@ -124,7 +129,7 @@ def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> S
             return waves
 
         field = through_waves([sums(q * values)], size, workers, remove)[0]
-        averages = np.ascontiguousarray(field[:, :columns]).ravel()[block]
+        averages = field.ravel()[block]
         averages *= q
         np.subtract(values, averages, out=averages)
         averages *= touched
@@ -143,17 +148,11 @@ def _low_pass(size: tuple[int, int], basis: Array) -> Single:
     return passed.astype(np.float32)
 
 
-def _block_spectrum(
-    blocks: tuple[int, int], basis: Array, count: float, workers: int
-) -> tuple[tuple[int, int], Single]:
-    """The size of a periodic box, and the spectrum of about the mean of 1 / r over pairs of blocks.
-
-    count : mean number of touching asperities in a block
-    """
+def _block_spectrum(size: tuple[int, int], basis: Array, count: float, workers: int) -> Single:
+    """The spectrum of the mean of 1 / r over pairs of blocks, about, for `count` points in each."""
     from scipy import fft
 
-    rows, columns = (fft.next_fast_len(length, real=True) for length in blocks)
-    i, j = (BLOCK * np.fft.ifftshift(np.arange(n) - n // 2) for n in (rows, columns))
+    i, j = (BLOCK * np.fft.ifftshift(np.arange(n) - n // 2) for n in size)
     x, y = (np.add.outer(i * basis[0, k], j * basis[1, k]) for k in (0, 1))
     x[0, 0] = np.inf
     mean = (1.0 / np.hypot(x, y)).astype(np.float32)
@@ -162,4 +161,4 @@ def _block_spectrum(
     own = ((2.0 / sides).sum() + (1.0 / diagonals).sum()) / 6.0  # six pairs of cells in a block
     mean[0, 0] = own * max(0.0, 1.0 - 1.0 / count)
     spectrum: Any = fft.rfft2(mean, workers=workers).real
-    return (rows, columns), np.ascontiguousarray(spectrum)
+    return np.ascontiguousarray(spectrum)

@@ -3,7 +3,8 @@
 L denotes the smooth kernel. Beyond the reach a, L is 1 / r^q. Within the reach, L is a polynomial:
 the series of 1 / r^q in t = 1 - (r/a)^2 up to the term with t^p. So L has p continuous derivatives
 at r = a. All terms of the series are positive, so nothing cancels. docs/theory/operators-mesh.md
-derives the bounds, in "The smooth part", "Derivatives of L" and "Interpolation".
+derives the bounds, in "The smooth part", "Derivatives of L", "Interpolation", "Rounding" and
+"Rounding errors of L".
 """
 
 from __future__ import annotations
@@ -61,10 +62,7 @@ class Softened:
 
     @property
     def roundoffs(self) -> float:
-        """Bound on the relative error of one computed value of L, in roundoffs.
-
-        docs/theory/operators-mesh.md, "Rounding errors of L".
-        """
+        """Bound on the relative error of one computed value of L, in roundoffs."""
         mean = self._slope / float(_series(self.order, self.power).sum())
         return 3.0 * mean + 4.0 + 4.5 * self.power
 
@@ -74,10 +72,7 @@ class Softened:
         return 8.0 * self.power + 2.0
 
     def moved(self, shift: float) -> float:
-        """Bound on (error of L) / (1 / r^q) for distances with errors of at most `shift` [length].
-
-        docs/theory/operators-mesh.md, "Rounding", for any q.
-        """
+        """Bound on (error of L) r^q for distances with errors of at most `shift` [length]."""
         q = self.power
         return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
 
@@ -109,11 +104,7 @@ class Softened:
         return float(_interpolated(self.order) * worst * ratio * nearer**self.power)
 
     def sway(self, spacing: float) -> float:
-        """[length] bound on |d - r| for two points at the distance r.
-
-        d is the distance from any node that is used to interpolate L at the first point to any node
-        that is used at the second point.
-        """
+        """[length] bound on |d - r| for nodes at a distance d that serve points at a distance r."""
         return math.sqrt(2.0) * self.order * spacing
 
     @property
@@ -140,10 +131,7 @@ def lebesgue(order: int) -> float:
 
 
 def twofold_lagrange(places: Array, order: int) -> Pair:
-    """(n, p) Lagrange's polynomials for the nodes 1 - p/2, ..., p/2, in double-double numbers.
-
-    places : (n,) from 0 to 1
-    """
+    """(n, p) Lagrange's polynomials for the nodes 1 - p/2, ..., p/2, at places from 0 to 1."""
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Pair(*two_sum(places, -float(node))) for node in nodes]
     left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]

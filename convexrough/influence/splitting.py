@@ -34,31 +34,21 @@ NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 
 @dataclass(frozen=True)
 class Splitting:
-    """A splitting of 1 / r^q into L + S, and a mesh for L.
+    """A splitting of 1 / r^q into L + S, and a mesh for L."""
 
-    kernel  : the softened kernel, which has q, p and a
-    spacing : [length] spacing h of the mesh
-    block   : side of the blocks that are interpolated together, in mesh cells
-    """
-
-    kernel: Softened
-    spacing: float
-    block: int
+    kernel: Softened  # the softened kernel, which has q, p and a
+    spacing: float  # [length] spacing h of the mesh
+    block: int  # side of the blocks that are interpolated together, in mesh cells
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting | None:
-        """The fastest splitting with an estimated relative error of products of `tolerance`.
-
-        None if sums over all pairs are faster.
-        """
+        """The fastest splitting with about this relative error; None if a matrix is faster."""
         n = len(points)
-        extent = np.ptp(points, axis=0) if n else np.zeros(2)
+        if n < 2 or not (extent := np.ptp(points, axis=0)).any():
+            return None
+        sums, widest = _Sums.of(points, power), float(np.hypot(*extent))
         best: Splitting | None = None
         least = PAIR_COST * n * n / 2
-        if n < 2 or not extent.any():
-            return best
-        sums = _Sums.of(points, power)
-        widest = float(np.hypot(*extent))
         for reach in (widest * 2.0 ** (-0.25 * np.arange(1, 80))).tolist():
             if (near := sums.around(reach)) < 2:
                 break
@@ -70,7 +60,10 @@ class Splitting:
                 if not spacing * order < widest:
                     continue
                 nodes = float(np.prod(extent / spacing + 1.5 * order))
-                found = cls(kernel, float(spacing), _block(order, nodes / n))
+                # A block has some tens of points, and a side of p / 2 to 2 p mesh cells.
+                wanted = int(np.ceil(np.sqrt(48.0 * nodes / n)))
+                block = int(np.clip(wanted, order // 2, 2 * order))
+                found = cls(kernel, float(spacing), block)
                 cost = pairs + NODE_COST * nodes + ROW_COST * n * (found.width**2 + 100)
                 if cost < least:
                     best, least = found, cost
@@ -122,9 +115,3 @@ def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
         excess = max(near_error, kernel.far_error(spacing)) / tolerance
         spacing *= excess ** (-1.0 / kernel.order)
     return spacing
-
-
-def _block(order: int, nodes_per_point: float) -> int:
-    """The side of a block with some tens of points, in mesh cells; from p / 2 to 2 p."""
-    wanted = int(np.ceil(np.sqrt(48.0 * nodes_per_point)))
-    return int(np.clip(wanted, order // 2, 2 * order))

@@ -14,7 +14,7 @@ from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout, Pattern
+from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout
 
 #: Random heights and logarithms of radii are normally distributed. They are clipped at this many
 #: standard deviations, so that only finitely many asperities of an unbounded array can touch.
@@ -43,17 +43,16 @@ class Asperities(Record):
     def __init__(
         self, positions: ArrayLike, tip_radii: ArrayLike, heights: ArrayLike = 0.0
     ) -> None:
-        object.__setattr__(self, "positions", _points(positions))
+        points = _points(positions)
         checks.same_index(positions=positions, tip_radii=tip_radii, heights=heights)
-        self._wear(tip_radii, heights)
+        self._set(points, tip_radii, heights)
         self.layout  # noqa: B018, refuses two asperities at one place
 
-    def _wear(self, tip_radii: ArrayLike, heights: ArrayLike) -> None:
-        n, least = len(self), checks.SMALLEST
+    def _set(self, positions: Array, tip_radii: ArrayLike, heights: ArrayLike) -> None:
+        n, least = len(positions), checks.SMALLEST
         radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
-        object.__setattr__(self, "tip_radii", radii)
         tall = checks.array("heights", heights, length=n, smallest=least)
-        object.__setattr__(self, "heights", tall)
+        self.__dict__.update(positions=positions, tip_radii=radii, heights=tall)
 
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
@@ -98,9 +97,8 @@ class Asperities(Record):
     @staticmethod
     def _on(layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
         asperities = object.__new__(Asperities)
-        object.__setattr__(asperities, "positions", layout.points)
-        object.__setattr__(asperities, "layout", layout)
-        asperities._wear(tip_radii, heights)
+        asperities._set(layout.points, tip_radii, heights)
+        asperities.__dict__["layout"] = layout
         return asperities
 
     def __len__(self) -> int:
@@ -177,18 +175,17 @@ class Asperities(Record):
 
     @classmethod
     def _lattice(
-        cls, pattern: Pattern, spacing: float, tip_radius: ArrayLike, within: float
+        cls, second: tuple[float, float], spacing: float, tip_radius: ArrayLike, within: float
     ) -> Asperities:
         spacing = checks.positive("spacing", spacing)
         within = checks.non_negative("within", within)
         ratio = within / spacing
-        count = np.pi * pattern.density * ratio**2 + 1
+        count = np.pi / second[1] * ratio**2 + 1
         checks.fits_in_memory(f"within / spacing = {ratio:.3g}", count, 300)
-        layout = Layout.of(pattern, spacing, ratio**2 * (1 + 1e-12))
+        layout = Layout.of(second, spacing, ratio**2 * (1 + 1e-12))
         n = len(layout.points)
-        return cls._on(
-            layout, checks.array("tip_radius", tip_radius, length=n, sign="positive"), 0.0
-        )
+        radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
+        return cls._on(layout, radii, 0.0)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:

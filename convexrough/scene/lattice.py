@@ -33,18 +33,12 @@ SPARSEST = 50
 
 @dataclass(frozen=True, eq=False)
 class Lattice(Cached):
-    """The sites origin + i b1 + j b2 with whole numbers i and j.
+    """The sites origin + i b1 + j b2 with whole numbers i and j."""
 
-    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2, a reduced basis (of shortest
-        vectors)
-    site_error : [length] bound on the distance of points from their sites along x and along y
-    shrink, unshrunk : if `shrunk` made this lattice, its factors along x and y, and the basis
-        before shrinking; else 1, 1 and None
-    """
-
-    origin: Array
-    basis: Array
-    site_error: float
+    origin: Array  # (2,) [length]
+    basis: Array  # (2, 2) [length] rows b1 and b2, a reduced basis (of shortest vectors)
+    site_error: float  # [length] bound on the distance of points from sites along x and along y
+    #: If `shrunk` made this lattice, its factors along x and y, and the basis before shrinking.
     shrink: tuple[Fraction, Fraction] = (Fraction(1), Fraction(1))
     unshrunk: Array | None = None
 

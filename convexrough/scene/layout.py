@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from convexrough.scene.neighbours import refuse_coincident
 #: For more asperities than this, a lattice is looked for before nearest neighbours are computed.
 MANY = 5000
 
-
 #: The rim of a layout consists of the farthest point in each of this number of sectors.
 SECTORS = 16
 
@@ -26,64 +24,37 @@ SECTORS = 16
 MADE_SITE_ERROR = 16 * 2.0**-53
 
 
-@dataclass(frozen=True)
-class Pattern:
-    """The sites i b1 + j b2 of a lattice with the spacing 1.
+#: The second vector b2 of the lattice in which each site has six nearest neighbours, and of that in
+#: which each has four. The first vector b1 is (1, 0), and the spacing is 1.
+HEXAGONAL, SQUARE = (0.5, float(np.sqrt(0.75))), (0.0, 1.0)
 
-    skew   : coefficient in the norm of a site, |i b1 + j b2|^2 = i^2 + skew i j + j^2
-    second : b2; b1 is (1, 0)
+
+def sites_within(second: tuple[float, float], limit: float) -> tuple[NDArray[np.int32], Indices]:
+    """(n, 2) the sites (i, j) with |i b1 + j b2|^2 up to `limit`, and (n,) indices that sort them.
+
+    The sites are ordered by distance and then by angle; the indices sort them by i and then by j.
     """
-
-    skew: int
-    second: tuple[float, float]
-
-    @property
-    def basis(self) -> Array:
-        return np.array([[1.0, 0.0], self.second])
-
-    @property
-    def density(self) -> float:
-        """The number of sites per unit area."""
-        return 1.0 / self.second[1]
-
-    def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
-        """(n, 2) the sites (i, j) with norms of at most `limit`, and (n,) indices that sort them.
-
-        The sites are ordered by norm and then by angle; the indices sort them by i and then by j.
-        """
-        top = int(np.sqrt(limit / (1.0 - self.skew**2 / 4.0))) + 1
-        steps = np.arange(-top, top + 1)
-        norms = np.add.outer(steps * steps, steps * steps)
-        if self.skew:
-            norms += np.multiply.outer(self.skew * steps, steps)
-        taken = norms <= limit
-        i, j = (each - top for each in np.nonzero(taken))
-        x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of two norms
-        order = np.argsort(norms[taken] + turns)
-        back = np.empty_like(order)
-        back[order] = np.arange(len(order))
-        return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
-
-    def coordinates(self, i: NDArray[Any], j: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """The coordinates x and y of the sites i b1 + j b2."""
-        return i + self.second[0] * j, self.second[1] * j
-
-
-#: The lattice in which each site has six nearest neighbours, and that in which each has four.
-HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
-SQUARE = Pattern(0, (0.0, 1.0))
+    skew = round(2.0 * second[0])  # |i b1 + j b2|^2 = i^2 + skew i j + j^2
+    top = int(np.sqrt(limit / (1.0 - skew**2 / 4.0))) + 1
+    steps = np.arange(-top, top + 1)
+    norms = np.add.outer(steps * steps, steps * steps)
+    if skew:
+        norms += np.multiply.outer(skew * steps, steps)
+    taken = norms <= limit
+    i, j = (each - top for each in np.nonzero(taken))
+    turns = np.arctan2(second[1] * j, i + second[0] * j) % (2 * np.pi) / 7.0
+    order = np.argsort(norms[taken] + turns)  # turns are below 1, the least difference of two norms
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
 
 
 @dataclass(frozen=True, eq=False)
 class Layout(Cached):
-    """Distinct points (n, 2) [length] in the plane, with data that depend only on them.
-
-    made : the lattice on which the points were made, and (n, 2) their sites (i, j); None for other
-        points
-    """
+    """Distinct points (n, 2) [length] in the plane, with data that depend only on them."""
 
     points: Array
+    #: The lattice on which the points were made, and (n, 2) their sites; None for other points.
     made: tuple[Lattice, Sites] | None = None
 
     def __post_init__(self) -> None:
@@ -91,19 +62,16 @@ class Layout(Cached):
             refuse_coincident(self.points)
 
     @classmethod
-    def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
-        """The layout of a pattern's sites up to the squared distance `limit` [spacing^2].
-
-        spacing : [length] distance of nearest neighbours
-        """
-        sites, order = pattern.within(limit)
-        points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
+    def of(cls, second: tuple[float, float], spacing: float, limit: float) -> Layout:
+        """The layout of `sites_within` this limit, for a spacing [length]."""
+        sites, order = sites_within(second, limit)
+        i, j = sites.T
+        points = frozen(spacing * np.stack((i + second[0] * j, second[1] * j), axis=1))
         if len(points) < 3:
-            return cls(frozen(points))
+            return cls(points)
         site_error = MADE_SITE_ERROR * float(np.abs(points).max())
-        layout = cls(
-            frozen(points), (Lattice(np.zeros(2), spacing * pattern.basis, site_error), sites)
-        )
+        lattice = Lattice(np.zeros(2), spacing * np.array([[1.0, 0.0], second]), site_error)
+        layout = cls(points, (lattice, sites))
         layout.__dict__["order"] = order
         return layout
 

@@ -46,13 +46,12 @@ class Material:
         if youngs_modulus is not None:
             expected = "a contact_modulus; Material.from_youngs(modulus, poisson_ratio) converts"
             raise InputError("youngs_modulus", found=youngs_modulus, expected=expected)
-        for name, value in (
-            ("contact_modulus", checks.positive("contact_modulus", contact_modulus)),
-            ("poisson_ratio", checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)),
-            ("hardness", None if hardness is None else checks.positive("hardness", hardness)),
-            ("mismatch", checks.between("mismatch", mismatch, -0.5, 0.5)),
-        ):
-            object.__setattr__(self, name, value)
+        self.__dict__.update(
+            contact_modulus=checks.positive("contact_modulus", contact_modulus),
+            poisson_ratio=checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5),
+            hardness=None if hardness is None else checks.positive("hardness", hardness),
+            mismatch=checks.between("mismatch", mismatch, -0.5, 0.5),
+        )
 
     @classmethod
     def from_youngs(

@@ -15,16 +15,6 @@ BATCH = 256
 FEW = 400
 
 
-def separations(points: Array, point_error: float = 0.0) -> Array:
-    """(n,) [length] lower bounds on the distance of each point to its nearest neighbour.
-
-    point_error : [length] bound on the error of each coordinate
-    """
-    if len(points) < 2:
-        return np.full(len(points), np.inf)
-    return np.maximum(nearest_distances(points) - 3.0 * point_error, 0.0)
-
-
 def crowding(points: Array, radii: Array) -> float:
     """The largest (a_i + a_j) / r_ij over all pairs, with contact radii a and distances r."""
     from scipy.spatial import cKDTree

@@ -100,11 +100,8 @@ class Scene(Record):
     @cached_property
     def relative_radii(self) -> Array:
         """(n,) [length] R_i, from 1/R_i = `curvature` + 1/rho_i with the tip radius rho_i."""
-
-        def relative(rho: Array) -> Array:
-            return frozen(1.0 / (self.curvature + 1.0 / rho))
-
-        return evenly(relative, self.asperities.tip_radii)
+        radii = self.asperities.tip_radii
+        return evenly(lambda rho: frozen(1.0 / (self.curvature + 1.0 / rho)), radii)
 
     @cached_property
     def contact_points(self) -> Array:
@@ -211,9 +208,8 @@ class Scene(Record):
 @lru_cache(8)  # scenes that differ only in heights share it
 def _shrunk(lattice: Lattice, radii: tuple[float, float], tip: float) -> Lattice | None:
     """The lattice of the points x R / (R + tip), with the radii R along x and y."""
-    tip_radius = Fraction(tip)
-    exact = [Fraction(R) if math.isfinite(R) else None for R in radii]
-    return lattice.shrunk(*(Fraction(1) if R is None else R / (R + tip_radius) for R in exact))
+    factors = (Fraction(R) / (Fraction(R) + Fraction(tip)) if math.inf > R else 1 for R in radii)
+    return lattice.shrunk(*map(Fraction, factors))
 
 
 def reach(

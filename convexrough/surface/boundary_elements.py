@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -53,7 +52,13 @@ def half_space(
 
     box = SiteBox(shape, np.diag(pixel[::-1]))
     (kernel,) = box.kernels(influence, np.float64)
-    return partial(box.convolve, spectrum=kernel.spectrum)
+
+    def displacement(pressure: Array) -> Array:
+        field = box.field(np.float64)
+        field[:, : shape[1]] = pressure
+        return np.asarray(box.convolve(field, kernel.spectrum)[:, : shape[1]])
+
+    return displacement
 
 
 def touch(

@@ -62,7 +62,10 @@ def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None
     loads = Pair.exact(np.random.default_rng(1).random(shape[0] * shape[1]) ** 3)
     slices, _ = sliced._cut(loads)
     fields = [each.reshape(shape) for each in slices]
-    levels = through_waves(fields, box.padded, 1, sliced._levels)
+    places = np.add.outer(np.arange(shape[0]) * box.stride, np.arange(shape[1])).ravel()
+    levels = through_waves(
+        [box.laid_out(each, places) for each in slices], box.padded, 1, sliced._levels
+    )
     # The slices of the kernel, from its values: K(-d) = K(d).
     i, j = np.arange(-shape[0] + 1, shape[0]), np.arange(-shape[1] + 1, shape[1])
     values = cut(distances.at(i, j), sliced.bits, sliced.more, count)
