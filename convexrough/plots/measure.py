@@ -98,42 +98,51 @@ def _metric(unit: str) -> tuple[str, int] | None:
     return (name, power) if name and known.size * 10 ** (-power) == 1 else None
 
 
+class Place(NamedTuple):
+    """Where a map is: its points (n, 2) [length], and the measure of its axes.
+
+    axes : semi-axes [length] of the smooth contact, to be outlined about the origin; or ()
+    """
+
+    points: Array
+    length: Measure
+    axes: Sequence[float] = ()
+
+
 class Scale:
     """The measures of a contact's figures, and the smooth contact under the same load.
 
-    sphere : the smooth sphere or ellipsoid, or None
-    axes   : semi-axes [length] of the smooth contact;  centre : (2,) [length] origin of distances
+    sphere : the smooth sphere or ellipsoid, or None;  name : its name in legends
+    points, length, axes : as in `Place`;  centre : (2,) [length] origin of distances
+    typical, peak : radius and peak pressure of the smooth contact, or r_c and mean pressure
     """
 
     def __init__(self, contact: Contact) -> None:
         self.contact, self.units = contact, contact.scene.units
-        load, points = contact.load, contact.scene.contact_points
+        self.points, load = contact.scene.contact_points, contact.load
         self.sphere = smooth_reference(contact.scene, load) if load else None
-        self.centre: Array = np.zeros(2)
+        self.name, self.centre = "smooth sphere", np.zeros(2)
         self.axes: Sequence[float] = ()
         if self.sphere is not None:
-            a_H = self.sphere.contact_radius
-            self.axes = (a_H, a_H)
+            self.typical, self.peak = self.sphere.contact_radius, self.sphere.peak_pressure
+            self.axes = (self.typical, self.typical)
             if isinstance(self.sphere, SmoothEllipsoid):
-                self.axes = self.sphere.semi_axes
-            self.typical, self.peak = a_H, self.sphere.peak_pressure
-            symbols = "a_H", "p_0"
+                self.name, self.axes = "smooth ellipsoid", self.sphere.semi_axes
         else:
-            touching = contact.loads > 0
             if load:
-                self.centre = contact.loads @ points / load
-            rims = np.hypot(*(points - self.centre).T) + contact.contact_radii
-            self.typical = float(rims[touching].max(initial=0.0))
+                self.centre = contact.loads @ self.points / load
+            rims = np.hypot(*(self.points - self.centre).T) + contact.contact_radii
+            self.typical = float(rims[contact.loads > 0].max(initial=0.0))
             self.peak = load / (np.pi * self.typical**2) if load else 0.0
-            symbols = "r_c", "\\bar p"
+        symbols = ("a_H", "p_0") if self.sphere else ("r_c", "\\bar p")
         self.length = measure(self.typical, self.units.length, symbols[0])
         pressure, most = self.units.pressure, peak_pressures(contact).max()
         self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
 
     @property
-    def name(self) -> str:
-        """The name of the smooth reference."""
-        return f"smooth {'ellipsoid' if isinstance(self.sphere, SmoothEllipsoid) else 'sphere'}"
+    def distances(self) -> Array:
+        """(n,) [length] distances of all contact points from the centre."""
+        return np.asarray(np.hypot(*(self.points - self.centre).T))
 
     @cached_property
     def limit(self) -> float:
@@ -155,20 +164,19 @@ class Scale:
         """W0 = 24/5 f P X0 [force length]; for a sphere 9 (2 - nu) f^2 P^2 / (5 G a_H)."""
         return 4.8 * self.limit * self.travel
 
-    @cached_property
+    @property
     def force(self) -> Measure:
         """The measure of shear forces."""
         return measure(self.limit, self.units.force, "(fP)")
 
-    @cached_property
+    @property
     def displacement(self) -> Measure:
         """The measure of displacements along the shear."""
         return measure(self.travel, self.units.length, "X_0")
 
     def energy(self, largest: float) -> Measure:
         """The measure of energies up to the largest."""
-        unit = self.units.work
-        return measure(largest if unit else self.work, unit, "W_0")
+        return measure(largest if self.units.work else self.work, self.units.work, "W_0")
 
     def footnote(self) -> str:
         """A line that says what f P and X0 are."""
