@@ -19,11 +19,10 @@ from convexrough.paper.states import AMPLITUDES, READ_CROSSING, SHARE, PaperStat
 from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
-from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.press import abscissae, map_and_profile, pressure_figure, towards_rim
 from convexrough.plots.shear import draw_state, legend_handles
-from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, Scale
 from convexrough.sphere.smooth import smooth
 
 
@@ -81,7 +80,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, float(row), f"{value:.4f}", fontsize=TICK, va="center")
-    limit = f"$fP$ = {quantity(scale.limit, '')}"
+    limit = f"$fP$ = {style.quantity(scale.limit, '')}"
     style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     style.title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
@@ -91,10 +90,10 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     return figure
 
 
-def _tractions(scale: Scale) -> tuple[float, Measure]:
+def _tractions(scale: Scale) -> tuple[float, style.Measure]:
     """The coefficient of friction f, and the measure of tractions, f p0."""
     f = checks.friction(scale.contact.scene.friction)
-    return f, measure(f * scale.peak, "", "(fp_0)")
+    return f, style.measure(f * scale.peak, "", "(fp_0)")
 
 
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
@@ -113,13 +112,13 @@ def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
     style.title(profile, "central asperity")
-    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, '')})"
+    across = f"$x\\,/\\,a_i$  ($a_i$ = {style.quantity(a, '')})"
     style.label(profile, across, unit.label("q"))
     style.legend(profile, "above")
     return figure
 
 
-def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) -> None:
+def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: style.Measure) -> None:
     """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre."""
     contact = state.contact
     touching = contact.loads > 0

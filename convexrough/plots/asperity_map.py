@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
-from convexrough.plots.measure import Place, Scale
-from convexrough.plots.style import COLOURS, DASHED, FAINT, SMOOTH
+from convexrough.plots.style import COLOURS, DASHED, FAINT, SMOOTH, Scale
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
 #: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
@@ -53,7 +52,7 @@ class Layer(NamedTuple):
 
 
 def draw_map(
-    axes: Axes, place: Place | Scale, layers: Sequence[Layer], *, room: Array | None = None
+    axes: Axes, place: style.Place | Scale, layers: Sequence[Layer], *, room: Array | None = None
 ) -> None:
     """Draw discs, and faint dots at points without a disc, in a square with a margin.
 

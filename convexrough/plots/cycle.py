@@ -18,10 +18,9 @@ from convexrough.friction.fretting import Fretting
 from convexrough.friction.loop import Loop
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
-from convexrough.plots.measure import Scale, measure
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.steady import draw_closed
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, Scale
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
@@ -246,8 +245,8 @@ def fretting_figures(worn: Fretting) -> Figures:
     figure, maps = panels(DOUBLE, 6.2, 2, 2, sharex=True, sharey=True)
     pressure, f = scale.units.pressure, scale.limit / worn.contact.load
     most = _largest(worn.largest_tractions) if pressure else f * scale.peak
-    traction = measure(most, pressure, f"(f{scale.pressure.symbol})")
-    energy = measure(_largest(worn.losses), scale.units.work, "W_m")
+    traction = style.measure(most, pressure, f"(f{scale.pressure.symbol})")
+    energy = style.measure(_largest(worn.losses), scale.units.work, "W_m")
     draw_slip(maps[0], worn, scale)
     for axes, values, unit, name, symbol in (
         (maps[1], worn.losses, energy, "energy lost per cycle", "W_i"),
@@ -267,7 +266,7 @@ def fretting_figures(worn: Fretting) -> Figures:
 def draw_slip(axes: Axes, worn: Fretting, scale: Scale | None = None) -> None:
     """Draw the map of slip amplitudes."""
     scale, unit = scale or Scale(worn.contact), worn.contact.scene.units.length
-    slip = measure(_largest(worn.slip_amplitudes) if unit else scale.travel, unit, "X_0")
+    slip = style.measure(_largest(worn.slip_amplitudes) if unit else scale.travel, unit, "X_0")
     draw_values(axes, scale, np.nan_to_num(slip.of(worn.slip_amplitudes)), slip.short("s_i"))
     style.title(axes, "slip amplitude at the rim")
 

@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 from convexrough.gradients.gradient import Gradient
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
-from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figures, panels
-from convexrough.plots.style import SINGLE
+from convexrough.plots.style import SINGLE, Scale
 
 
 def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:

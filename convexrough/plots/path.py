@@ -15,10 +15,9 @@ from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_layers
-from convexrough.plots.measure import Place, Scale
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.steady import PATTERNS, label_plane, name_statuses, vertices
-from convexrough.plots.style import DOUBLE, FAINT, SMOOTH, TICK
+from convexrough.plots.style import DOUBLE, FAINT, SMOOTH, TICK, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
@@ -146,7 +145,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     figure, places = panels(DOUBLE, 0.5 + 1.9 * rows, rows, columns)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
-    room, place = radii[chosen].max(axis=0), Place(scale.points, scale.length)
+    room, place = radii[chosen].max(axis=0), style.Place(scale.points, scale.length)
     for axes, k in zip(places, chosen, strict=False):
         draw_map(axes, place, status_layers(path.status[k], radii[k]), room=room)
         slide = np.count_nonzero(path.status[k] == "sliding")

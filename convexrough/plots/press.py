@@ -14,9 +14,8 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, draw_values
-from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
-from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE
+from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE, Scale
 from convexrough.sphere import hertz
 
 

@@ -11,7 +11,6 @@ from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_map, even_radii
-from convexrough.plots.measure import Place, measure
 from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
@@ -55,8 +54,8 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
         Layer("first", np.where(first, 1.25 * radii, 0.0), UNSURE, None),
         Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
     ]
-    length = measure(float(np.ptp(points)), found.scene.units.length)
-    draw_map(axes, Place(points, length), layers)
+    length = style.measure(float(np.ptp(points)), found.scene.units.length)
+    draw_map(axes, style.Place(points, length), layers)
     ringed = "\nringed: the first to keep sliding" if first.any() else ""
     style.title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:

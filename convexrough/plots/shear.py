@@ -20,9 +20,8 @@ from convexrough.plots.asperity_map import (
     status_handles,
     status_layers,
 )
-from convexrough.plots.measure import Scale, quantity
 from convexrough.plots.notebook import Figures, no_contact, panels
-from convexrough.plots.style import DASHED, DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -62,7 +61,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
         axes.remove()
     for axes in maps[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
-    limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
+    limit = f"$fP$ = {style.quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
     style.legend(figure, "outside", handles=legend_handles(shown, scale),

@@ -48,7 +48,7 @@ def slider_html(contact: Contact, proved: Sequence[str]) -> str:
 def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
     """The data of the page, with five digits: first loading, and steady cycles.
 
-    Lengths are in a_H, forces in f P, displacements in X0 of `plots.measure`. `stick` has a row per
+    Lengths are in a_H, forces in f P, displacements in X0 of `plots.style`. `stick` has a row per
     force and a column per disc: the stick radius in thousandths of the contact radius, 0 where
     sliding, -1 where undecided.
     """

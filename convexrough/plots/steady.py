@@ -15,9 +15,8 @@ from convexrough.friction.cycle import Cycle
 from convexrough.friction.phases import PhaseLosses
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
-from convexrough.plots.measure import Measure, Place, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, UNSURE, Scale
 
 #: Losses are drawn for at most this many factors (sizes of elliptic paths), the largest ones.
 MOST_FACTORS = 5
@@ -39,10 +38,10 @@ def steady_figures(found: Cycle) -> Figures:
     """
     figure, (plane, chart) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
-    place = Place(found.scene.contact_points, Scale(found.contact).length)
+    place = style.Place(found.scene.contact_points, Scale(found.contact).length)
     draw_map(chart, place, status_layers(found.status, found.contact.contact_radii))
     name_statuses(figure, found.status)
-    lost = quantity(found.loss, found.scene.units.work)
+    lost = style.quantity(found.loss, found.scene.units.work)
     style.title(chart, f"each cycle after the first loses {lost}")
     return Figures({"steady": figure})
 
@@ -58,7 +57,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
     >>> print(*cr.plots.phase_figures(found))
     phase_losses
     """
-    figure, (axes,) = panels(SINGLE, 3.4)
+    figure, (axes,) = panels(style.SINGLE, 3.4)
     draw_losses(axes, found)
     return Figures({"phase_losses": figure})
 
@@ -68,7 +67,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
-    unit = measure(most, found.scene.units.work, "W_m")
+    unit = style.measure(most, found.scene.units.work, "W_m")
     for size, shade, pattern in zip(sizes, style.shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]
@@ -114,9 +113,9 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
     style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
 
 
-def label_plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
+def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
     """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
-    unit = measure(most, force_unit, "P_m")
+    unit = style.measure(most, force_unit, "P_m")
     _draw_cross(axes, unit, 0.0, 0.0, most, SMOOTH, 0.7)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
@@ -126,7 +125,13 @@ def label_plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
 
 
 def _draw_cross(
-    axes: Axes, unit: Measure, level: float, height: float, most: float, colour: str, lw: float
+    axes: Axes,
+    unit: style.Measure,
+    level: float,
+    height: float,
+    most: float,
+    colour: str,
+    lw: float,
 ) -> None:
     """Draw the lines T = height +- (P - level) from P = level to P = most."""
     P = np.array([level, most])
@@ -135,6 +140,6 @@ def _draw_cross(
         axes.plot(unit.of(P), unit.of(T), color=colour, lw=lw, ls=DASHED)
 
 
-def vertices(curve: MemoryCurve, unit: Measure) -> tuple[Array, Array]:
+def vertices(curve: MemoryCurve, unit: style.Measure) -> tuple[Array, Array]:
     levels, heights = (np.array(each, dtype=float) for each in (curve.levels, curve.heights))
     return unit.of(levels), unit.of(heights)

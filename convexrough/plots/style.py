@@ -1,20 +1,34 @@
-"""The shared look of the figures: sizes, colours, labels, ticks, legends, bars."""
+"""The shared look of the figures: sizes, colours, labels, legends, and the units of their axes.
+
+Where the scene names its units, axes show metric units as SI units with suitable prefixes, and
+other units unchanged. Where it does not, lengths are in a_H and pressures in p0 (contact radius and
+peak pressure of the smooth sphere under the same load), shear forces in f P, and displacements and
+energies in X0 and W0 of `Scale`. Where there is no finite smooth contact, lengths are in the radius
+r_c of the circle that holds all contacts, and pressures in the mean pressure on this circle.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough.arrays import Array
-from convexrough.plots.measure import literal as literal
+from convexrough import checks
+from convexrough.arrays import Array, Number
+from convexrough.contact import Contact
+from convexrough.fields import peak_pressures
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
+from convexrough.tabular.units import parsed
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -33,6 +47,10 @@ LEGENDS: dict[str, dict[str, Any]] = {
     "outside": dict(handletextpad=0.5, columnspacing=1.4, borderpad=0.2),
 }  # fmt: skip
 
+#: SI units by their powers of length and force; and prefixes in ascending order.
+SYMBOLS = {(1, 0): "m", (0, 1): "N", (-2, 1): "Pa", (1, 1): "J"}
+PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
+
 
 def label(axes: Axes, x: str, y: str) -> None:
     """Label the axes in the font size of print."""
@@ -47,13 +65,12 @@ def title(axes: Axes, text: str, loc: Literal["left", "center"] = "left") -> Non
     axes.set_title(text, fontsize=TICK, loc=loc)
 
 
-def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
+def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> None:
     """A colour bar, added to the right of the axes, with its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
     label(found.ax, "", "" if above else name)
     if above:
         title(found.ax, name, "center")
-    return found
 
 
 def legend(where: Any, place: str, **more: Any) -> None:
@@ -102,3 +119,160 @@ def doubtful(state: Any) -> NDArray[np.bool_]:
 def shades_of(count: int, low: float = 0.3) -> Array:
     """(count, 4) colours of curves, darker from first to last, all visible on white."""
     return np.asarray(matplotlib.colormaps[COLOURS](np.linspace(low, 1.0, count)))
+
+
+class Measure(NamedTuple):
+    """The unit of an axis: values are divided by `size`, which the label names.
+
+    symbol : formula of the divisor, such as a_H; "" if the axis shows a unit
+    said   : this unit; or, if there is a symbol, the value of the divisor
+    """
+
+    size: float = 1.0
+    symbol: str = ""
+    said: str = ""
+
+    def of(self, values: Number) -> Number:
+        """The values divided by `size`, as the axis shows them."""
+        return values / self.size
+
+    def short(self, name: str) -> str:
+        """The label of an axis, without the value of the symbol."""
+        if self.symbol:
+            return f"${name}\\,/\\,{self.symbol}$"
+        return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
+
+    def label(self, name: str) -> str:
+        """The label of an axis, with the unit or the value of the symbol."""
+        known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
+        return self.short(name) + known
+
+
+def measure(size: float, unit: str, symbol: str = "") -> Measure:
+    """The measure of an axis with values up to `size`.
+
+    A metric `unit` becomes an SI unit with a prefix; another unit stays. Without a unit, values are
+    divided by `size`, whose formula is `symbol`; without unit and symbol, values are not divided.
+    """
+    if known := _metric(unit):
+        name, exponent = known
+        si, step = abs(size) * 10.0**exponent, 0  # a power of a thousand scales it to 1 to 1000
+        if si and math.isfinite(si):
+            step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
+        return Measure(10.0 ** (3 * step - exponent), "", f"{PREFIXES[step + 5]}{name}")
+    if unit or not symbol:
+        return Measure(1.0, "", unit)
+    return Measure(size or 1.0, symbol, quantity(size, ""))
+
+
+def quantity(value: float, unit: str) -> str:
+    """The value to three digits with its unit, such as 4.12 µm (SI) or 4.12 × 10^-3 in."""
+    if value and _metric(unit):
+        prefixed = measure(float(f"{value:.3g}"), unit)
+        return f"{prefixed.of(value):.3g} {prefixed.said}"
+    digits, _, power = f"{value:.2e}".partition("e")
+    plain = value == 0 or -3 < int(power) < 3
+    number = f"{value:.3g}" if plain else f"${digits}\\times 10^{{{int(power)}}}$"
+    return f"{number} {literal(unit)}".strip()
+
+
+def literal(text: str) -> str:
+    """Text in which no dollar sign begins a formula."""
+    return text.replace("$", r"\$")
+
+
+def _metric(unit: str) -> tuple[str, int] | None:
+    """The SI unit of which a unit is 10^power, and the power; None for other units."""
+    if (known := parsed(unit) if unit.strip() else None) is None:
+        return None
+    power = round(math.log10(known.size))
+    name = SYMBOLS.get((known.length, known.force))
+    return (name, power) if name and known.size * 10 ** (-power) == 1 else None
+
+
+class Place(NamedTuple):
+    """Where a map is: its points (n, 2) [length], and the measure of its axes.
+
+    axes : semi-axes [length] of the smooth contact, to be outlined about the origin; or ()
+    """
+
+    points: Array
+    length: Measure
+    axes: Sequence[float] = ()
+
+
+class Scale:
+    """The measures of a contact's figures, and the smooth contact under the same load.
+
+    sphere : the smooth sphere or ellipsoid, or None;  name : its name in legends
+    points, length, axes : as in `Place`;  centre : (2,) [length] origin of distances
+    typical, peak : radius and peak pressure of the smooth contact, or r_c and mean pressure
+    """
+
+    def __init__(self, contact: Contact) -> None:
+        self.contact, self.units = contact, contact.scene.units
+        self.points, load = contact.scene.contact_points, contact.load
+        self.sphere = smooth_reference(contact.scene, load) if load else None
+        self.name, self.centre = "smooth sphere", np.zeros(2)
+        self.axes: Sequence[float] = ()
+        if self.sphere is not None:
+            self.typical, self.peak = self.sphere.contact_radius, self.sphere.peak_pressure
+            self.axes = (self.typical, self.typical)
+            if isinstance(self.sphere, SmoothEllipsoid):
+                self.name, self.axes = "smooth ellipsoid", self.sphere.semi_axes
+        else:
+            if load:
+                self.centre = contact.loads @ self.points / load
+            rims = np.hypot(*(self.points - self.centre).T) + contact.contact_radii
+            self.typical = float(rims[contact.loads > 0].max(initial=0.0))
+            self.peak = load / (np.pi * self.typical**2) if load else 0.0
+        symbols = ("a_H", "p_0") if self.sphere else ("r_c", "\\bar p")
+        self.length = measure(self.typical, self.units.length, symbols[0])
+        pressure, most = self.units.pressure, peak_pressures(contact).max()
+        self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
+
+    @property
+    def distances(self) -> Array:
+        """(n,) [length] distances of all contact points from the centre."""
+        return np.asarray(np.hypot(*(self.points - self.centre).T))
+
+    @cached_property
+    def limit(self) -> float:
+        """[force] the friction limit f P."""
+        return checks.friction(self.contact.scene.friction) * self.contact.load
+
+    @cached_property
+    def travel(self) -> float:
+        """[length] X0: displacement at gross sliding of the smooth contact, if any, or of this."""
+        if self.sphere is not None:
+            return float(self.sphere.displacement(self.limit))
+        scene = self.contact.scene  # X0 = c_t f times the approach from first touch
+        c_t = float(mindlin.ratio(scene.material.poisson_ratio))
+        first = self.contact.approach + float(scene.offsets.max())
+        return checks.friction(scene.friction) * c_t * first
+
+    @property
+    def work(self) -> float:
+        """W0 = 24/5 f P X0 [force length]; for a sphere 9 (2 - nu) f^2 P^2 / (5 G a_H)."""
+        return 4.8 * self.limit * self.travel
+
+    @property
+    def force(self) -> Measure:
+        """The measure of shear forces."""
+        return measure(self.limit, self.units.force, "(fP)")
+
+    @property
+    def displacement(self) -> Measure:
+        """The measure of displacements along the shear."""
+        return measure(self.travel, self.units.length, "X_0")
+
+    def energy(self, largest: float) -> Measure:
+        """The measure of energies up to the largest."""
+        return measure(largest if self.units.work else self.work, self.units.work, "W_0")
+
+    def footnote(self) -> str:
+        """A line that says what f P and X0 are."""
+        whose = f"the {self.name}'s" if self.sphere else "this contact's"
+        X0 = quantity(self.travel, self.units.length)
+        limit = quantity(self.limit, self.units.force)
+        return f"$fP$ = {limit},   $X_0$ = {X0}: {whose} $X$ at gross sliding"

@@ -12,19 +12,8 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
-from convexrough.plots.measure import Measure, Place, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import (
-    DASHED,
-    DOUBLE,
-    FAINT,
-    LABEL,
-    ROUGH,
-    SINGLE,
-    SMOOTH,
-    TICK,
-    UNSURE,
-)
+from convexrough.plots.style import DASHED, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE, Scale
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
@@ -70,10 +59,10 @@ def surface_figures(
     return figures
 
 
-def draw_surface(axes: Axes, surface: Surface) -> tuple[AxesImage, Measure, Measure]:
+def draw_surface(axes: Axes, surface: Surface) -> tuple[AxesImage, style.Measure, style.Measure]:
     """Draw the heights in greys; return the image, and the measures of its axes and heights."""
-    x = measure(surface.size[0] / 2, surface.unit)
-    z = measure(float(np.abs(surface.heights).max()), surface.unit)
+    x = style.measure(surface.size[0] / 2, surface.unit)
+    z = style.measure(float(np.abs(surface.heights).max()), surface.unit)
     width, height = (x.of(side / 2) for side in surface.size)
     whole = (-width, width, -height, height)
     image = axes.imshow(z.of(surface.heights), origin="lower", extent=whole, cmap="gray",
@@ -88,8 +77,8 @@ def draw_summit_map(axes: Axes, summits: Summits) -> None:
     """Draw a disc at each summit."""
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    length = measure(float(np.ptp(summits.positions)) / 2, summits.unit)
-    draw_map(axes, Place(summits.positions, length), [layer])
+    length = style.measure(float(np.ptp(summits.positions)) / 2, summits.unit)
+    draw_map(axes, style.Place(summits.positions, length), [layer])
 
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
@@ -130,7 +119,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
         axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
         style.label(axes, "", name)
-    lower.set_xlabel(upper.get_xlabel(), fontsize=LABEL)
+    lower.set_xlabel(upper.get_xlabel(), fontsize=style.LABEL)
     upper.set_xlabel("")
     first = curve.trusted_from
     until = float(curve.prune[-1]) if np.isnan(first) else first
@@ -139,7 +128,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
     met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
-    size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
+    size = f"   ($Sz$ = {style.quantity(float(tallest), unit)})" if tallest else ""
     style.title(upper, f"assumptions met {met}{size}")
     return figure
 
@@ -184,7 +173,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     return figure
 
 
-def _draw_contacts(axes: Axes, scale: Scale, length: Measure) -> float:
+def _draw_contacts(axes: Axes, scale: Scale, length: style.Measure) -> float:
     """Draw contacts, smooth contact and most crowded pair; return half the width of the view."""
     contact, points = scale.contact, length.of(scale.points)
     touching, radii = contact.loads > 0, length.of(contact.contact_radii)
@@ -202,9 +191,9 @@ def _draw_contacts(axes: Axes, scale: Scale, length: Measure) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    figure, (left, middle, right) = panels(DOUBLE, 2.7, 1, 3)
+    figure, (left, middle, right) = panels(style.DOUBLE, 2.7, 1, 3)
     moments, level = surface.moments, summits.origin.level
-    unit = measure(float(np.abs(maxima.heights - level).max()), surface.unit)
+    unit = style.measure(float(np.abs(maxima.heights - level).max()), surface.unit)
     edges = _bins(unit.of(maxima.heights - level))
     _draw_both(left, edges, *(unit.of(each.heights - level) for each in (maxima, summits)))
     mean, spread = unit.of(moments.mean_height), unit.of(moments.height_std)
@@ -216,7 +205,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     left.xaxis.set_major_locator(style.round_ticks(4))
     style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
-    unit = measure(float(np.median(maxima.tip_radii)), surface.unit)
+    unit = style.measure(float(np.median(maxima.tip_radii)), surface.unit)
     edges = 10 ** _bins(np.log10(unit.of(maxima.tip_radii)))
     _draw_both(middle, edges, *(unit.of(each.tip_radii) for each in (maxima, summits)))
     middle.set_xscale("log")

@@ -20,7 +20,6 @@ from convexrough.plots.asperity_map import (
     status_handles,
     status_layers,
 )
-from convexrough.plots.measure import Place, measure
 from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, TICK, UNSURE
 
@@ -55,9 +54,9 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
 def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim; marks of wrong claims differ also without colours."""
     status, points = claim.status, claim.of.asperities.positions
-    length = measure(float(np.ptp(points)), claim.of.units.length)
+    length = style.measure(float(np.ptp(points)), claim.of.units.length)
     size = even_radii(points, np.ones(len(points), dtype=bool))
-    draw_map(axes, Place(points, length), status_layers(status, size, looks=SHADES))
+    draw_map(axes, style.Place(points, length), status_layers(status, size, looks=SHADES))
     handles = status_handles(status, SHADES)
     marked = {**claim.wrong, "undecided": claim.undecided}
     for mark, (what, those) in zip("oX^", marked.items(), strict=True):
