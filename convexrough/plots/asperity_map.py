@@ -41,8 +41,7 @@ LOOKS: Looks = {
 class Layer(NamedTuple):
     """Discs of one status; later layers cover earlier ones.
 
-    radii  : (n,) [length], 0 where no disc is drawn;  shades : (n, 4), or one colour for all
-    rim    : colour of the outlines; None draws no outlines
+    radii : (n,) [length], 0 for no disc;  shades : (n, 4), or one colour;  rim : of the outlines
     """
 
     status: str
@@ -58,9 +57,7 @@ def draw_map(
 
     room : (n,) [length] radii of discs that must fit into the square; default: of those drawn
 
-    If there are `CROWDED` or more discs, a mosaic replaces discs and dots. A pixel with several
-    asperities has their mean colour. Any other pixel has the colour of the nearest asperity, or
-    none if this asperity is far away. Asperities without a disc are white.
+    If there are `CROWDED` or more discs, a mosaic replaces discs and dots.
     """
     length = place.length
     points, outline = length.of(place.points), [length.of(axis) for axis in place.axes]
@@ -106,10 +103,8 @@ def draw_values(
 ) -> ScalarMappable:
     """Draw discs coloured by `values`, and a named colour bar; return the map of colours.
 
-    values : (n,), one for each contact disc; or (k, n), for k discs of each asperity, the later
-        drawn over the earlier
-    radii  : (k, n) [length] radii of these discs, the largest first
-    most   : the value at the end of the colour scale; default: the largest absolute value
+    values : (n,), one for each contact disc; or (k, n), of discs with `radii` (k, n) [length], the
+        largest first;  most : the end of the colour scale; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
     """
     most = float(np.abs(values).max()) or 1.0 if most is None else most
@@ -166,19 +161,16 @@ def draw_outline(
 
 
 def status_layers(
-    status: NDArray[np.str_],
-    radii: Array,
-    stick_radii: Array | None = None,
-    looks: Looks = LOOKS,
+    status: NDArray[np.str_], radii: Array, stick: Array | None = None, looks: Looks = LOOKS
 ) -> list[Layer]:
     """A layer of discs for each status, and one for the stick discs of "partial" asperities."""
     layers = [
         Layer(name, np.where(status == name, radii, 0.0), colour)
         for name, (colour, _) in looks.items()
     ]
-    if stick_radii is not None:
-        stick = np.where((status == "partial") & (radii > 0), stick_radii, 0.0)
-        layers.append(Layer("stick", stick, STICK))
+    if stick is not None:
+        there = (status == "partial") & (radii > 0)
+        layers.append(Layer("stick", np.where(there, stick, 0.0), STICK))
     return layers
 
 
@@ -200,7 +192,11 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
 
 
 def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:
-    """Draw the mosaic that `draw_map` describes, in the square with the corners `low`, `high`."""
+    """Draw a mosaic in the square with the corners `low`, `high`.
+
+    A pixel with several asperities has their mean colour; any other pixel has the colour of the
+    nearest asperity, or none if this asperity is far away.
+    """
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     width = high[0] - low[0]

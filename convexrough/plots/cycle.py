@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
@@ -101,9 +100,8 @@ def loops_figure(
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
             draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
-        upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
-                         textcoords="offset points", fontsize=7, va="center",
-                         path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+        place = (x.of(end), q.of(loop.forces[0]))
+        style.note(upright, _range(cycle, scale), place, (4, 2), fontsize=7, va="center")
     in_units = x.said and not x.symbol
     less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))
@@ -131,11 +129,12 @@ def loops_figure(
 def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     """Draw the loop of a cycle or, if the normal load varies, its path in the plane of loads."""
     if np.ptp(cycle.loads) > 0:
-        return draw_closed(axes, cycle)
-    scale = Scale(cycle.contact)
-    draw_loop(axes, scale, cycle.loop(asperities=[]))
-    style.legend(axes, "inside")
-    return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
+        draw_closed(axes, cycle)
+    else:
+        scale = Scale(cycle.contact)
+        draw_loop(axes, scale, cycle.loop(asperities=[]))
+        style.legend(axes, "inside")
+        style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
 def draw_loop(axes: Axes, scale: Scale, loop: Loop, slope: float = 0.0) -> None:

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.patheffects import withStroke
 
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
@@ -115,9 +114,9 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:
         return
-    figure, place = axes.get_figure(root=True), axes.get_position()
-    assert figure is not None
-    inches = 0.75 * figure.get_size_inches() * place.size  # about the size of the axes after layout
+    inches = (
+        0.75 * np.array(axes.bbox.size) / axes.figure.dpi
+    )  # about the size of the axes after layout
     spots = np.column_stack((x, y)) / (np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0]) / inches)
     groups: dict[int, list[int]] = {}
     for i, spot in enumerate(spots):
@@ -132,9 +131,8 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         clear = [min(float(np.hypot(*(place - each))) for each in taken) for place in places]
         best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
         taken.append(places[best])
-        axes.annotate(text, (x[i], y[i]), xytext=tuple((places[best] - spots[i]) * 72.0),
-                      textcoords="offset points", fontsize=TICK, ha="center", va="center",
-                      path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+        offset = tuple((places[best] - spots[i]) * 72.0)
+        style.note(axes, text, (x[i], y[i]), offset, ha="center", va="center")
 
 
 def _maps(path: LoadPath, scale: Scale) -> Figure:

@@ -67,9 +67,8 @@ def map_and_profile() -> tuple[Figure, tuple[Axes, Axes]]:
 def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
     """Draw a map of contact pressures with a colour bar; return the map of colours.
 
-    Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is drawn as a stack of discs in equal
-    steps of pressure. If many asperities touch, each is one disc in the colour of its peak
-    pressure.
+    Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is a stack of discs in equal steps of
+    pressure; if there are many, each is one disc in the colour of its peak pressure.
     """
     scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))

@@ -64,8 +64,8 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     limit = f"$fP$ = {style.quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
-    style.legend(figure, "outside", handles=legend_handles(shown, scale),
-                 loc="outside upper center", ncols=2 if columns == 1 else 4)  # fmt: skip
+    handles, loc, ncols = legend_handles(shown, scale), "outside upper center", min(2 * columns, 4)
+    style.legend(figure, "outside", handles=handles, loc=loc, ncols=ncols)
     return Figures({"stick_slip": figure})
 
 

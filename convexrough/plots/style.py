@@ -19,6 +19,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
@@ -87,6 +88,13 @@ def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
     return MaxNLocator(most, steps=[1, 2, 5, 10], integer=whole)
 
 
+def note(axes: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
+    """Write a text with a white halo near a place, at an offset in points."""
+    halo = [withStroke(linewidth=2.0, foreground="white")]
+    axes.annotate(text, place, xytext=offset, textcoords="offset points", path_effects=halo,
+                  **{"fontsize": TICK, **look})  # fmt: skip
+
+
 def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
     """Write a small text next to a place, readable on any background."""
     x, y = np.asarray(place)
@@ -124,8 +132,7 @@ def shades_of(count: int, low: float = 0.3) -> Array:
 class Measure(NamedTuple):
     """The unit of an axis: values are divided by `size`, which the label names.
 
-    symbol : formula of the divisor, such as a_H; "" if the axis shows a unit
-    said   : this unit; or, if there is a symbol, the value of the divisor
+    symbol : formula of the divisor, such as a_H, and `said` its value; or "", and `said` the unit
     """
 
     size: float = 1.0
