@@ -114,9 +114,7 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:
         return
-    inches = (
-        0.75 * np.array(axes.bbox.size) / axes.figure.dpi
-    )  # about the size of the axes after layout
+    inches = 0.75 * np.array(axes.bbox.size) / axes.figure.dpi  # about those after layout
     spots = np.column_stack((x, y)) / (np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0]) / inches)
     groups: dict[int, list[int]] = {}
     for i, spot in enumerate(spots):

@@ -11,15 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from convexrough.friction.shear import ShearState
+from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.asperity_map import (
-    CROWDED,
-    STICK,
-    draw_map,
-    draw_outline,
-    status_handles,
-    status_layers,
-)
 from convexrough.plots.notebook import Figures, no_contact, panels
 from convexrough.plots.style import DASHED, DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, Scale
 from convexrough.scene.rings import evenly_chosen
@@ -50,16 +43,16 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     width = SINGLE if columns == 1 else DOUBLE
     above = 0.17 * (1 + (columns == 4) + any(style.not_proved(state) for state in shown))
     height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
-    figure, maps = panels(width, height, rows, columns, sharex=True, sharey=True)
-    for axes, state in zip(maps, shown, strict=False):
+    figure, places = panels(width, height, rows, columns, sharex=True, sharey=True)
+    for axes, state in zip(places, shown, strict=False):
         draw_state(axes, state, scale)
         _title(axes, state, scale, "\n" if columns == 4 else " ")
         axes.set(xlabel="", ylabel="")
         if columns == 4:
             axes.xaxis.set_major_locator(style.round_ticks(4))
-    for axes in maps[len(shown) :]:
+    for axes in places[len(shown) :]:
         axes.remove()
-    for axes in maps[len(shown) - columns : len(shown)]:
+    for axes in places[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
     limit = f"$fP$ = {style.quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
@@ -91,10 +84,11 @@ def _title(axes: Axes, state: State, scale: Scale, space: str) -> None:
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
     """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact."""
     radii = state.contact.contact_radii
-    draw_map(axes, scale, status_layers(state.status, radii, state.stick_radii))
+    maps.draw_map(axes, scale, maps.status_layers(state.status, radii, state.stick_radii))
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
     if 0 < left < 1:
-        draw_outline(axes, [scale.length.of(np.cbrt(left) * each) for each in scale.axes], DOTTED)
+        stick = [scale.length.of(np.cbrt(left) * each) for each in scale.axes]
+        maps.draw_outline(axes, stick, DOTTED)
     unsure = scale.points[style.doubtful(state)]
     if len(unsure):
         size = float(np.clip(60.0 / np.sqrt(len(unsure)), 1.0, 4.0))
@@ -106,12 +100,12 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
     """Legend entries for the colours and marks that occur."""
     loads = states[0].contact.loads
     occur = np.concatenate([state.status[loads > 0] for state in states])
-    marks: list[Any] = status_handles(occur[occur != "undecided"])
+    marks: list[Any] = maps.status_handles(occur[occur != "undecided"])
     if "partial" in occur:
-        marks.insert(0, style.disc_handle(STICK, "stick disc"))
+        marks.insert(0, style.disc_handle(maps.STICK, "stick disc"))
     if any(style.doubtful(state).any() for state in states):
         marks.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
-    if (loads == 0).any() and np.count_nonzero(loads) < CROWDED:
+    if (loads == 0).any() and np.count_nonzero(loads) < maps.CROWDED:
         marks.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
     outlines = {"contact": DASHED}
     if any(np.any(state.force != 0) for state in states):

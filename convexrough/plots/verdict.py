@@ -11,15 +11,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from convexrough.compare import Comparison
 from convexrough.friction.side_by_side import PathComparison, PathEntry
 from convexrough.normal.claims import Claim
+from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.asperity_map import (
-    CROWDED,
-    Looks,
-    draw_map,
-    even_radii,
-    status_handles,
-    status_layers,
-)
 from convexrough.plots.notebook import Figures, panels
 from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, TICK, UNSURE
 
@@ -27,7 +20,7 @@ from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, TICK, UNSURE
 NUMBERED = 5
 
 #: Grey shade and label of each status.
-SHADES: Looks = {
+SHADES: maps.Looks = {
     "open": ("0.93", "open"),
     "contact": ("0.72", "contact"),
     "partial": ("0.72", "partial slip"),
@@ -45,8 +38,8 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     verdict
     """
     claims = [verdict] if sheared is None else [verdict, sheared]
-    figure, maps = panels(SINGLE if sheared is None else DOUBLE, 3.9, 1, len(claims))
-    for axes, claim in zip(maps, claims, strict=True):
+    figure, places = panels(SINGLE if sheared is None else DOUBLE, 3.9, 1, len(claims))
+    for axes, claim in zip(places, claims, strict=True):
         draw_claim(axes, claim)
     return Figures({"verdict": figure})
 
@@ -55,16 +48,16 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim; marks of wrong claims differ also without colours."""
     status, points = claim.status, claim.of.asperities.positions
     length = style.measure(float(np.ptp(points)), claim.of.units.length)
-    size = even_radii(points, np.ones(len(points), dtype=bool))
-    draw_map(axes, style.Place(points, length), status_layers(status, size, looks=SHADES))
-    handles = status_handles(status, SHADES)
+    size = maps.even_radii(points, np.ones(len(points), dtype=bool))
+    maps.draw_map(axes, style.Place(points, length), maps.status_layers(status, size, looks=SHADES))
+    handles = maps.status_handles(status, SHADES)
     marked = {**claim.wrong, "undecided": claim.undecided}
     for mark, (what, those) in zip("oX^", marked.items(), strict=True):
         if len(those):
             ms = float(np.clip(120.0 / np.sqrt(len(those)), 2.5, 7.0))
             handles += axes.plot(*length.of(points[those]).T, mark, mfc="white", mec=UNSURE,
                                  mew=1.1, ms=ms, label=f"{what} ({len(those):,})",
-                                 rasterized=len(those) > CROWDED)  # fmt: skip
+                                 rasterized=len(those) > maps.CROWDED)  # fmt: skip
     for i in claim.suspects[:NUMBERED]:
         style.write_beside(axes, str(i), length.of(points[i]))
     verdict = "holds" if claim.holds else "does not hold"
