@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.bench.scenes import FAMILIES, Family
-from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, UNSURE, label
+from convexrough.plots import style
+from convexrough.plots.notebook import Figure, panels
+from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, UNSURE
 
 #: Marker, line, face and colour of each solver, all different in grey.
 LOOKS: dict[str, dict[str, Any]] = {
@@ -42,26 +43,24 @@ def work_figure(bench: Bench) -> Figure:
 
     The frontier is grey.
     """
-    every = bench.panels().items()
-    panels = {scene: tried for scene, tried in every if any(row.known for row in tried)}
-    columns = min(COLUMNS, max(1, len(panels)))
-    rows = max(1, -(-len(panels) // columns))
-    figure = Figure(figsize=(DOUBLE, 2.1 * rows + 0.9), layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    for axes in grid[len(panels) :]:
+    scenes = [it for it in bench.panels().items() if any(row.known for row in it[1])]
+    columns = min(COLUMNS, max(1, len(scenes)))
+    rows = max(1, -(-len(scenes) // columns))
+    figure, grid = panels(DOUBLE, 2.1 * rows + 0.9, rows, columns, sharex=True)
+    for axes in grid[len(scenes) :]:
         axes.set_visible(False)
     handles: dict[str, Any] = {}
-    for axes, ((family, n), tried) in zip(grid, panels.items(), strict=False):
+    for axes, ((family, n), tried) in zip(grid, scenes, strict=False):
         _draw_panel(axes, tried)
-        axes.set_title(f"{n:,} ({family})", fontsize=TICK, loc="left")
+        style.title(axes, f"{n:,} ({family})")
         axes.tick_params(labelbottom=True)
         lines, names = axes.get_legend_handles_labels()
         handles |= dict(zip(names, lines, strict=True))
     figure.supxlabel("largest error of a load / largest load", fontsize=LABEL)
     figure.supylabel("seconds", fontsize=LABEL)
-    shown = [name for name in (*LOOKS, "frontier") if name in handles]
+    shown = {name: handles[name] for name in (*LOOKS, "frontier") if name in handles}
     labels = ["newton (default)" if name == "newton" else name for name in shown]
-    lines = [handles[name] for name in shown]
+    lines = list(shown.values())
     figure.legend(lines, labels, loc="outside upper center", ncols=3, fontsize=TICK, frameon=False)
     return figure
 
@@ -70,8 +69,8 @@ def _draw_panel(axes: Axes, rows: list[Row]) -> None:
     axes.set(xscale="log", yscale="log", xlim=(EXACT, 1.0))
     for name, look in LOOKS.items():
         if points := [row for row in rows if row.solver == name and row.known]:
-            style: dict[str, Any] = {"ms": 4.5, "mew": 0.9, "lw": 0.8, "ls": "none"} | look
-            axes.plot(*_coordinates(points), label=name, **style)
+            usual: dict[str, Any] = {"ms": 4.5, "mew": 0.9, "lw": 0.8, "ls": "none"}
+            axes.plot(*_coordinates(points), label=name, **(usual | look))
     if best := frontier(rows):
         x, y = _coordinates(best)
         # Extend the frontier to errors above that of the fastest point.
@@ -88,8 +87,7 @@ def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
 
 def cost_figure(bench: Bench) -> Figure:
     """The figure of time to press a scene against its size, with fitted exponents."""
-    figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels(SINGLE, 2.9)
     axes.set(xscale="log", yscale="log")
     for family in FAMILIES:
         if rows := bench.presses(family):
@@ -102,7 +100,7 @@ def cost_figure(bench: Bench) -> Figure:
                 axes.plot(x, 0.6 * min(y / x) * x, ":", color="0.3", lw=1.0, label="slope 1")
     if axes.lines:
         axes.legend(fontsize=TICK, frameon=False, loc="lower right")
-    label(axes, "asperities", "seconds for a certified press")
+    style.label(axes, "asperities", "seconds for a certified press")
     _plain(axes)
     return figure
 

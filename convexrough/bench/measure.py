@@ -16,7 +16,6 @@ from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath, load_path
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycle, cycles
@@ -65,12 +64,7 @@ class Attempt:
     most: int = 10**9
 
 
-def _pressed(scene: Scene) -> Contact:
-    return press(scene, approach=APPROACH)
-
-
-def _cycled(contact: Contact) -> Cycle:
-    return cycle(contact, maximum=0.5 * limit(contact))
+_pressed = partial(press, approach=APPROACH)
 
 
 def _along_corners(contact: Contact) -> LoadPath:
@@ -78,8 +72,8 @@ def _along_corners(contact: Contact) -> LoadPath:
     return load_path(contact.scene, loads=contact.load * P, forces=limit(contact) * T)
 
 
-#: The tasks that are timed at many sizes, by name: the preparation of an argument, and the function
-#: of this argument that is timed.
+#: The tasks that are timed at many sizes, by name: the preparation of an argument from a function
+#: that makes the scene, and the function of this argument that is timed.
 TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
     "press": (lambda make: make(), _pressed),
     "from nothing": (lambda make: make, lambda make: _pressed(make())),
@@ -89,7 +83,10 @@ TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
         lambda it: cycles(it, limit(it) * PARTS_OF_LIMIT),
     ),
     "load path": (lambda make: _pressed(make()), _along_corners),
-    "gradient": (lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")),
+    "gradient": (
+        lambda make: cycle(it := _pressed(make()), maximum=0.5 * limit(it)),
+        lambda it: it.gradient(holding="load"),
+    ),
 }
 
 
@@ -97,11 +94,11 @@ def reference(scene: Scene) -> Array:
     """(n,) [force] accurate loads. Raises SolverError if they are not proved accurate."""
     contact = _pressed(scene)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
-    if not bound <= ACCURATE:
-        advice = "another approach, or asperities further apart"
-        what = f"the proved error of the loads is {bound:.2g} of the largest load, above 2^-52"
-        raise SolverError(what, solver="reference", advice=advice)
-    return contact.loads
+    if bound <= ACCURATE:
+        return contact.loads
+    advice = "another approach, or asperities further apart"
+    what = f"the proved error of the loads is {bound:.2g} of the largest load, above 2^-52"
+    raise SolverError(what, solver="reference", advice=advice)
 
 
 def relative_error(loads: Array, right: Array) -> float:
@@ -129,12 +126,9 @@ def measure_attempt(
     problem, solution = found
     loads = np.zeros(len(scene))
     loads[problem.candidates] = solution.loads * problem.units.force  # exact, by a power of two
-    return replace(
-        row,
-        touching=int(np.count_nonzero(loads)),
-        iterations=solution.iterations,
-        error=math.nan if right is None else relative_error(loads, right),
-    )
+    error = math.nan if right is None else relative_error(loads, right)
+    touching = int(np.count_nonzero(loads))
+    return replace(row, touching=touching, iterations=solution.iterations, error=error)
 
 
 def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
@@ -153,11 +147,11 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
     from convexrough.sweeps.sweep import sweep
 
     a = 1.0 / REFINEMENTS[size]
-    lattice = {"spacing": 0.0025 * a, "tip_radius": 0.02 * a, "within": 0.0102}
+    lattice = {"pattern": "hexagonal", "spacing": 0.0025 * a, "tip_radius": 0.02 * a}
     file = {
         "sphere": {"radius": 1.0},
         "material": {"contact_modulus": 1.0, "poisson_ratio": 0.3},
-        "asperities": {"pattern": "hexagonal", **lattice, "height_std": 1e-6 * a},
+        "asperities": {**lattice, "within": 0.0102, "height_std": 1e-6 * a},
         "normal": {"load": 3.6e-7},
         "friction": {"coefficient": 0.5},
         "cycle": {"maximum_fraction": [0.37]},

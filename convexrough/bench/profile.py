@@ -45,19 +45,17 @@ class Profile:
 
     def part(self, factor: float) -> Array:
         """(k,) part of the cases answered correctly within this factor of the least time."""
-        part: Array = (self.ratios <= factor).mean(axis=1)
-        return part
+        return np.asarray((self.ratios <= factor).mean(axis=1))
 
     def rows(self) -> list[dict[str, str | int | float]]:
         """For each solver the numbers of outcomes and of right `sets`, and `part` for `FACTORS`."""
-        rows = []
+        rows = list[dict[str, str | int | float]]()
         for i, solver in enumerate(self.solvers):
-            row: dict[str, str | int | float] = {"solver": solver}
-            for outcome in ("right", "wrong", "refused", "failed"):
-                row[outcome] = int((self.outcomes[i] == outcome).sum())
-            row["contact set right"] = int(self.sets[i].sum())
-            row |= {f"within {factor}x": float(self.part(factor)[i]) for factor in FACTORS}
-            rows.append(row)
+            outcomes = self.outcomes[i].tolist()
+            counts = {it: outcomes.count(it) for it in ("right", "wrong", "refused", "failed")}
+            parts = {f"within {factor}x": float(self.part(factor)[i]) for factor in FACTORS}
+            right = int(self.sets[i].sum())
+            rows.append({"solver": solver, **counts, "contact set right": right, **parts})
         return rows
 
     def plot(self, axes: Axes | None = None) -> Axes:

@@ -15,7 +15,7 @@ from convexrough.errors import FileError, file_errors
 from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
 
-#: Markers of the block of a page that `suite.write_bench` replaces.
+#: Markers of the block of a page that `page_text` replaces.
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
 #: Tasks that have no plain column of seconds in the table of sizes.
@@ -61,6 +61,11 @@ class Row:
     memory: int | None = None
 
     @property
+    def scene(self) -> tuple[Family, int]:
+        """The family and the number of asperities."""
+        return self.family, self.asperities
+
+    @property
     def default(self) -> bool:
         """True for the default solver with its default settings."""
         return (self.solver, self.setting) == ("newton", "default")
@@ -85,7 +90,7 @@ class Bench:
         found: dict[tuple[Family, int], list[Row]] = {}
         for row in self.rows:
             if row.task == "solve":
-                found.setdefault((row.family, row.asperities), []).append(row)
+                found.setdefault(row.scene, []).append(row)
         return found
 
     def presses(self, family: Family, least: int = 0) -> list[Row]:
@@ -99,10 +104,10 @@ class Bench:
 
         The least-squares fit is  log time = a + b log n;  nan for fewer than two sizes.
         """
-        large = self.presses(family, FITTED_FROM)
-        if len({row.asperities for row in large}) < 2:
+        large = [(row.asperities, row.seconds) for row in self.presses(family, FITTED_FROM)]
+        if len({size for size, _ in large}) < 2:
             return math.nan
-        sizes, times = np.log([(row.asperities, row.seconds) for row in large]).T
+        sizes, times = np.log(large).T
         return float(np.polyfit(sizes, times, 1)[0])
 
     def summary(self) -> dict[str, Any]:
@@ -122,9 +127,11 @@ class Bench:
         """Sentences: whether the default solver is on the frontier, and how its time grows."""
         lines = []
         for (family, n), rows in self.panels().items():
-            beaten = [f"{row.solver}, {row.setting}" for row in better_than_default(rows)]
-            said = f"not on the frontier: {'; '.join(beaten)}" if beaten else "on the frontier"
-            if not any(row.known for row in rows):
+            if beaten := [f"{row.solver}, {row.setting}" for row in better_than_default(rows)]:
+                said = f"not on the frontier: {'; '.join(beaten)}"
+            elif any(row.known for row in rows):
+                said = "on the frontier"
+            else:
                 said = "not compared, because no reference loads are proved accurate enough"
             lines.append(f"{n:,} asperities ({family}): the default solver is {said}.")
         for family in FAMILIES:
@@ -138,16 +145,9 @@ class Bench:
 def frontier(rows: Iterable[Row]) -> list[Row]:
     """The Pareto frontier: points such that no other is at least as fast and as accurate."""
     points = [row for row in rows if row.known]
-
-    def dominated(row: Row) -> bool:
-        return any(
-            other.seconds <= row.seconds
-            and other.error <= row.error
-            and (other.seconds, other.error) != (row.seconds, row.error)
-            for other in points
-        )
-
-    return [row for row in points if not dominated(row)]
+    found = {(row.seconds, row.error) for row in points}
+    as_good = [[s <= row.seconds and e <= row.error for s, e in found] for row in points]
+    return [row for row, others in zip(points, as_good, strict=True) if sum(others) == 1]
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
@@ -167,30 +167,27 @@ def describe(bench: Bench) -> list[str]:
     """The measurements as aligned lines for the terminal."""
     lines = [machine_line(bench)]
     for (family, n), rows in bench.panels().items():
-        table = [["solver", "setting", "error", "seconds", "iterations", ""]]
-        best = frontier(rows)
+        table, best = [["solver", "setting", "error", "seconds", "iterations", ""]], frontier(rows)
         for row in rows:
             error = f"{row.error:.1e}" if row.known else row.outcome
             mark = "frontier" if row in best else ""
-            cells = [row.solver, row.setting, error, _seconds(row), str(row.iterations), mark]
-            table.append(cells)
+            table.append([row.solver, row.setting, error, _seconds(row), f"{row.iterations}", mark])
         lines += ["", f"{n:,} asperities ({family})", *aligned(table, left=2)]
     return [*lines, "", *aligned(size_table(bench), left=1), "", *_messages(bench)]
 
 
-def page_block(bench: Bench) -> list[str]:
-    """Lines of Markdown: the machine, a figure, a table of sizes, and the conclusions."""
-    return [
-        machine_line(bench),
-        "",
+def page_text(page: Path, bench: Bench) -> str:
+    """The text of a page with the results in its block, as Markdown. Raises as `split_page`."""
+    before, after = split_page(page)
+    lines = [
+        f"{before}{BEGIN}\n\n{machine_line(bench)}",
         "![Time against error, every solver, at each size](figures/work-precision.png)",
-        "",
         "![Time of a certified press against the number of asperities](figures/cost.png)",
-        "",
-        *markdown(size_table(bench), left=1),
-        "",
-        *(f"- {line}" for line in _messages(bench)),
+        "\n".join(markdown(size_table(bench), left=1)),
+        "\n".join(f"- {line}" for line in _messages(bench)),
+        f"{END}{after}",
     ]
+    return "\n\n".join(lines)
 
 
 def machine_line(bench: Bench) -> str:
@@ -204,8 +201,7 @@ def machine_line(bench: Bench) -> str:
         f"{'Quick' if bench.quick else 'Full'} run of {bench.seconds / 60:.1f} min, {on['date']}, "
         f"on {on['cores']} cores ({on['processor']}, {on['memory'] / 2**30:.0f} GiB, "
         f"{on['system']}): convexrough {__version__}, Python {on['python']}, {versions}. Threads "
-        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {known}"
-        f"{busy}."
+        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {known}{busy}."
     )
 
 
@@ -217,15 +213,14 @@ def size_table(bench: Bench) -> list[list[str]]:
     table = [[*heading, "MB", "proved error"]]
     for row in bench.rows:
         if row.task == "press" and row.outcome == "answered":
-            scene = (row.family, row.asperities)
-            found = {it.task: it for it in bench.rows if (it.family, it.asperities) == scene}
+            found = {it.task: it for it in bench.rows if it.scene == row.scene}
             cells = [row.family, f"{row.asperities:,}", f"{row.touching:,}"]
             for one in (row, found["from nothing"]):
                 counted = one.seconds / one.product  # nan without a lattice
                 cells += [_seconds(one), f"{counted:.0f}" if math.isfinite(counted) else "-"]
+            cells += [_seconds(found.get(task)) for task in other]
             memory = "-" if row.memory is None else f"{row.memory / 1e6:.0f}"
-            seconds = [_seconds(found.get(task)) for task in other]
-            table.append([*cells, *seconds, memory, f"{row.bound:.0e}"])
+            table.append([*cells, memory, f"{row.bound:.0e}"])
     return table
 
 
@@ -257,4 +252,4 @@ def _seconds(row: Row | None) -> str:
         return "-"
     if row.seconds < 1e-3:
         return f"{1e6 * row.seconds:.0f}e-6"
-    return f"{row.seconds:.2g}" if row.seconds < 100 else f"{row.seconds:.0f}"
+    return f"{row.seconds:.{'2g' if row.seconds < 100 else '0f'}}"

@@ -12,22 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from convexrough.atomic import write_text
-from convexrough.bench.measure import (
-    Attempt,
-    measure_attempt,
-    measure_sweep,
-    measure_task,
-    reference,
-)
-from convexrough.bench.rows import (
-    BEGIN,
-    END,
-    Bench,
-    Row,
-    better_than_default,
-    page_block,
-    split_page,
-)
+from convexrough.bench import measure
+from convexrough.bench.measure import Attempt
+from convexrough.bench.rows import Bench, Row, better_than_default, page_text
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import press
 from convexrough.errors import InputError, SolverError, file_errors
@@ -35,7 +22,7 @@ from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import LOGGER
 from convexrough.run.results import Writer, versions
-from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
+from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solver
 from convexrough.threads import cores
 
 Sizes = tuple[tuple[Family, int], ...]
@@ -89,6 +76,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 def attempts(quick: bool) -> list[Attempt]:
     """All solvers at several tolerances; others than Newton's with and without a Newton step."""
     found, every = [Attempt("newton", "default", Newton())], 2 if quick else 1
+    solver: Solver
     for kind, most in COUPLINGS.items():
         label = "newton" if kind is None else f"newton, {kind}"
         for power in (2, 4, 8, 12)[::every]:
@@ -96,15 +84,13 @@ def attempts(quick: bool) -> list[Attempt]:
             found.append(Attempt(label, f"tolerance 1e-{power}", solver, kind, most))
     for step, ending in ((True, " + Newton step"), (False, "")):
         for power in (3, 6, 9, 11)[::every]:
-            setting, tolerance = f"tolerance 1e-{power}", 10.0**-power
-            conic = Conic(tolerance=tolerance, newton_step=step)
-            convex = ConicCVXPY(tolerance=tolerance, newton_step=step)
-            found.append(Attempt(f"conic{ending}", setting, conic, most=PROGRAMS))
-            found.append(Attempt(f"conic in CVXPY{ending}", setting, convex, most=PROGRAMS))
+            for name, cones in (("conic", Conic), ("conic in CVXPY", ConicCVXPY)):
+                solver, setting = cones(10.0**-power, newton_step=step), f"tolerance 1e-{power}"
+                found.append(Attempt(f"{name}{ending}", setting, solver, most=PROGRAMS))
         for rows, power in ((16, 4), (16, 6), (64, 6), (256, 6))[::every]:
-            program = BristleQP(rows, newton_step=step, tolerance=10.0**-power)
+            solver = BristleQP(rows, newton_step=step, tolerance=10.0**-power)
             setting = f"{rows} bristles, tolerance 1e-{power}"
-            found.append(Attempt(f"bristles{ending}", setting, program, most=PROGRAMS))
+            found.append(Attempt(f"bristles{ending}", setting, solver, most=PROGRAMS))
     return found
 
 
@@ -121,10 +107,10 @@ def run(*, quick: bool) -> Bench:
         for family, size in sizes:
             if size <= QUICK or not quick:
                 LOGGER.info(f"{task}: {family}, about {size:,}")
-                rows.append(measure_task(task, family, size, patience))
+                rows.append(measure.measure_task(task, family, size, patience))
     for size, scenes, workers in SWEEPS[:1] if quick else SWEEPS:
         LOGGER.info(f"sweep: scenes of about {size:,}")
-        rows.append(measure_sweep(size, scenes // PART if quick else scenes, workers))
+        rows.append(measure.measure_sweep(size, scenes // PART if quick else scenes, workers))
     return Bench(machine, quick, tuple(rows), time.perf_counter() - began)
 
 
@@ -135,25 +121,20 @@ def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]
     are limited to fewer asperities.
     """
     LOGGER.info(f"{family}, about {size:,}: reference")
-    each = scene(family, REFINEMENTS[size])
-    problem = NormalProblem.assemble(each, approach=APPROACH)
-    right = None
+    each, right, rows = scene(family, REFINEMENTS[size]), None, list[Row]()
+    usual = NormalProblem.assemble(each, approach=APPROACH).influence.name
     with suppress(SolverError):
-        right = reference(each)
-    tried = [
-        attempt
-        for attempt in attempts(quick)
-        if attempt.influence != problem.influence.name and len(each) <= attempt.most
-    ]
-    rows = []
+        right = measure.reference(each)
+    fitting = [attempt for attempt in attempts(quick) if len(each) <= attempt.most]
+    tried = [attempt for attempt in fitting if attempt.influence != usual]
     for attempt in tried:
         LOGGER.info(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
-        rows.append(measure_attempt(family, each, attempt, right, patience))
+        rows.append(measure.measure_attempt(family, each, attempt, right, patience))
     for _ in range(ROUNDS):
         better = better_than_default(rows)
         for i, row in enumerate(rows):
             if better and (row.default or row in better):
-                again = measure_attempt(family, each, tried[i], None, patience)
+                again = measure.measure_attempt(family, each, tried[i], None, patience)
                 if again.outcome == "answered":
                     rows[i] = replace(row, seconds=min(row.seconds, again.seconds))
     return rows
@@ -163,9 +144,13 @@ def describe_machine() -> dict[str, Any]:
     """Processor, memory [bytes], threads, versions, date, and current load of the machine."""
     import psutil
 
+    cpu, named = Path("/proc/cpuinfo"), list[str]()
+    with suppress(OSError):
+        lines = cpu.read_text().splitlines()
+        named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]
     return {
-        "processor": _processor(),
+        "processor": named[0] if named else platform.processor() or "unknown",
         "cores": cores(),
         "memory": psutil.virtual_memory().total,
         "system": f"{platform.system()} {platform.machine()}",
@@ -175,14 +160,6 @@ def describe_machine() -> dict[str, Any]:
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     }
-
-
-def _processor() -> str:
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or "unknown"
 
 
 def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) -> None:
@@ -201,10 +178,9 @@ def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) 
     if figures:
         new.figures(both)
     if page is not None:
-        before, after = split_page(page)
+        text = page_text(page, bench)
         with file_errors(pictures := page.parent / "figures", "be made"):
             pictures.mkdir(exist_ok=True)
         pictured = Writer(pictures, pictures, ("png",), 200)
         pictured.figures(both)
-        block = [before + BEGIN, "", *page_block(bench), "", END + after]
-        new.files += [*pictured.files, write_text(page, "\n".join(block))]
+        new.files += [*pictured.files, write_text(page, text)]

@@ -19,11 +19,10 @@ from convexrough.paper.states import AMPLITUDES, READ_CROSSING, SHARE, PaperStat
 from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
-from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.press import map_and_profile, pressure_figure
+from convexrough.plots.press import abscissae, map_and_profile, pressure_figure, towards_rim
 from convexrough.plots.shear import draw_state, legend_handles
-from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, Scale
 from convexrough.sphere.smooth import smooth
 
 
@@ -42,14 +41,14 @@ def paper_figures(found: PaperStates) -> Figures:
 
     Rings have letters as in the paper: A is the outermost.
     """
-    scale, loops = Scale(found.contact), ([found.steady], [*found.firsts.values()])
+    scale, loops = Scale(found.contact), ([found.steady], [found.loop])
     return Figures(
         fig3_pressure=pressure_figure(scale),
         fig4_rings=_rings_figure(found, scale),
         fig5_traction=_traction_figure(found, scale),
         fig6_section=_section_figure(found, scale),
         fig7_asperities=_forces_figure(found, scale),
-        fig8_loops=loops_figure(*loops, [*found.firsts], "ring", scale, [found.loop]),
+        fig8_loops=loops_figure(*loops, found.firsts.items(), "ring", scale),
         fig9_energy=_loss_figure(found, scale),
     )
 
@@ -81,19 +80,20 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, float(row), f"{value:.4f}", fontsize=TICK, va="center")
-    limit = f"$fP$ = {quantity(scale.limit, '')}"
+    limit = f"$fP$ = {style.quantity(scale.limit, '')}"
     style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     style.title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
                   textcoords="offset points", xycoords="axes fraction")  # fmt: skip
-    style.legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
+    handles = legend_handles([found.half], scale)
+    style.legend(figure, "outside", handles=handles, loc="outside upper center", ncols=4)
     return figure
 
 
-def _tractions(scale: Scale) -> tuple[float, Measure]:
+def _tractions(scale: Scale) -> tuple[float, style.Measure]:
     """The coefficient of friction f, and the measure of tractions, f p0."""
     f = checks.friction(scale.contact.scene.friction)
-    return f, measure(f * scale.peak, "", "(fp_0)")
+    return f, style.measure(f * scale.peak, "", "(fp_0)")
 
 
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
@@ -104,7 +104,7 @@ def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
-    x = np.unique(np.concatenate((a * style.towards_rim(), c * style.towards_rim())))
+    x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))
     line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
     profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
     fp = unit.of(f * fields.pressure(contact, line))
@@ -112,13 +112,13 @@ def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
     style.title(profile, "central asperity")
-    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, '')})"
+    across = f"$x\\,/\\,a_i$  ($a_i$ = {style.quantity(a, '')})"
     style.label(profile, across, unit.label("q"))
-    style.legend_above(profile)
+    style.legend(profile, "above")
     return figure
 
 
-def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) -> None:
+def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: style.Measure) -> None:
     """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre."""
     contact = state.contact
     touching = contact.loads > 0
@@ -141,16 +141,14 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
     figure, (axes,) = panels(DOUBLE, 2.9)
     points, radii = contact.scene.contact_points, contact.contact_radii
     edge = 1.06 * max(scale.typical, float((np.hypot(*points.T) + radii)[contact.loads > 0].max()))
-    x = np.union1d(
-        style.abscissae(points, radii, edge), style.abscissae(points, state.stick_radii, edge)
-    )
+    x = np.union1d(abscissae(points, radii, edge), abscissae(points, state.stick_radii, edge))
     line = np.column_stack((x, np.zeros_like(x)))
     fp, q = unit.of(f * fields.pressure(contact, line)), unit.of(fields.traction(state, line))
     across = scale.length.of(x)
     axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
     axes.fill_between(across, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
-    s = scale.typical * style.towards_rim()
-    s = np.union1d(s, style.towards_rim() * sphere.stick_radius(state.force))
+    s = scale.typical * towards_rim()
+    s = np.union1d(s, towards_rim() * sphere.stick_radius(state.force))
     smooth_fp, smooth_q = f * sphere.pressure(np.abs(s)), sphere.traction(np.abs(s), state.force)
     for values, ls, name in ((smooth_fp, DASHED, "$fp$"), (smooth_q, DOTTED, "$q$")):
         axes.plot(scale.length.of(s), unit.of(values), ls=ls, lw=1.4, color=SMOOTH,
@@ -159,7 +157,7 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
     axes.set(xlim=(-scale.length.of(edge), scale.length.of(edge)), ylim=(0.0, 1.05 * most))
     style.label(axes, scale.length.label("x"), unit.label("q"))
     style.title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
-    style.legend_above(axes, ncols=4)
+    style.legend(axes, "above", ncols=4)
     return figure
 
 
@@ -233,7 +231,7 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     _mark_crossing(zoom, found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth)))
     style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
     style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
-    style.legend_inside(whole)
+    style.legend(whole, "inside")
     style.title(whole, "energy lost per cycle")
     style.title(zoom, "zoom")
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +12,12 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Normalize, to_rgba, to_rgba_array
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
+from convexrough.contact import Contact
 from convexrough.plots import style
-from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH
+from convexrough.plots.style import COLOURS, DASHED, FAINT, SMOOTH, Scale
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
 #: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
@@ -28,7 +28,8 @@ PIXELS = 400
 
 #: Colour and label of each status: more slip is darker, also in grey.
 STICK, SLIP, SLIDING, UNKNOWN = "#b9d0e5", "#e0842a", "#701c05", "0.85"
-LOOKS = {
+Looks = Mapping[str, tuple[str, str]]
+LOOKS: Looks = {
     "stuck": (STICK, "sticks"),
     "partial": (SLIP, "slips in part"),
     "sliding": (SLIDING, "slides"),
@@ -40,8 +41,7 @@ LOOKS = {
 class Layer(NamedTuple):
     """Discs of one status; later layers cover earlier ones.
 
-    radii  : (n,) [length], 0 where no disc is drawn;  shades : (n, 4), or one colour for all
-    rim    : colour of the outlines; None draws no outlines
+    radii : (n,) [length], 0 for no disc;  shades : (n, 4), or one colour;  rim : of the outlines
     """
 
     status: str
@@ -51,35 +51,37 @@ class Layer(NamedTuple):
 
 
 def draw_map(
-    axes: Axes,
-    points: Array,
-    layers: Sequence[Layer],
-    length: Measure,
-    *,
-    smooth: Sequence[float] = (),
-    room: Array | None = None,
+    axes: Axes, place: style.Place | Scale, layers: Sequence[Layer], *, room: Array | None = None
 ) -> None:
     """Draw discs, and faint dots at points without a disc, in a square with a margin.
 
-    points : (n, 2) [length]
-    smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
-    room   : (n,) [length] radii of discs that must fit into the square; default: those of the discs
-        drawn
+    room : (n,) [length] radii of discs that must fit into the square; default: of those drawn
 
-    If there are `CROWDED` or more discs, a mosaic replaces discs and dots. A pixel with several
-    asperities has their mean colour. Any other pixel has the colour of the nearest asperity, or
-    none if this asperity is far away. Asperities without a disc are white.
+    If there are `CROWDED` or more discs, a mosaic replaces discs and dots.
     """
-    whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
-    shown, outline = whole > 0, [length.of(axis) for axis in smooth]
-    points, whole = length.of(points), length.of(whole)
+    length = place.length
+    points, outline = length.of(place.points), [length.of(axis) for axis in place.axes]
     layers = [each._replace(radii=length.of(each.radii)) for each in layers]
-    low, high = _square(points, whole if room is None else length.of(room), outline)
-    inside: NDArray[np.bool_] = np.all((points > low) & (points < high), axis=1)
-    if int(shown.sum()) >= CROWDED:
-        _draw_mosaic(axes, points, _blended(layers, whole), shown, inside, low, high)
+    whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
+    shown, fits = whole > 0, whole if room is None else length.of(room)
+    there = fits > 0 if fits.any() else fits == 0  # without discs, all points fit
+    rims, reach = np.reshape(outline, (-1, 2)), fits[there, None]
+    ends = np.concatenate((points[there] - reach, points[there] + reach, -rims, rims))
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    middle, half = (low + high) / 2, 0.53 * (float((high - low).max()) or 1.0)
+    low, high = middle - half, middle + half
+    if np.count_nonzero(shown) >= CROWDED:
+        shades = np.tile(to_rgba("white"), (len(points), 1))
+        for each in layers:
+            part = np.divide(each.radii, whole, out=np.zeros(len(whole)), where=shown) ** 2
+            shades += part[:, None] * (to_rgba_array(each.shades) - shades)
+        shades[~shown, 3] = 0.0
+        _draw_mosaic(axes, points, shades, low, high)
     else:
-        _draw_open(axes, points[~shown & inside])
+        bare = points[~shown & ((points > low) & (points < high)).all(axis=1)]
+        size = float(np.clip(25.0 / np.sqrt(len(bare) + 1), 0.4, 1.5))
+        axes.plot(*bare.T, "o", ms=size, mew=0, color=FAINT, rasterized=len(bare) >= CROWDED,
+                  label="open")  # fmt: skip
         for each in layers:
             draw_discs(axes, points, each)
     draw_outline(axes, outline)
@@ -87,12 +89,6 @@ def draw_map(
     axes.xaxis.set_major_locator(style.round_ticks(5))
     axes.yaxis.set_major_locator(style.round_ticks(5))
     style.label(axes, length.label("x"), length.short("y"))
-
-
-def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> None:
-    """Draw the map of a contact, with the outline of the smooth contact under the same load."""
-    points = scale.contact.scene.contact_points
-    draw_map(axes, points, layers, scale.length, smooth=scale.axes)
 
 
 def draw_values(
@@ -107,10 +103,8 @@ def draw_values(
 ) -> ScalarMappable:
     """Draw discs coloured by `values`, and a named colour bar; return the map of colours.
 
-    values : (n,), one for each contact disc; or (k, n), for k discs of each asperity, the later
-        drawn over the earlier
-    radii  : (k, n) [length] radii of these discs, the largest first
-    most   : the value at the end of the colour scale; default: the largest absolute value
+    values : (n,), one for each contact disc; or (k, n), of discs with `radii` (k, n) [length], the
+        largest first;  most : the end of the colour scale; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
     """
     most = float(np.abs(values).max()) or 1.0 if most is None else most
@@ -122,29 +116,35 @@ def draw_values(
         Layer("_inner discs" if k else "contact discs", radius, colours.to_rgba(each), rim)
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
-    draw_contact(axes, scale, layers)
+    draw_map(axes, scale, layers)
     style.bar(axes, colours, name, above=not signed)
     return colours
+
+
+def draw_statuses(axes: Axes, contact: Contact, status: NDArray[np.str_]) -> None:
+    """Draw the map of statuses with a legend."""
+    draw_map(axes, Scale(contact), status_layers(status, contact.contact_radii))
+    style.legend(axes, "below", handles=status_handles(status))
 
 
 def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
     """Draw the discs of a layer in true size."""
     there = layer.radii > 0
-    if not there.any():
+    if not (count := np.count_nonzero(there)):
         return
     shades = to_rgba_array(layer.shades)
-    few = int(there.sum()) < DENSE or layer.status == "undecided"
+    few = count < DENSE or layer.status == "undecided"
     axes.add_collection(
         EllipseCollection(
             *(2.0 * layer.radii[there],) * 2,
-            np.zeros(int(there.sum())),
+            np.zeros(count),
             units="xy",
             offsets=points[there],
             offset_transform=axes.transData,
             facecolors=shades[there] if len(shades) == len(there) > 1 else shades,
             edgecolors=layer.rim or "none",
             linewidths=0.4 if few and layer.rim else 0.0,
-            rasterized=int(there.sum()) >= DENSE,
+            rasterized=count >= DENSE,
             label=layer.status,
         ),
         autolim=False,
@@ -154,109 +154,63 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 def draw_outline(
     axes: Axes, semi_axes: Sequence[float], dashes: Any = DASHED, colour: str = SMOOTH
 ) -> None:
-    """Draw a circle (one semi-axis) or an ellipse about the origin; nothing without semi-axes."""
+    """Draw an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
         axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=colour))
 
 
 def status_layers(
-    status: NDArray[np.str_], radii: Array, stick_radii: Array | None = None
+    status: NDArray[np.str_], radii: Array, stick: Array | None = None, looks: Looks = LOOKS
 ) -> list[Layer]:
     """A layer of discs for each status, and one for the stick discs of "partial" asperities."""
     layers = [
         Layer(name, np.where(status == name, radii, 0.0), colour)
-        for name, (colour, _) in LOOKS.items()
+        for name, (colour, _) in looks.items()
     ]
-    if stick_radii is not None:
-        stick = np.where((status == "partial") & (radii > 0), stick_radii, 0.0)
-        layers.append(Layer("stick", stick, STICK))
+    if stick is not None:
+        there = (status == "partial") & (radii > 0)
+        layers.append(Layer("stick", np.where(there, stick, 0.0), STICK))
     return layers
 
 
-def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
-    """Legend entries for each status that occurs and, if `stick`, for stick discs."""
-    entries = [each for status, each in LOOKS.items() if status in statuses]
-    if stick and "partial" in statuses:
-        entries.insert(0, (STICK, "stick disc"))
-    return [style.disc_handle(*entry) for entry in entries]
-
-
-def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
-    """Legend entries for the outlines of the smooth contact and of its stick disc."""
-    if scale.sphere is None:
-        return []
-    outlines = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
-    return [
-        Line2D([], [], ls=dashes, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
-        for what, dashes in outlines.items()
-    ]
+def status_handles(statuses: ArrayLike, looks: Looks = LOOKS) -> list[Line2D]:
+    """Legend entries for each status that occurs."""
+    occur = set(np.unique(statuses).tolist())
+    return [style.disc_handle(*look) for status, look in looks.items() if status in occur]
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
     """(n,) radii of discs: one radius, about 0.42 of the spacing, at chosen points, 0 at others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
-    size = float(np.ptp(points, axis=0).max()) or 1.0
-    apart = size
+    apart = size = float(np.ptp(points, axis=0).max()) or 1.0
     if len(points) > 1:
         sample = points[:: max(1, len(points) // 1000)]
         apart = float(np.median(np.asarray(cKDTree(points).query(sample, k=2)[0])[:, 1]))
     return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
 
 
-def _square(points: Array, radii: Array, outline: Sequence[float]) -> tuple[Array, Array]:
-    """Two corners of the square about the outline and the discs (if there are none, all points)."""
-    there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
-    ends = [points[there] - radii[there, None], points[there] + radii[there, None]]
-    if outline:
-        ends += [-np.array([outline]), np.array([outline])]
-    low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
-    middle, half = (low + high) / 2, 0.53 * (float((high - low).max()) or 1.0)
-    return middle - half, middle + half
+def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:
+    """Draw a mosaic in the square with the corners `low`, `high`.
 
-
-def _draw_open(axes: Axes, points: Array) -> None:
-    """Draw open asperities as faint dots, smaller if they are many."""
-    size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
-    axes.plot(*points.T, "o", ms=size, mew=0, color=FAINT, rasterized=len(points) >= CROWDED,
-              label="open")  # fmt: skip
-
-
-def _blended(layers: Sequence[Layer], whole: Array) -> Array:
-    """(n, 4) the mean colour of each asperity's disc, with later layers above earlier ones."""
-    mean = np.tile(to_rgba("white"), (len(whole), 1))
-    for each in layers:
-        part = np.divide(each.radii, whole, out=np.zeros(len(whole)), where=whole > 0) ** 2
-        mean += part[:, None] * (to_rgba_array(each.shades) - mean)
-    return mean
-
-
-def _draw_mosaic(
-    axes: Axes,
-    points: Array,
-    shades: Array,
-    shown: NDArray[np.bool_],
-    inside: NDArray[np.bool_],
-    low: Array,
-    high: Array,
-) -> None:
-    """Draw the mosaic that `draw_map` describes, in the square with the corners `low`, `high`."""
+    A pixel with several asperities has their mean colour; any other pixel has the colour of the
+    nearest asperity, or none if this asperity is far away.
+    """
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     width = high[0] - low[0]
     steps = width * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(low[0] + steps, low[1] + steps), axis=-1)
-    cell = width / np.sqrt(
-        np.count_nonzero(shown)
-    )  # pixels farther than this from every point stay empty
+    # Pixels farther than this from every point stay empty.
+    cell = width / np.sqrt(np.count_nonzero(shades[:, 3]))
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
-    visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
-    image = np.vstack((visible, np.zeros(4)))[nearest]
+    image = np.vstack((shades, np.zeros(4)))[nearest]
+    inside = ((points > low) & (points < high)).all(axis=1)
     column, row = ((points[inside] - low) / width * PIXELS).astype(int).T
-    place: Indices = row * PIXELS + column
-    several = np.bincount(place, minlength=PIXELS**2)
-    mean = np.stack([np.bincount(place, part, PIXELS**2) for part in visible[inside].T], axis=1)
+    pixel = row * PIXELS + column
+    several = np.bincount(pixel, minlength=PIXELS**2)
+    mean = np.stack([np.bincount(pixel, part, PIXELS**2) for part in shades[inside].T], axis=1)
     crowded = several > 1
     image.reshape(-1, 4)[crowded] = mean[crowded] / several[crowded, None]
     extent = (low[0], high[0], low[1], high[1])

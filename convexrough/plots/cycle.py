@@ -1,23 +1,24 @@
-"""Figures of steady cycles: hysteresis loops and energy losses."""
+"""Figures of steady cycles: hysteresis loops, energy losses, and maps of fretting."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
+from convexrough.friction.fretting import Fretting
 from convexrough.plots import style
-from convexrough.plots.load_plane import draw_closed
-from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK
+from convexrough.plots.asperity_map import draw_values
+from convexrough.plots.notebook import Figure, Figures, no_contact, panels
+from convexrough.plots.steady import draw_closed
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, Scale
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
@@ -54,79 +55,72 @@ def cycle_figures(
     contact = cycles[0].contact
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
-        return style.no_contact("hysteresis", *(["loss"] if several else []))
+        return no_contact("hysteresis", *(["loss"] if several else []))
     scale = Scale(contact)
-    by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
-    cycles = [cycles[i] for i in by_range]
-    loops = None if loops is None else [loops[i] for i in by_range]
-    r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
-    known = np.arange(len(r)) if loops is None else loops[0].asperities
-    rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
-    chosen = known[rings].tolist() if asperities is None else list(asperities)
-    names = [f"{scale.length.of(each):.3g}" for each in r[chosen]]
-    shown = _spread([each.force_amplitude for each in cycles])
-    some, theirs = [cycles[i] for i in shown], loops and [loops[i] for i in shown]
+    order = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
+    shown = order
+    if len(order) > MOST_LOOPS:  # the nearest to 1/4, 1/2, 3/4, 1 of the widest range
+        amplitudes = np.array([cycles[i].force_amplitude for i in order])
+        parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
+        nearest = np.argmin(np.abs(amplitudes[:, None] - parts), axis=0)
+        shown = [order[i] for i in np.unique(nearest)]
+    r = scale.distances
+    if asperities is None:
+        known = np.arange(len(r)) if loops is None else loops[order[0]].asperities
+        rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
+        asperities = known[rings].tolist()
+    named = [(f"{scale.length.of(r[i]):.3g}", i) for i in asperities]
+    some = [cycles[i] for i in shown]
+    theirs = steady_loops(some, POINTS, asperities) if loops is None else [loops[i] for i in shown]
     meaning = scale.length.short("r")
-    figure = loops_figure(some, chosen, names, meaning, scale, theirs, len(cycles))
+    figure = loops_figure(some, theirs, named, meaning, scale, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
-        figures["loss"] = _loss_figure(cycles, scale)
+        figures["loss"] = _loss_figure([cycles[i] for i in order], scale)
     return figures
-
-
-def _spread(amplitudes: Sequence[float]) -> list[int]:
-    """Indices of the loops to draw: all, or those nearest to 1/4, 1/2, 3/4, 1 of the largest."""
-    if len(amplitudes) <= MOST_LOOPS:
-        return list(range(len(amplitudes)))
-    parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
-    away = np.abs(np.array(amplitudes)[:, None] - parts)
-    return sorted(set(np.argmin(away, axis=0).tolist()))
 
 
 def loops_figure(
     cycles: Sequence[Cycle],
-    asperities: Sequence[int],
-    names: Sequence[str],
+    loops: Sequence[Loop],
+    named: Iterable[tuple[str, int]],
     meaning: str,
     scale: Scale,
-    loops: Sequence[Loop] | None = None,
-    count: int = 0,
+    count: int = 1,
 ) -> Figure:
     """The figure of loops: the contact, the same less its elastic part, and single asperities.
 
-    names, meaning : entries and title of the legend for the asperities
-    loops : loops of the cycles, with those of the asperities;  count : number of all cycles; only
-        `cycles` are drawn
+    named, meaning : names of asperities in the legend, with their indices; its title
+    count : number of all cycles, of which only `cycles` are drawn
     """
-    loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure, (whole, upright, single) = panels(DOUBLE, 3.0, 1, 3, width_ratios=[1, 1, 1.1])
     x, q = scale.displacement, scale.force
     for cycle, loop in zip(cycles, loops, strict=True):
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
             draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
-        upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
-                         textcoords="offset points", fontsize=7, va="center",
-                         path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+        place = (x.of(end), q.of(loop.forces[0]))
+        style.note(upright, _range(cycle, scale), place, (4, 2), fontsize=7, va="center")
+    in_units = x.said and not x.symbol
+    less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))
-    style.label(upright, x.short("X - Q/k") if x.said and not x.symbol
-          else f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$", "")  # fmt: skip
+    style.label(upright, x.short("X - Q/k") if in_units else less, "")
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     which = f": {len(cycles)} of {count}" if count > len(cycles) else ""
     style.title(whole, f"whole contact{which}")
     style.title(upright, "less its elastic part")
-    _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)
+    _draw_asperity_loops(single, loops[-1], list(named), scale)
     style.title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
     single.legend(title=meaning, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=TICK,
                   title_fontsize=TICK, frameon=False, handlelength=2.4, handletextpad=0.5,
                   borderpad=0.2)  # fmt: skip
     for axes in (whole, upright, single):
         axes.xaxis.set_major_locator(style.round_ticks(4))
-    handles = {line.get_label(): line for line in reversed(whole.lines)}
-    style.legend_outside(figure, list(handles.values())[::-1], "upper left", 2)
-    elastic = ",   $k = 3fP/(2X_0)$" if x.said and not x.symbol else ""
+    handles = list({line.get_label(): line for line in reversed(whole.lines)}.values())[::-1]
+    style.legend(figure, "outside", handles=handles, loc="outside upper left", ncols=2)
+    elastic = ",   $k = 3fP/(2X_0)$" if in_units else ""
     figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
     return figure
 
@@ -134,11 +128,12 @@ def loops_figure(
 def draw_cycle(axes: Axes, cycle: Cycle) -> None:
     """Draw the loop of a cycle or, if the normal load varies, its path in the plane of loads."""
     if np.ptp(cycle.loads) > 0:
-        return draw_closed(axes, cycle)
-    scale = Scale(cycle.contact)
-    draw_loop(axes, scale, cycle.loop(asperities=[]))
-    style.legend_inside(axes)
-    return style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
+        draw_closed(axes, cycle)
+    else:
+        scale = Scale(cycle.contact)
+        draw_loop(axes, scale, cycle.loop(asperities=[]))
+        style.legend(axes, "inside")
+        style.label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
 def draw_loop(axes: Axes, scale: Scale, loop: Loop, slope: float = 0.0) -> None:
@@ -168,22 +163,15 @@ def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
 
 
 def _draw_asperity_loops(
-    axes: Axes,
-    loop: Loop,
-    asperities: Sequence[int],
-    names: Sequence[str],
-    cycle: Cycle,
-    scale: Scale,
+    axes: Axes, loop: Loop, named: Sequence[tuple[str, int]], scale: Scale
 ) -> None:
     """Draw Q_i / (f P_i) against X_i + slip_i; the ordinate is 1 or -1 while an asperity slides."""
-    limits = scale.limit * cycle.contact.loads / cycle.contact.load
     kept = loop.asperities.tolist()
-    for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
-        at = kept.index(i)
-        moved = scale.displacement.of(loop.asperity_displacements[:, at])
-        axes.plot(moved, loop.asperity_forces[:, at] / limits[i], lw=1.1, label=name,
-                  ls=DASHES[order % len(DASHES)],
-                  color=ring_colour(order, len(asperities)))  # fmt: skip
+    for order, (name, i) in enumerate(named):
+        at, limit = kept.index(i), scale.limit * scale.contact.loads[i] / scale.contact.load
+        axes.plot(scale.displacement.of(loop.asperity_displacements[:, at]),
+                  loop.asperity_forces[:, at] / limit, lw=1.1, label=name,
+                  ls=DASHES[order % len(DASHES)], color=ring_colour(order, len(named)))  # fmt: skip
     style.label(axes, scale.displacement.short("(X_i + s_i)"), "$Q_i\\,/\\,(fP_i)$")
     for limit in (-1.0, 1.0):
         axes.axhline(limit, lw=0.5, color=FAINT, zorder=0.5)
@@ -211,17 +199,21 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
     marks |= {"mew": 0, "clip_on": False}
     q, w = scale.force, scale.energy(float(rough.max()))
+    ends = q.of(scale.limit)
     t = np.geomspace(min(0.7 * amplitude[0] / scale.limit, 0.3), 1.0, 300)
     if scale.sphere is not None:
         whole = w.of(scale.work) * mindlin.loss(t)
-        loss.plot(q.of(scale.limit) * t, whole, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
+        loss.plot(ends * t, whole, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
     loss.plot(q.of(amplitude), w.of(rough), label="asperities", **marks)
-    ends = q.of(scale.limit)
     loss.set(xscale="log", yscale="log", xlim=(ends * t[0], ends))
-    style.few_ticks(loss.xaxis)
-    style.few_ticks(loss.yaxis)
+    for axis in (loss.xaxis, loss.yaxis):  # at most 6 powers of ten; on a short axis also 2, 5
+        low, high = axis.get_view_interval()
+        short = high / low < 50
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=6))
+        axis.set_major_formatter("{x:g}" if short else LogFormatterSciNotation())
+        axis.set_minor_formatter(NullFormatter())
     style.label(loss, "amplitude of " + q.label("Q"), w.label("W"))
-    style.legend_inside(loss)
+    style.legend(loss, "inside")
     style.title(loss, "energy lost per cycle")
     if scale.sphere is None:
         style.say_nothing(ratio, "no smooth reference")
@@ -233,3 +225,49 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     style.label(ratio, "amplitude of " + q.short("Q"), "$W\\,/\\,W_\\mathrm{smooth}$")
     style.title(ratio, f"loss / loss of the {scale.name}")
     return figure
+
+
+def fretting_figures(worn: Fretting) -> Figures:
+    """The figure of fretting in a steady cycle.
+
+    "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle and,
+        at the largest force, the mean and the largest shear traction
+
+    >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
+    >>> print(*cr.plots.fretting_figures(worn))
+    fretting
+    """
+    if not worn.contact.loads.any():
+        return no_contact("fretting")
+    scale = Scale(worn.contact)
+    figure, maps = panels(DOUBLE, 6.2, 2, 2, sharex=True, sharey=True)
+    pressure, f = scale.units.pressure, scale.limit / worn.contact.load
+    most = _largest(worn.largest_tractions) if pressure else f * scale.peak
+    traction = style.measure(most, pressure, f"(f{scale.pressure.symbol})")
+    energy = style.measure(_largest(worn.losses), scale.units.work, "W_m")
+    draw_slip(maps[0], worn, scale)
+    for axes, values, unit, name, symbol in (
+        (maps[1], worn.losses, energy, "energy lost per cycle", "W_i"),
+        (maps[2], worn.mean_tractions, traction, "mean traction", "\\bar q_i"),
+        (maps[3], worn.largest_tractions, traction, "largest traction", "q_i"),
+    ):
+        draw_values(axes, scale, np.nan_to_num(unit.of(values)), unit.short(symbol))
+        style.title(axes, name)
+    for axes in maps:
+        axes.label_outer()
+    low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
+    between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
+    figure.suptitle(between, fontsize=TICK)
+    return Figures({"fretting": figure})
+
+
+def draw_slip(axes: Axes, worn: Fretting, scale: Scale | None = None) -> None:
+    """Draw the map of slip amplitudes."""
+    scale, unit = scale or Scale(worn.contact), worn.contact.scene.units.length
+    slip = style.measure(_largest(worn.slip_amplitudes) if unit else scale.travel, unit, "X_0")
+    draw_values(axes, scale, np.nan_to_num(slip.of(worn.slip_amplitudes)), slip.short("s_i"))
+    style.title(axes, "slip amplitude at the rim")
+
+
+def _largest(values: Array) -> float:
+    return float(values.max(initial=0.0, where=np.isfinite(values)))

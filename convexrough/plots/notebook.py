@@ -1,9 +1,10 @@
-"""Figures and axes that notebooks display, and `save`."""
+"""Figures and axes that notebooks display; `plot`, `thumbnail` and `save`."""
 
 from __future__ import annotations
 
 import sys
 from base64 import b64encode
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,33 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure as MatplotlibFigure
 
+from convexrough import checks
+from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.path import LoadPath
+from convexrough.plots.style import SINGLE, say_nothing
+
+#: The module and the function that draw a result into axes, by the name of the result's class. A
+#: module is imported only when its function is needed.
+PICTURES = {
+    "Contact": "press.draw_pressure",
+    "ShearState": "shear.draw_one_state",
+    "VectorShearState": "shear.draw_one_state",
+    "Cycle": "cycle.draw_cycle",
+    "Fretting": "cycle.draw_slip",
+    "LoadPath": "path.draw_loop_or_plane",
+    "MemoryCurve": "steady.draw_curve",
+    "PhaseLosses": "steady.draw_losses",
+    "Shakedown": "shakedown.draw_factors",
+    "Gradient": "gradient.draw_gradient",
+    "Verdict": "verdict.draw_claim",
+    "Comparison": "verdict.draw_times",
+    "PathComparison": "verdict.draw_times",
+    "Surface": "surface.draw_surface",
+    "Summits": "surface.draw_summit_map",
+    "Provability": "surface.draw_provability",
+}
 
 #: Formats of files, with options for matplotlib: a level of compression that takes two thirds of
 #: the usual time, for files that are 5 % larger; and no dates, so that files can be compared.
@@ -69,6 +96,15 @@ class Figures(dict[str, MatplotlibFigure]):
         return "<br>".join(image_tag(stem, figure) for stem, figure in self.items())
 
 
+def no_contact(*stems: str) -> Figures:
+    """Figures under these names, each with the text that nothing touches."""
+    figures = Figures()
+    for stem in stems:
+        figures[stem], (axes,) = panels(SINGLE, 2.6)
+        say_nothing(axes)
+    return figures
+
+
 def as_png(figure: MatplotlibFigure, dpi: int = 100) -> bytes:
     figure.savefig(file := BytesIO(), format="png", dpi=dpi)
     return file.getvalue()
@@ -78,6 +114,60 @@ def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
     """The figure as an image inside HTML."""
     picture = b64encode(as_png(figure, dpi)).decode()
     return f'<img alt="{name}" src="data:image/png;base64,{picture}">'
+
+
+def plot(result: object, axes: Axes | None = None) -> Axes:
+    """Draw the main picture of a result; return the axes.
+
+    result : a Contact: map of pressure; ShearState, VectorShearState: map of stick and slip;
+        Cycle: loop, or the plane of loads if the normal load varies; Fretting: map of slip
+        amplitudes; LoadPath: shear force against displacement, or the plane of loads if the load
+        varies; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
+        proved statuses with marks on wrong claims; Comparison, PathComparison: times of the solvers
+        or methods; PhaseLosses: loss against phase; Shakedown: map of factors, or of slips for the
+        kind "vector"; Surface, Summits: map; Provability: contacts against pruning
+    axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
+
+    Raises InputError for anything else.
+
+    >>> axes = cr.plots.plot(cr.shear(contact, force=0.25 * contact.load))
+    >>> print(axes.get_title())
+    $Q/(fP)$ = 0.5: 6 of 37 slide
+    """
+    kinds = [kind for kind in type(result).__mro__ if kind.__module__.startswith("convexrough.")]
+    where = next((PICTURES[it.__name__] for it in kinds if it.__name__ in PICTURES), None)
+    if where is None:
+        expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
+        raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
+    if axes is None:
+        axes = new_axes((SINGLE, 3.2))
+    checks.instance("axes", axes, Axes)
+    contact = getattr(result, "contact", result)
+    if isinstance(contact, Contact) and not contact.loads.any():
+        say_nothing(axes)
+    else:
+        _draw(where, axes, result)
+    return axes
+
+
+def _draw(where: str, axes: Axes, *what: object) -> None:
+    module, function = where.split(".")
+    getattr(import_module(f"convexrough.plots.{module}"), function)(axes, *what)
+
+
+def thumbnail(result: object) -> str:
+    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses.
+
+    >>> print(cr.plots.thumbnail(contact)[:36])
+    <img alt="Contact" src="data:image/p
+    """
+    figure, (axes,) = panels(SINGLE, 3.0)
+    if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
+        status = result.status if isinstance(result, Cycle) else result.status[-1]
+        _draw("asperity_map.draw_statuses", axes, result.contact, status)
+    else:
+        plot(result, axes)
+    return image_tag(type(result).__name__, figure, 80)
 
 
 def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,23 +13,19 @@ from matplotlib.colors import ListedColormap, Normalize
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
-from convexrough.plots.load_plane import draw_path
-from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DOUBLE, MOST_NUMBERS, TICK
+from convexrough.plots.asperity_map import draw_map, status_layers
+from convexrough.plots.notebook import Figure, Figures, no_contact, panels
+from convexrough.plots.steady import PATTERNS, label_plane, name_statuses, vertices
+from convexrough.plots.style import DOUBLE, FAINT, SMOOTH, TICK, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
-MOST_MAPS = 8
+#: Largest numbers of maps, of memory curves, of points with numbers, and of points with dots.
+MOST_MAPS, MOST_CURVES, MOST_NUMBERS, MOST_DOTS = 8, 4, 12, 60
 
 #: Limits when points are added: number of points; touching asperities times points; steps between
-#: two given points.
-MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
-
-#: At varying load, points are added to at most this number of segments, because each point needs a
-#: normal solution.
-MOST_SEGMENTS = 24
+#: two given points; at varying load, where each point needs a normal solution, number of segments.
+MOST_POINTS, AFFORDABLE, MOST_BETWEEN, MOST_SEGMENTS = 500, 16_000, 40, 24
 
 
 def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
@@ -50,15 +45,14 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     history
     """
     if path.load_constant and not path.contact.loads.any():
-        return style.no_contact("history")
-    scale = Scale(path.contact)
+        return no_contact("history")
+    scale, fine = Scale(path.contact), fine or between(path)
     height, columns = (3.0, 2) if path.load_constant else (3.2, 3)
     figure, (*plane, loop, cost) = panels(DOUBLE, height, 1, columns, gridspec_kw={"wspace": 0.06})
-    fine = fine or between(path)
     for axes in plane:
-        draw_path(axes, path)
-    draw_loop(loop, path, scale, fine)
-    draw_cost(cost, path, scale, fine)
+        _draw_path(axes, path)
+    _draw_loop(loop, path, scale, fine)
+    _draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)
     if path.load_constant:
         style.title(cost, "energy lost since the beginning")
@@ -69,28 +63,28 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
     """Draw the loop of a path; at varying load, its points in the plane of P and Q / f."""
     if path.load_constant:
-        draw_loop(axes, path, Scale(path.contact), between(path))
+        _draw_loop(axes, path, Scale(path.contact), between(path))
     else:
-        draw_path(axes, path)
+        _draw_path(axes, path)
 
 
-def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
+def _draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Draw shear force against displacement."""
     x, q = scale.displacement, scale.force
-    _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
-    style.mark_points(axes, x.of(path.displacements), q.of(path.forces))
+    _draw_darkening(axes, path, x.of(fine.displacements), q.of(fine.forces))
+    _mark_points(axes, x.of(path.displacements), q.of(path.forces))
     axes.margins(0.12)
     style.label(axes, x.short("X"), q.short("Q"))
 
 
-def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
+def _draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Draw the energy lost since the beginning against the number of the point."""
     m = len(path.losses)
     energy = scale.energy(float(path.losses.max(initial=0.0)))
     at = np.arange(1.0, len(fine.losses) + 1) * m / max(1, len(fine.losses))
-    colours = _draw_darkening(axes, path, fine, at, energy.of(fine.losses))
+    colours = _draw_darkening(axes, path, at, energy.of(fine.losses))
     if m <= MOST_NUMBERS:
-        axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color="0.15")
+        axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color=SMOOTH)
     else:
         style.bar(axes, colours, "step", above=True)
     axes.set(xlim=(0, max(1, m)))
@@ -99,9 +93,7 @@ def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     style.label(axes, "step", energy.label("W"))
 
 
-def _draw_darkening(
-    axes: Axes, path: LoadPath, fine: LoadPath, x: Array, y: Array
-) -> ScalarMappable:
+def _draw_darkening(axes: Axes, path: LoadPath, x: Array, y: Array) -> ScalarMappable:
     """Draw a curve that darkens from its start at the origin to its end; return the colours."""
     steps = max(1, len(path.forces))
     colours = ScalarMappable(Normalize(0, steps), ListedColormap(style.shades_of(256, low=0.15)))
@@ -116,27 +108,50 @@ def _draw_darkening(
     return colours
 
 
+def _mark_points(axes: Axes, x: Array, y: Array) -> None:
+    """Mark points with dots and numbers, if there are few; close ones share their label."""
+    if len(x) <= MOST_DOTS:
+        axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
+    if len(x) > MOST_NUMBERS:
+        return
+    inches = 0.75 * np.array(axes.bbox.size) / axes.figure.dpi  # about those after layout
+    spots = np.column_stack((x, y)) / (np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0]) / inches)
+    groups: dict[int, list[int]] = {}
+    for i, spot in enumerate(spots):
+        near = [j for j in groups if np.hypot(*(spots[j] - spot)) < 0.06]
+        groups.setdefault(near[0] if near else i, []).append(i)
+    taken = [spots[i] for i in groups]
+    sides = np.deg2rad([90, -90, 45, -45, 135, -135, 0, 180])
+    for i, group in groups.items():
+        text = ", ".join(str(1 + each) for each in group)
+        reach = 0.12 + 0.03 * len(text) * np.abs(np.cos(sides))
+        places = spots[i] + np.column_stack((np.cos(sides), np.sin(sides))) * reach[:, None]
+        clear = [min(float(np.hypot(*(place - each))) for each in taken) for place in places]
+        best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
+        taken.append(places[best])
+        offset = tuple((places[best] - spots[i]) * 72.0)
+        style.note(axes, text, (x[i], y[i]), offset, ha="center", va="center")
+
+
 def _maps(path: LoadPath, scale: Scale) -> Figure:
+    """Maps of stick and slip at some points, all in the same square."""
     chosen = evenly_chosen(range(len(path.loads)), MOST_MAPS)
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
     figure, places = panels(DOUBLE, 0.5 + 1.9 * rows, rows, columns)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
-    room = radii[chosen].max(axis=0)
+    room, place = radii[chosen].max(axis=0), style.Place(scale.points, scale.length)
     for axes, k in zip(places, chosen, strict=False):
-        layers = status_layers(path.status[k], radii[k])
-        draw_map(axes, scene.contact_points, layers, scale.length, room=room)
-        slide = int((path.status[k] == "sliding").sum())
-        touch = int((path.asperity_loads[k] > 0).sum())
+        draw_map(axes, place, status_layers(path.status[k], radii[k]), room=room)
+        slide = np.count_nonzero(path.status[k] == "sliding")
+        touch = np.count_nonzero(path.asperity_loads[k] > 0)
         style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelbottom=False, labelleft=False)
     for axes in places[len(chosen) :]:
         axes.set_axis_off()
-    handles: Any = status_handles(np.unique(path.status[chosen]))
-    if handles:
-        style.legend_outside(figure, handles, "lower center", len(handles))
+    name_statuses(figure, path.status[chosen])
     return figure
 
 
@@ -169,3 +184,17 @@ def between(path: LoadPath) -> LoadPath:
         return history(path.contact, forces=Q)
     limit = (path.scene.friction or 1.0) * P
     return load_path(path.scene, loads=P, forces=np.clip(Q, -limit, limit))
+
+
+def _draw_path(axes: Axes, path: LoadPath) -> None:
+    """Draw the path in the plane, and the memory curve at some of its points."""
+    f = path.scene.friction or 1.0
+    unit = label_plane(axes, float(path.loads.max()), path.scene.units.force)
+    P, T = unit.of(path.loads), unit.of(path.forces / f)
+    axes.plot(np.append(unit.of(path.start), P), np.append(0.0, T), color=FAINT, lw=0.9)
+    chosen = evenly_chosen(range(len(P)), MOST_CURVES)
+    for k, shade, pattern in zip(chosen, style.shades_of(len(chosen)), PATTERNS, strict=False):
+        memory = vertices(path.curves[k], unit)
+        axes.plot(*memory, color=shade, lw=1.5, ls=pattern, label=f"memory at {k + 1}")
+    _mark_points(axes, P, T)
+    style.legend(axes, "below", handlelength=2.2)

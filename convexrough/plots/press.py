@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, draw_values
-from convexrough.plots.measure import Scale
-from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE
+from convexrough.plots.notebook import Figure, Figures, no_contact, panels
+from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE, Scale
 from convexrough.sphere import hertz
 
 
@@ -32,7 +32,7 @@ def press_figures(contact: Contact) -> Figures:
     pressure loads
     """
     if not contact.loads.any():
-        return style.no_contact("pressure", "loads")
+        return no_contact("pressure", "loads")
     scale = Scale(contact)
     return Figures({"pressure": pressure_figure(scale), "loads": _loads_figure(scale)})
 
@@ -44,13 +44,14 @@ def pressure_figure(scale: Scale) -> Figure:
     style.label(profile, scale.length.label("x"), scale.pressure.label("p"))
     colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
-    crossed = (np.abs(contact.scene.contact_points[:, 1]) < contact.contact_radii).sum()
+    crossed = np.count_nonzero(np.abs(scale.points[:, 1]) < contact.contact_radii)
     touching = np.count_nonzero(contact.loads)
     in_rows = contact.scene.lattice is not None and crossed**2 >= touching
     if touching < CROWDED and (in_rows or crossed == touching):
         _draw_section(profile, scale, chart.get_xlim())
     else:
         _draw_peaks(profile, scale)
+    style.legend(profile, "above")
     profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
     return figure
 
@@ -66,9 +67,8 @@ def map_and_profile() -> tuple[Figure, tuple[Axes, Axes]]:
 def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> ScalarMappable:
     """Draw a map of contact pressures with a colour bar; return the map of colours.
 
-    Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is drawn as a stack of discs in equal
-    steps of pressure. If many asperities touch, each is one disc in the colour of its peak
-    pressure.
+    Each contact, with the pressure p0 sqrt(1 - (r/a)^2), is a stack of discs in equal steps of
+    pressure; if there are many, each is one disc in the colour of its peak pressure.
     """
     scale = scale or Scale(contact)
     peaks = scale.pressure.of(fields.peak_pressures(contact))
@@ -76,36 +76,52 @@ def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> S
     steps = int(np.clip(1000 // n, 8, 40)) if n < CROWDED else 1
     s = np.arange(steps)[:, None] / steps  # p = p0 s at the rim of a disc
     values = peaks * (s + 0.5 / steps) if steps > 1 else peaks
-    style.title(axes, census(contact))
+    style.title(axes, f"touching: {n:,} of {len(contact.loads):,}{style.not_proved(contact)}")
     name = ("" if steps > 1 else "peak ") + scale.pressure.short("p")
     most = max(float(scale.pressure.of(scale.peak)), float(peaks.max()))
     radii = contact.contact_radii * np.sqrt(1.0 - s**2)
     return draw_values(axes, scale, values, name, radii=radii, most=most)
 
 
+def towards_rim() -> Array:
+    """(81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth."""
+    return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
+
+
+def abscissae(centres: Array, radii: Array, edge: float) -> Array:
+    """Abscissae from -edge to edge, dense at the rims of discs on y = 0, where pressure is steep.
+
+    centres : (n, 2) [length];  radii : (n,) [length], 0 for no disc
+    """
+    x, y = centres.T
+    crossed = np.abs(y) < radii
+    half_chord = np.sqrt(radii[crossed] ** 2 - y[crossed] ** 2)
+    places = x[crossed, None] + np.outer(half_chord, towards_rim())
+    return np.unique(np.append(places, [-edge, edge]))
+
+
 def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
-    contact, (left, right) = scale.contact, sides
-    edge = max(-left, right) * scale.length.size
-    x = style.abscissae(contact.scene.contact_points, contact.contact_radii, edge)
+    """Draw the pressure along y = 0."""
+    contact, edge = scale.contact, max(-sides[0], sides[1]) * scale.length.size
+    x = abscissae(scale.points, contact.contact_radii, edge)
     rough = scale.pressure.of(fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))))
     axes.fill_between(scale.length.of(x), rough, facecolor=(ROUGH, 0.2), edgecolor=ROUGH,
                       lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
                       label="asperities, $y=0$")  # fmt: skip
-    _draw_smooth(axes, scale, scale.axes[:1], style.towards_rim())
-    axes.set_xlim(left, right)
-    style.legend_above(axes)
+    _draw_smooth(axes, scale, scale.axes[:1], towards_rim())
+    axes.set_xlim(*sides)
 
 
 def _draw_peaks(axes: Axes, scale: Scale) -> None:
+    """Draw the peak pressure of each asperity against its distance from the centre."""
     touching = scale.contact.loads > 0
-    r = distances(scale)[touching]
+    r = scale.length.of(scale.distances[touching])
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
     _draw_points(axes, r, peaks, float(peaks.max()), "peaks of all")
-    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(style.towards_rim()[40:]))
+    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(towards_rim()[40:]))
     reach = max([scale.typical, *scale.axes])
     axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
     style.label(axes, scale.length.label("r"), scale.pressure.label("p"))
-    style.legend_above(axes)
 
 
 def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array) -> None:
@@ -116,35 +132,32 @@ def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array)
                   label=f"_{scale.name}" if place else scale.name)  # fmt: skip
 
 
-def distances(scale: Scale) -> Array:
-    """(n,) distances of all contact points from the centre, in units of the length axis."""
-    away: Array = np.hypot(*(scale.contact.scene.contact_points - scale.centre).T)
-    return away / scale.length.size
-
-
 def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
-    """Draw a dot for each point or, if there are many points, their density and median."""
-    if len(x) >= CROWDED:
-        style.draw_density(axes, x, y, top, name)
-    else:
+    """Draw a dot for each point or, if there are many, their median, and density up to `top`."""
+    if len(x) < CROWDED:
         size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
         axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=name, clip_on=False, zorder=3)
-
-
-def census(contact: Contact) -> str:
-    """A line with the number of asperities that have a load and of statuses that are not proved."""
-    text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
-    return text + style.not_proved(contact.certificate.scope, contact.status)
+        return
+    columns, rows = (int(np.clip(len(x) / 50, 20, most)) for most in (80, 60))
+    span = (float(x.min()), float(x.max()))
+    count, across, up = np.histogram2d(x, y, bins=(columns, rows), range=(span, (0.0, top)))
+    most = count.max(axis=1, keepdims=True)
+    share = np.sqrt(np.divide(count, most, out=np.zeros_like(count), where=most > 0))
+    fading = LinearSegmentedColormap.from_list("density", [(1, 1, 1, 0), to_rgba(ROUGH, 0.75)])
+    axes.pcolormesh(across, up, share.T, cmap=fading, vmin=0.0, vmax=1.0, rasterized=True, lw=0)
+    column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
+    filled = np.unique(column)
+    middle = [np.median(y[column == each]) for each in filled]
+    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=name)
+    axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
+              label="median")  # fmt: skip
 
 
 def _loads_figure(scale: Scale) -> Figure:
     contact = scale.contact
     figure, (axes,) = panels(SINGLE, 2.6)
-    touching = contact.loads > 0
-    unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # mark only undecided asperities with a load
-        unsure &= touching
-    r, share = distances(scale), 100.0 * contact.loads / contact.load
+    touching, unsure = contact.loads > 0, style.doubtful(contact)
+    r, share = scale.length.of(scale.distances), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)
     sure = touching & ~unsure if touching.sum() < CROWDED else touching
     if sure.any():
@@ -154,10 +167,9 @@ def _loads_figure(scale: Scale) -> Figure:
         axes.plot(r[unsure], share[unsure], "x", ms=4, mew=0.8, color=UNSURE, label="undecided",
                   clip_on=False, rasterized=unsure.sum() >= CROWDED, zorder=3)  # fmt: skip
     reach = max(float(r[touching | unsure].max()), scale.length.of(scale.typical))
-    axes.set_xlim(0.0, 1.05 * reach)
-    axes.set_ylim(0.0, 1.06 * (axes.dataLim.ymax or 1.0))
+    axes.set(xlim=(0.0, 1.05 * reach), ylim=(0.0, 1.06 * (axes.dataLim.ymax or 1.0)))
     style.label(axes, scale.length.label("r"), "asperity load  [% of total]")
-    style.legend_above(axes, ncols=2)
+    style.legend(axes, "above", ncols=2)
     return figure
 
 
@@ -165,13 +177,12 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     """Draw 100 p(r) A / P for the smooth sphere, with the median cell area A of asperities."""
     if len(set(scale.axes)) != 1:
         return
-    points = scale.contact.scene.contact_points
-    sample = np.argsort(np.hypot(*points.T))[:5000]  # at most 5000, nearest the axis
-    areas = fields.cell_areas(points[sample])
+    sample = np.argsort(np.hypot(*scale.points.T))[:5000]  # at most 5000, nearest the axis
+    areas = fields.cell_areas(scale.points[sample])
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:
         return
-    s = style.towards_rim()[40:]
+    s = towards_rim()[40:]
     share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
     axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=SMOOTH,
               label="smooth $p(r)$ × cell area")  # fmt: skip

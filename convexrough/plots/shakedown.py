@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -13,7 +11,6 @@ from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_map, even_radii
-from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
@@ -38,8 +35,8 @@ def shakedown_figures(found: Shakedown) -> Figures:
     figure, (axes,) = panels(SINGLE + 0.7, 3.4)
     draw_factors(axes, found)
     figures = Figures({"shakedown": figure})
-    if found.kind == "exact" and len(onsets := _onsets(found)) > 1:
-        figures["shakedown_map"] = _map(found, onsets)
+    if found.kind == "exact" and np.count_nonzero(np.isfinite(found.factors)) > 1:
+        figures["shakedown_map"] = _map(found)
     return figures
 
 
@@ -57,7 +54,8 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
         Layer("first", np.where(first, 1.25 * radii, 0.0), UNSURE, None),
         Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
     ]
-    draw_map(axes, points, layers, measure(float(np.ptp(points)), found.scene.units.length))
+    length = style.measure(float(np.ptp(points)), found.scene.units.length)
+    draw_map(axes, style.Place(points, length), layers)
     ringed = "\nringed: the first to keep sliding" if first.any() else ""
     style.title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:
@@ -65,21 +63,12 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
         style.bar(axes, colours, what)
 
 
-def _onsets(found: Shakedown) -> Array:
-    """(k,) loads, over P0, at which asperities with a known factor first touch; descending."""
-    fall = _fall(found, np.array(1.0), np.array(1.0))
-    return np.sort(1.0 - found.factors[np.isfinite(found.factors)] * float(fall))[::-1]
-
-
 def _fall(found: Shakedown, along: Array, across: Array) -> Array:
-    """(P0 - L*) / P0 for factors of the load and shear amplitudes.
+    """(P0 - L*) / P0 for factors of the load amplitudes (along) and of the shear ones (across).
 
     Asperities that first touch above the load L* slide or open in every cycle.
-
-    along, across : factors of the load amplitudes and of the shear amplitudes
     """
-    f = found.scene.friction or 1.0
-    p, t = found.load_amplitudes, found.force_amplitudes / f
+    p, t = found.load_amplitudes, found.force_amplitudes / (found.scene.friction or 1.0)
     reached = [
         (-(along[..., None] * p + sign * across[..., None] * t)).max(axis=-1)
         for sign in (1.0, -1.0)
@@ -87,38 +76,40 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
     return np.asarray(sum(reached) / (2.0 * found.load))
 
 
-def _map(found: Shakedown, onsets: Array) -> Figure:
+def _map(found: Shakedown) -> Figure:
     """The map: how many asperities slide or open in every cycle; hatched where |Q| > f P."""
     figure, (axes,) = panels(SINGLE, 3.4)
-    f = found.scene.friction or 1.0
-    varies = np.ptp(found.load_amplitudes) > 0
-    unit_p = np.ptp(found.load_amplitudes) / 2.0 / found.load
-    unit_t = np.ptp(found.force_amplitudes) / 2.0 / (f * found.load)
+    limit = (found.scene.friction or 1.0) * found.load
+    p, t = found.load_amplitudes, found.force_amplitudes
+    unit_p, unit_t = np.ptp(p) / 2.0 / found.load, np.ptp(t) / 2.0 / limit
+    varies, centre = unit_p > 0, float(found.force) / limit
     part = (np.arange(FINE) + 0.5) / FINE
     x, y = np.meshgrid(part, part)
-    mean = np.full_like(x, float(found.force) / (f * found.load)) if varies else x
+    mean = np.full_like(x, centre) if varies else x
     along = x / unit_p if varies else np.zeros_like(x)
     across = y / unit_t if unit_t > 0 else np.zeros_like(y)
-    P = 1.0 + along[..., None] * found.load_amplitudes / found.load
-    T = mean[..., None] + across[..., None] * found.force_amplitudes / (f * found.load)
+    P = 1.0 + along[..., None] * p / found.load
+    T = mean[..., None] + across[..., None] * t / limit
     borne = (np.abs(T) <= P).all(axis=-1)
+    # The loads, over P0, at which the asperities with a known factor first touch.
+    fall = float(_fall(found, np.array(1.0), np.array(1.0)))
+    onsets = np.sort(1.0 - found.factors[np.isfinite(found.factors)] * fall)
     level = 1.0 - _fall(found, along, across)
-    sliding = len(onsets) - np.searchsorted(onsets[::-1], level, side="right")
-    shown = np.ma.masked_where(~borne, sliding)
-    look: dict[str, Any] = {"cmap": COLOURS, "vmin": 0, "vmax": len(onsets), "rasterized": True}
-    filled = axes.pcolormesh(part, part, shown, **look)
+    sliding = len(onsets) - np.searchsorted(onsets, level, side="right")
+    filled = axes.pcolormesh(part, part, np.ma.masked_where(~borne, sliding), cmap=COLOURS, vmin=0,
+                             vmax=len(onsets), rasterized=True)  # fmt: skip
     axes.patch.set(hatch="////", edgecolor=FAINT, facecolor="white")
-    limit = np.where(borne, sliding > 0, np.nan).astype(float)
-    if np.nanmin(limit) < np.nanmax(limit):
-        axes.contour(x, y, limit, [0.5], colors=UNSURE, linewidths=1.4)
+    slides = np.where(borne, sliding > 0, np.nan).astype(float)
+    if np.nanmin(slides) < np.nanmax(slides):
+        axes.contour(x, y, slides, [0.5], colors=UNSURE, linewidths=1.4)
+    at, across_label = centre, "mean shear $Q_0\\,/\\,(fP_0)$"
     if varies:
+        at, across_label = unit_p * found.factor, "load amplitude / $P_0$"
         reach = np.array([0.0, 1.0 / max(unit_p, unit_t)])
         axes.plot(unit_p * reach, unit_t * reach, color=SMOOTH, lw=0.8, ls=DASHED)
-    at = unit_p * found.factor if varies else float(found.force) / (f * found.load)
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
     style.bar(axes, filled, "asperities that keep sliding, or open")
-    across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     style.label(axes, across_label, "shear amplitude / $(fP_0)$")
     style.title(axes, "hatched: gross sliding; line: limit\ndot: this path at its limit")
     return figure

@@ -11,18 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from convexrough.friction.shear import ShearState
+from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.asperity_map import (
-    CROWDED,
-    draw_contact,
-    draw_outline,
-    smooth_handles,
-    status_handles,
-    status_layers,
-)
-from convexrough.plots.measure import Scale, quantity
-from convexrough.plots.notebook import Figures, panels
-from convexrough.plots.style import DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH
+from convexrough.plots.notebook import Figures, no_contact, panels
+from convexrough.plots.style import DASHED, DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -43,33 +35,30 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     """
     if not states:
         return Figures()
-    scale = Scale(states[0].contact)
     if not states[0].contact.loads.any():
-        return style.no_contact("stick_slip")
-    shown = evenly_chosen(states, MOST_PANELS)
+        return no_contact("stick_slip")
+    scale, shown = Scale(states[0].contact), evenly_chosen(states, MOST_PANELS)
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)
     width = SINGLE if columns == 1 else DOUBLE
-    doubted = any(style.not_proved(state.certificate.scope, state.status) for state in shown)
-    above = 0.17 * (1 + (columns == 4) + doubted)
+    above = 0.17 * (1 + (columns == 4) + any(style.not_proved(state) for state in shown))
     height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
-    figure, maps = panels(width, height, rows, columns, sharex=True, sharey=True)
-    for axes, state in zip(maps, shown, strict=False):
+    figure, places = panels(width, height, rows, columns, sharex=True, sharey=True)
+    for axes, state in zip(places, shown, strict=False):
         draw_state(axes, state, scale)
-        style.title(axes, state_title(state, scale, narrow=columns == 4), "center")
+        _title(axes, state, scale, "\n" if columns == 4 else " ")
         axes.set(xlabel="", ylabel="")
         if columns == 4:
             axes.xaxis.set_major_locator(style.round_ticks(4))
-    for axes in maps[len(shown) :]:
+    for axes in places[len(shown) :]:
         axes.remove()
-    for axes in maps[len(shown) - columns : len(shown)]:
+    for axes in places[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
-    limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
+    limit = f"$fP$ = {style.quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
-    style.legend_outside(
-        figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4
-    )
+    handles, loc, ncols = legend_handles(shown, scale), "outside upper center", min(2 * columns, 4)
+    style.legend(figure, "outside", handles=handles, loc=loc, ncols=ncols)
     return Figures({"stick_slip": figure})
 
 
@@ -77,50 +66,51 @@ def draw_one_state(axes: Axes, state: State) -> None:
     """Draw the map of a state, with a title and a legend."""
     scale = Scale(state.contact)
     draw_state(axes, state, scale)
-    style.title(axes, state_title(state, scale, narrow=False), "center")
-    style.legend_below(axes, handles=legend_handles([state], scale))
+    _title(axes, state, scale, " ")
+    style.legend(axes, "below", handles=legend_handles([state], scale))
+
+
+def _title(axes: Axes, state: State, scale: Scale, space: str) -> None:
+    """The title: the shear force divided by f P, and after `space` how many asperities slide."""
+    touching = state.contact.loads > 0
+    force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
+    share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
+    slide = f"{np.count_nonzero(touching & (state.status == 'sliding')):,}"
+    unsure = style.not_proved(state).replace(" ", "\n", 1)
+    said = f"$Q/(fP)$ = {share}:{space}{slide} of {np.count_nonzero(touching):,} slide{unsure}"
+    style.title(axes, said, "center")
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
     """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact."""
-    radii, points = state.contact.contact_radii, state.contact.scene.contact_points
-    draw_contact(axes, scale, status_layers(state.status, radii, state.stick_radii))
+    radii = state.contact.contact_radii
+    maps.draw_map(axes, scale, maps.status_layers(state.status, radii, state.stick_radii))
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
     if 0 < left < 1:
-        draw_outline(axes, [scale.length.of(np.cbrt(left) * each) for each in scale.axes], DOTTED)
-    doubtful = _doubtful(state)
-    if doubtful.any():
-        size = float(np.clip(60.0 / np.sqrt(doubtful.sum()), 1.0, 4.0))
-        axes.plot(*scale.length.of(points[doubtful]).T, "x", ms=size, mew=0.8, color=SMOOTH,
+        stick = [scale.length.of(np.cbrt(left) * each) for each in scale.axes]
+        maps.draw_outline(axes, stick, DOTTED)
+    unsure = scale.points[style.doubtful(state)]
+    if len(unsure):
+        size = float(np.clip(60.0 / np.sqrt(len(unsure)), 1.0, 4.0))
+        axes.plot(*scale.length.of(unsure).T, "x", ms=size, mew=0.8, color=SMOOTH,
                   label="_undecided")  # fmt: skip
 
 
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
     """Legend entries for the colours and marks that occur."""
     loads = states[0].contact.loads
-    statuses = {status for state in states for status in np.unique(state.status[loads > 0])}
-    marks: list[Any] = status_handles(statuses - {"undecided"}, stick=True)
-    if any(_doubtful(state).any() for state in states):
+    occur = np.concatenate([state.status[loads > 0] for state in states])
+    marks: list[Any] = maps.status_handles(occur[occur != "undecided"])
+    if "partial" in occur:
+        marks.insert(0, style.disc_handle(maps.STICK, "stick disc"))
+    if any(style.doubtful(state).any() for state in states):
         marks.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
-    if (loads == 0).any() and np.count_nonzero(loads) < CROWDED:
+    if (loads == 0).any() and np.count_nonzero(loads) < maps.CROWDED:
         marks.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
-    return marks + smooth_handles(scale, stick=any(np.any(state.force != 0) for state in states))
-
-
-def _doubtful(state: State) -> Any:
-    """(n,) True for undecided asperities; if nothing is proved, only for those with a load."""
-    unsure = state.status == "undecided"
-    return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
-
-
-def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
-    """The title: the shear force divided by f P, and how many asperities slide."""
-    touching = state.contact.loads > 0
-    slide = int((touching & (state.status == "sliding")).sum())
-    force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
-    share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
-    sliding = f"{slide:,} of {int(touching.sum()):,} slide"
-    unsure = style.not_proved(state.certificate.scope, state.status)
-    return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{sliding}" + unsure.replace(
-        " ", "\n", 1
-    )
+    outlines = {"contact": DASHED}
+    if any(np.any(state.force != 0) for state in states):
+        outlines["stick"] = DOTTED
+    for what, dashes in outlines.items() if scale.sphere else ():
+        said = f"{scale.name}: {what}"
+        marks.append(Line2D([], [], ls=dashes, lw=0.9, color=SMOOTH, label=said))
+    return marks

@@ -12,13 +12,12 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import history
 from convexrough.friction.steady import cycles
 from convexrough.scene.base import sphere_radius
@@ -49,7 +48,7 @@ def slider_html(contact: Contact, proved: Sequence[str]) -> str:
 def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
     """The data of the page, with five digits: first loading, and steady cycles.
 
-    Lengths are in a_H, forces in f P, displacements in X0 of `plots.measure`. `stick` has a row per
+    Lengths are in a_H, forces in f P, displacements in X0 of `plots.style`. `stick` has a row per
     force and a column per disc: the stick radius in thousandths of the contact radius, 0 where
     sliding, -1 where undecided.
     """
@@ -67,30 +66,68 @@ def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
     shown = _some(touching, MOST_DRAWN)
     away = np.argsort(contact.scene.asperities.distances[shown], kind="stable")
     followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
+    which = shown[followed]
     points, radii = contact.scene.contact_points / a_H, contact.contact_radii[shown] / a_H
     radii *= np.sqrt(len(touching) / len(shown))  # together they cover the same area
     edge = 1.06 * max(1.0, float((np.hypot(*points[shown].T) + radii).max()))
     empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
     empty = empty[np.abs(points[empty]).max(axis=1) < edge]
     shares = loading.asperity_forces[:, shown] / (f * contact.loads[shown])
+    statuses = np.array([each.status for each in steady])
+    radius = np.rint(1000.0 * np.cbrt(np.maximum(1.0 - shares, 0.0)))
+    stick = np.select([statuses[:, shown] == status for status in ("sliding", "undecided")],
+                      [0, -1], np.maximum(radius, 1.0).astype(int))  # fmt: skip
+    stuck = np.cbrt(1.0 - fractions)
+    moved = np.array([each.displacement_amplitude for each in steady])
+    length, force = (f" {unit}".rstrip() for unit in contact.scene.units)
+    left_out = {
+        f"{len(shown):,} of {len(touching):,} touching asperities are drawn, chosen at random, as "
+        "larger discs.": len(shown) < len(touching),
+        f"{len(which):,} of the touching asperities can be selected.": len(which) < len(touching),
+        f"The slider has {count} positions.": count < next(iter(FORCES.values())),
+    }
     return {
         "units": contact.scene.units._asdict(),
         "touching": len(touching),
         "edge": _digits(edge),
         "certificate": list(proved),
-        "letters": _letters(limit, a_H, X0, *contact.scene.units),
-        "left_out": _left_out(len(touching), len(shown), len(followed), len(fractions)),
-        "states": _states(fractions, steady, X0, limit),
+        "letters": [
+            ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
+            ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],
+            ["X_0", f"{X0:.5g}{length}", "displacement X of the smooth sphere at gross sliding"],
+            ["X", "", "relative displacement of distant points of the two bodies"],
+            ["X_i, s_i, a_i", "", "deflection of an asperity, its gross slip, its contact radius"],
+            ["W_0", "", "scale of the loss, 24/5 f P X\u2080"],
+            ["k", "", "initial stiffness of the contact; Q/k is the elastic part of X"],
+        ],
+        "left_out": [sentence for sentence, holds in left_out.items() if holds],
+        "states": {
+            "fraction": _digits(fractions),
+            "force": _digits(fractions * limit),
+            "length": _digits(moved),
+            "displacement": _digits(moved / X0),
+            "displacement_error": [bound(each.displacement_error) for each in steady],
+            "loss": _digits([each.loss_normalised for each in steady]),
+            "smooth_loss": _digits([each.smooth_normalised for each in steady]),
+            "smooth_displacement": _digits(1.0 - stuck**2),
+            "smooth_stick": _digits(stuck),
+            "sliding": (statuses == "sliding").sum(axis=1).tolist(),
+            "partial": np.isin(statuses, ("partial", "stuck")).sum(axis=1).tolist(),
+            "undecided": (statuses == "undecided").sum(axis=1).tolist(),
+        },
         "discs": {"index": shown.tolist(), "x": _digits(points[shown, 0]),
                   "y": _digits(points[shown, 1]), "radius": _digits(radii)},
-        "stick": _stick(shares, np.array([each.status[shown] for each in steady])),
+        "stick": stick.tolist(),
         "open": {"x": _digits(points[empty, 0]), "y": _digits(points[empty, 1])},
         "followed": {
             "disc": followed.tolist(),
-            **_followed(contact, shown[followed]),
+            "x": _digits(contact.scene.asperities.positions[which, 0]),
+            "y": _digits(contact.scene.asperities.positions[which, 1]),
+            "status": contact.status[which].tolist(),
+            "load": _digits(contact.loads[which]),
+            "load_error": [bound(error) for error in contact.certificate.load_errors[which]],
             "share": [_digits(curve) for curve in shares[:, followed].T],
-            "moved": [_digits(curve) for curve in
-                      loading.asperity_displacements[:, shown[followed]].T / X0],
+            "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
         },
     }  # fmt: skip
 
@@ -102,76 +139,8 @@ def _some(which: Indices, most: int) -> Indices:
     return np.sort(np.random.default_rng(0).choice(which, most, replace=False))
 
 
-def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
-    moved = np.array([each.displacement_amplitude for each in steady])
-    stuck = np.cbrt(1.0 - fractions)
-    return {
-        "fraction": _digits(fractions),
-        "force": _digits(fractions * limit),
-        "length": _digits(moved),
-        "displacement": _digits(moved / X0),
-        "displacement_error": [bound(each.displacement_error) for each in steady],
-        "loss": _digits([each.loss_normalised for each in steady]),
-        "smooth_loss": _digits([each.smooth_normalised for each in steady]),
-        "smooth_displacement": _digits(1.0 - stuck**2),
-        "smooth_stick": _digits(stuck),
-        "sliding": [int((each.status == "sliding").sum()) for each in steady],
-        "partial": [int(np.isin(each.status, ("partial", "stuck")).sum()) for each in steady],
-        "undecided": [int((each.status == "undecided").sum()) for each in steady],
-    }
-
-
-def _stick(shares: Array, statuses: NDArray[np.str_]) -> list[list[int]]:
-    """`stick` of `slider_data`, from (m, k) shear forces / friction limits, and statuses."""
-    rows = np.maximum(np.rint(1000.0 * np.cbrt(np.maximum(1.0 - shares, 0.0))), 1.0).astype(int)
-    rows[statuses == "sliding"] = 0
-    rows[statuses == "undecided"] = -1
-    return [row.tolist() for row in rows]
-
-
-def _followed(contact: Contact, which: Indices) -> dict[str, Any]:
-    x, y = contact.scene.asperities.positions[which].T
-    certificate = contact.certificate
-    return {
-        "x": _digits(x),
-        "y": _digits(y),
-        "status": certificate.status[which].tolist(),
-        "load": _digits(contact.loads[which]),
-        "load_error": [bound(error) for error in certificate.load_errors[which]],
-    }
-
-
 def _digits(values: ArrayLike) -> Any:
     """A number, or a list of them, to the five digits that the page shows."""
     if isinstance(values, float):
         return float(f"{values:.5g}")
     return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
-
-
-def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]]:
-    """A row for each symbol, with its value and meaning."""
-    length, force = (f" {unit}".rstrip() for unit in units)
-    return [
-        ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
-        ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],
-        ["X_0", f"{X0:.5g}{length}", "displacement X of the smooth sphere at gross sliding"],
-        ["X", "", "relative displacement of distant points of the two bodies"],
-        ["X_i, s_i, a_i", "", "deflection of an asperity, its gross slip, its contact radius"],
-        ["W_0", "", "scale of the loss, 24/5 f P X\u2080"],
-        ["k", "", "initial stiffness of the contact; Q/k is the elastic part of X"],
-    ]
-
-
-def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str]:
-    """Sentences about asperities that the page leaves out."""
-    said = []
-    if shown < touching:
-        said.append(
-            f"{shown:,} of {touching:,} touching asperities are drawn, chosen at random, as larger "
-            "discs."
-        )
-    if followed < touching:
-        said.append(f"{followed:,} of the touching asperities can be selected.")
-    if forces < next(iter(FORCES.values())):
-        said.append(f"The slider has {forces} positions.")
-    return said

@@ -1,25 +1,35 @@
-"""The shared look of the figures: sizes, colours, labels, legends, bars, numbered points."""
+"""The shared look of the figures: sizes, colours, labels, legends, and the units of their axes.
+
+Where the scene names its units, axes show metric units as SI units with suitable prefixes, and
+other units unchanged. Where it does not, lengths are in a_H and pressures in p0 (contact radius and
+peak pressure of the smooth sphere under the same load), shear forces in f P, and displacements and
+energies in X0 and W0 of `Scale`. Where there is no finite smooth contact, lengths are in the radius
+r_c of the circle that holds all contacts, and pressures in the mean pressure on this circle.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
-from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import ArrayLike
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
 
-from convexrough.arrays import Array
-from convexrough.plots.measure import literal as literal
-from convexrough.plots.notebook import Figures, panels
+from convexrough import checks
+from convexrough.arrays import Array, Number
+from convexrough.contact import Contact
+from convexrough.fields import peak_pressures
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
+from convexrough.tabular.units import parsed
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -28,8 +38,19 @@ ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
 DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
 
-#: Largest numbers of points that are numbered, and that are marked.
-MOST_NUMBERS, MOST_DOTS = 12, 60
+#: Options of the legends of axes, and of those of figures ("outside" all axes), by their places.
+LEGENDS: dict[str, dict[str, Any]] = {
+    "inside": dict(loc="upper left"),
+    "above": dict(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderpad=0.2,
+                  columnspacing=1.0, handletextpad=0.4, handlelength=1.6),
+    "below": dict(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=2, fontsize=TICK - 1,
+                  columnspacing=1.0, handletextpad=0.4),
+    "outside": dict(handletextpad=0.5, columnspacing=1.4, borderpad=0.2),
+}  # fmt: skip
+
+#: SI units by their powers of length and force; and prefixes in ascending order.
+SYMBOLS = {(1, 0): "m", (0, 1): "N", (-2, 1): "Pa", (1, 1): "J"}
+PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 
 
 def label(axes: Axes, x: str, y: str) -> None:
@@ -45,49 +66,33 @@ def title(axes: Axes, text: str, loc: Literal["left", "center"] = "left") -> Non
     axes.set_title(text, fontsize=TICK, loc=loc)
 
 
-def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
+def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> None:
     """A colour bar, added to the right of the axes, with its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
-    found.ax.tick_params(labelsize=TICK)
-    found.ax.yaxis.get_offset_text().set_fontsize(TICK)
+    label(found.ax, "", "" if above else name)
     if above:
         title(found.ax, name, "center")
-    else:
-        found.set_label(name, fontsize=LABEL)
-    return found
+
+
+def legend(where: Any, place: str, **more: Any) -> None:
+    """Add a legend to axes or a figure, at a place of `LEGENDS`, with more options."""
+    where.legend(**{"fontsize": TICK, "frameon": False, **LEGENDS[place], **more})
+
+
+def disc_handle(colour: str, text: str) -> Line2D:
+    """The legend entry of discs of this colour."""
+    return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
 
 
 def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
     return MaxNLocator(most, steps=[1, 2, 5, 10], integer=whole)
 
 
-def few_ticks(axis: Axis) -> None:
-    """Label at most 6 powers of ten; on a short axis also 2 and 5 times these."""
-    low, high = axis.get_view_interval()
-    subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=6))
-    axis.set_major_formatter(LogFormatterSciNotation() if len(subs) == 1 else "{x:g}")
-    axis.set_minor_formatter(NullFormatter())
-
-
-def legend_inside(axes: Axes) -> None:
-    axes.legend(loc="upper left", fontsize=TICK, frameon=False)
-
-
-def legend_above(axes: Axes, ncols: int = 3) -> None:
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=ncols, fontsize=TICK,
-                frameon=False, borderpad=0.2, columnspacing=1.0, handletextpad=0.4,
-                handlelength=1.6)  # fmt: skip
-
-
-def legend_below(axes: Axes, ncols: int = 2, **more: Any) -> None:
-    axes.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=ncols, fontsize=TICK - 1,
-                frameon=False, columnspacing=1.0, handletextpad=0.4, **more)  # fmt: skip
-
-
-def disc_handle(colour: str, text: str) -> Line2D:
-    """The legend entry of discs of this colour."""
-    return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
+def note(axes: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
+    """Write a text with a white halo near a place, at an offset in points."""
+    halo = [withStroke(linewidth=2.0, foreground="white")]
+    axes.annotate(text, place, xytext=offset, textcoords="offset points", path_effects=halo,
+                  **{"fontsize": TICK, **look})  # fmt: skip
 
 
 def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
@@ -98,33 +103,25 @@ def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
                   bbox=box, zorder=5)  # fmt: skip
 
 
-def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) -> None:
-    """Add one legend for all panels."""
-    figure.legend(handles=list(handles), loc=f"outside {place}", ncols=ncols, fontsize=TICK,
-                  frameon=False, handletextpad=0.5, columnspacing=1.4, borderpad=0.2)  # fmt: skip
-
-
-def no_contact(*stems: str) -> Figures:
-    """Figures under these names, each with the text that nothing touches."""
-    figures = Figures()
-    for stem in stems:
-        figures[stem], (axes,) = panels(SINGLE, 2.6)
-        say_nothing(axes)
-    return figures
-
-
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
     """Write a reason into an empty panel, and remove the ticks."""
     axes.set(xticks=[], yticks=[])
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
 
 
-def not_proved(scope: str, status: Any) -> str:
-    """A text in brackets on what is not proved about a state; "" if all is proved."""
-    if scope == "none":
+def not_proved(state: Any) -> str:
+    """A text in brackets on what is not proved about a state or contact; "" if all is proved."""
+    if state.certificate.scope == "none":
         return " (not proved)"
-    unsure = int((status == "undecided").sum())
+    unsure = np.count_nonzero(state.status == "undecided")
     return f" ({unsure:,} undecided)" if unsure else ""
+
+
+def doubtful(state: Any) -> NDArray[np.bool_]:
+    """(n,) True for undecided asperities; if nothing is proved, only for those with a load."""
+    unsure: NDArray[np.bool_] = state.status == "undecided"
+    loads = getattr(state, "contact", state).loads
+    return unsure & (loads > 0) if state.certificate.scope == "none" else unsure
 
 
 def shades_of(count: int, low: float = 0.3) -> Array:
@@ -132,74 +129,157 @@ def shades_of(count: int, low: float = 0.3) -> Array:
     return np.asarray(matplotlib.colormaps[COLOURS](np.linspace(low, 1.0, count)))
 
 
-def mark_points(axes: Axes, x: Array, y: Array) -> None:
-    """Mark points with dots and numbers, if there are few points.
+class Measure(NamedTuple):
+    """The unit of an axis: values are divided by `size`, which the label names.
 
-    Dots are drawn for at most `MOST_DOTS` points, numbers for at most `MOST_NUMBERS`. Points at
-    nearly the same place share a label.
+    symbol : formula of the divisor, such as a_H, and `said` its value; or "", and `said` the unit
     """
-    if len(x) <= MOST_DOTS:
-        axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
-    if len(x) > MOST_NUMBERS:
-        return
-    size = np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0]) / _inches(axes)
-    spots = np.column_stack((x, y)) / size
-    groups: dict[int, list[int]] = {}
-    for i, spot in enumerate(spots):
-        near = [j for j in groups if np.hypot(*(spots[j] - spot)) < 0.06]
-        groups.setdefault(near[0] if near else i, []).append(i)
-    taken = [spots[i] for i in groups]
-    halo = [withStroke(linewidth=2.0, foreground="white")]
-    for i, group in groups.items():
-        text = ", ".join(str(1 + each) for each in group)
-        sides = np.deg2rad([90, -90, 45, -45, 135, -135, 0, 180])
-        reach = 0.12 + 0.03 * len(text) * np.abs(np.cos(sides))
-        places = spots[i] + np.column_stack((np.cos(sides), np.sin(sides))) * reach[:, None]
-        clear = [min(float(np.hypot(*(place - each))) for each in taken) for place in places]
-        best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
-        taken.append(places[best])
-        axes.annotate(text, (x[i], y[i]), xytext=tuple((places[best] - spots[i]) * 72.0),
-                      textcoords="offset points", fontsize=TICK, ha="center", va="center",
-                      path_effects=halo)  # fmt: skip
+
+    size: float = 1.0
+    symbol: str = ""
+    said: str = ""
+
+    def of(self, values: Number) -> Number:
+        """The values divided by `size`, as the axis shows them."""
+        return values / self.size
+
+    def short(self, name: str) -> str:
+        """The label of an axis, without the value of the symbol."""
+        if self.symbol:
+            return f"${name}\\,/\\,{self.symbol}$"
+        return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
+
+    def label(self, name: str) -> str:
+        """The label of an axis, with the unit or the value of the symbol."""
+        known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
+        return self.short(name) + known
 
 
-def _inches(axes: Axes) -> Array:
-    """(2,) approximate width and height [inches] of the axes after layout."""
-    width, height = axes.get_figure().get_size_inches()  # type: ignore[union-attr]
-    place = axes.get_position()
-    return np.array([0.75 * place.width * width, 0.75 * place.height * height])
+def measure(size: float, unit: str, symbol: str = "") -> Measure:
+    """The measure of an axis with values up to `size`.
 
-
-def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
-    """Draw the density of points and the median of y along x; `top` is the upper end of y."""
-    columns = int(np.clip(len(x) / 50, 20, 80))
-    rows = int(np.clip(len(x) / 50, 20, 60))
-    span = (float(x.min()), float(x.max()))
-    count, across, up = np.histogram2d(x, y, bins=(columns, rows), range=(span, (0.0, top)))
-    most = count.max(axis=1, keepdims=True)
-    share = np.sqrt(np.divide(count, most, out=np.zeros_like(count), where=most > 0))
-    fading = LinearSegmentedColormap.from_list("density", [(1, 1, 1, 0), to_rgba(ROUGH, 0.75)])
-    axes.pcolormesh(across, up, share.T, cmap=fading, vmin=0.0, vmax=1.0, rasterized=True, lw=0)
-    column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
-    filled = np.unique(column)
-    middle = [np.median(y[column == each]) for each in filled]
-    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=label)
-    axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
-              label="median")  # fmt: skip
-
-
-def towards_rim() -> Array:
-    """(81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth."""
-    return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
-
-
-def abscissae(centres: Array, radii: Array, edge: float) -> Array:
-    """Abscissae from -edge to edge, dense at the rims of discs on y = 0, where pressure is steep.
-
-    centres : (n, 2) [length];  radii : (n,) [length], 0 for no disc
+    A metric `unit` becomes an SI unit with a prefix; another unit stays. Without a unit, values are
+    divided by `size`, whose formula is `symbol`; without unit and symbol, values are not divided.
     """
-    x, y = centres.T
-    crossed = np.abs(y) < radii
-    half_chord = np.sqrt(radii[crossed] ** 2 - y[crossed] ** 2)
-    places = x[crossed, None] + np.outer(half_chord, towards_rim())
-    return np.unique(np.append(places, [-edge, edge]))
+    if known := _metric(unit):
+        name, exponent = known
+        si, step = abs(size) * 10.0**exponent, 0  # a power of a thousand scales it to 1 to 1000
+        if si and math.isfinite(si):
+            step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
+        return Measure(10.0 ** (3 * step - exponent), "", f"{PREFIXES[step + 5]}{name}")
+    if unit or not symbol:
+        return Measure(1.0, "", unit)
+    return Measure(size or 1.0, symbol, quantity(size, ""))
+
+
+def quantity(value: float, unit: str) -> str:
+    """The value to three digits with its unit, such as 4.12 µm (SI) or 4.12 × 10^-3 in."""
+    if value and _metric(unit):
+        prefixed = measure(float(f"{value:.3g}"), unit)
+        return f"{prefixed.of(value):.3g} {prefixed.said}"
+    digits, _, power = f"{value:.2e}".partition("e")
+    plain = value == 0 or -3 < int(power) < 3
+    number = f"{value:.3g}" if plain else f"${digits}\\times 10^{{{int(power)}}}$"
+    return f"{number} {literal(unit)}".strip()
+
+
+def literal(text: str) -> str:
+    """Text in which no dollar sign begins a formula."""
+    return text.replace("$", r"\$")
+
+
+def _metric(unit: str) -> tuple[str, int] | None:
+    """The SI unit of which a unit is 10^power, and the power; None for other units."""
+    if (known := parsed(unit) if unit.strip() else None) is None:
+        return None
+    power = round(math.log10(known.size))
+    name = SYMBOLS.get((known.length, known.force))
+    return (name, power) if name and known.size * 10 ** (-power) == 1 else None
+
+
+class Place(NamedTuple):
+    """Where a map is: its points (n, 2) [length], and the measure of its axes.
+
+    axes : semi-axes [length] of the smooth contact, to be outlined about the origin; or ()
+    """
+
+    points: Array
+    length: Measure
+    axes: Sequence[float] = ()
+
+
+class Scale:
+    """The measures of a contact's figures, and the smooth contact under the same load.
+
+    sphere : the smooth sphere or ellipsoid, or None;  name : its name in legends
+    points, length, axes : as in `Place`;  centre : (2,) [length] origin of distances
+    typical, peak : radius and peak pressure of the smooth contact, or r_c and mean pressure
+    """
+
+    def __init__(self, contact: Contact) -> None:
+        self.contact, self.units = contact, contact.scene.units
+        self.points, load = contact.scene.contact_points, contact.load
+        self.sphere = smooth_reference(contact.scene, load) if load else None
+        self.name, self.centre = "smooth sphere", np.zeros(2)
+        self.axes: Sequence[float] = ()
+        if self.sphere is not None:
+            self.typical, self.peak = self.sphere.contact_radius, self.sphere.peak_pressure
+            self.axes = (self.typical, self.typical)
+            if isinstance(self.sphere, SmoothEllipsoid):
+                self.name, self.axes = "smooth ellipsoid", self.sphere.semi_axes
+        else:
+            if load:
+                self.centre = contact.loads @ self.points / load
+            rims = np.hypot(*(self.points - self.centre).T) + contact.contact_radii
+            self.typical = float(rims[contact.loads > 0].max(initial=0.0))
+            self.peak = load / (np.pi * self.typical**2) if load else 0.0
+        symbols = ("a_H", "p_0") if self.sphere else ("r_c", "\\bar p")
+        self.length = measure(self.typical, self.units.length, symbols[0])
+        pressure, most = self.units.pressure, peak_pressures(contact).max()
+        self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
+
+    @property
+    def distances(self) -> Array:
+        """(n,) [length] distances of all contact points from the centre."""
+        return np.asarray(np.hypot(*(self.points - self.centre).T))
+
+    @cached_property
+    def limit(self) -> float:
+        """[force] the friction limit f P."""
+        return checks.friction(self.contact.scene.friction) * self.contact.load
+
+    @cached_property
+    def travel(self) -> float:
+        """[length] X0: displacement at gross sliding of the smooth contact, if any, or of this."""
+        if self.sphere is not None:
+            return float(self.sphere.displacement(self.limit))
+        scene = self.contact.scene  # X0 = c_t f times the approach from first touch
+        c_t = float(mindlin.ratio(scene.material.poisson_ratio))
+        first = self.contact.approach + float(scene.offsets.max())
+        return checks.friction(scene.friction) * c_t * first
+
+    @property
+    def work(self) -> float:
+        """W0 = 24/5 f P X0 [force length]; for a sphere 9 (2 - nu) f^2 P^2 / (5 G a_H)."""
+        return 4.8 * self.limit * self.travel
+
+    @property
+    def force(self) -> Measure:
+        """The measure of shear forces."""
+        return measure(self.limit, self.units.force, "(fP)")
+
+    @property
+    def displacement(self) -> Measure:
+        """The measure of displacements along the shear."""
+        return measure(self.travel, self.units.length, "X_0")
+
+    def energy(self, largest: float) -> Measure:
+        """The measure of energies up to the largest."""
+        return measure(largest if self.units.work else self.work, self.units.work, "W_0")
+
+    def footnote(self) -> str:
+        """A line that says what f P and X0 are."""
+        whose = f"the {self.name}'s" if self.sphere else "this contact's"
+        X0 = quantity(self.travel, self.units.length)
+        limit = quantity(self.limit, self.units.force)
+        return f"$fP$ = {limit},   $X_0$ = {X0}: {whose} $X$ at gross sliding"

@@ -12,19 +12,8 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
-from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import (
-    DASHED,
-    DOUBLE,
-    FAINT,
-    LABEL,
-    ROUGH,
-    SINGLE,
-    SMOOTH,
-    TICK,
-    UNSURE,
-)
+from convexrough.plots.style import DASHED, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE, Scale
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
@@ -70,9 +59,10 @@ def surface_figures(
     return figures
 
 
-def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
-    """Draw the heights in greys, with labelled axes; return the image."""
-    x, z = _measures(surface)
+def draw_surface(axes: Axes, surface: Surface) -> tuple[AxesImage, style.Measure, style.Measure]:
+    """Draw the heights in greys; return the image, and the measures of its axes and heights."""
+    x = style.measure(surface.size[0] / 2, surface.unit)
+    z = style.measure(float(np.abs(surface.heights).max()), surface.unit)
     width, height = (x.of(side / 2) for side in surface.size)
     whole = (-width, width, -height, height)
     image = axes.imshow(z.of(surface.heights), origin="lower", extent=whole, cmap="gray",
@@ -80,27 +70,15 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
     style.label(axes, x.short("x"), x.short("y"))
     axes.xaxis.set_major_locator(style.round_ticks())
     axes.yaxis.set_major_locator(style.round_ticks())
-    return image
-
-
-def _measures(surface: Surface) -> tuple[Measure, Measure]:
-    """The measures of places on the map, and of heights."""
-    highest = float(np.abs(surface.heights).max())
-    return measure(surface.size[0] / 2, surface.unit), measure(highest, surface.unit)
+    return image, x, z
 
 
 def draw_summit_map(axes: Axes, summits: Summits) -> None:
     """Draw a disc at each summit."""
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
-    length = measure(float(np.ptp(summits.positions)) / 2, summits.unit)
-    draw_map(axes, summits.positions, [layer], length)
-
-
-def draw_summits(axes: Axes, positions: Array) -> None:
-    """Draw a dot at each summit, smaller if there are many."""
-    size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
-    axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, rasterized=len(positions) > MANY)
+    length = style.measure(float(np.ptp(summits.positions)) / 2, summits.unit)
+    draw_map(axes, style.Place(summits.positions, length), [layer])
 
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
@@ -113,7 +91,6 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if highest < 300 * lowest else (1,)))
     axes.yaxis.set_major_formatter("{x:,g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    _name_prunings(axes, curve)
     style.label(axes, "pruning  [% of $Sz$]", "number")
 
 
@@ -138,12 +115,11 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         (middle, curve.crowding, OVERLAP, "crowding"),
         (lower, 100 * curve.model_error, 100 * TOO_FAR, "model error  [%]"),
     ):
-        _draw_by_scope(axes, curve, values, "")
+        _draw_by_scope(axes, curve, values)
         axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
-        _name_prunings(axes, curve)
         axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
         style.label(axes, "", name)
-    lower.set_xlabel("pruning  [% of $Sz$]", fontsize=LABEL)
+    lower.set_xlabel(upper.get_xlabel(), fontsize=style.LABEL)
     upper.set_xlabel("")
     first = curve.trusted_from
     until = float(curve.prune[-1]) if np.isnan(first) else first
@@ -152,12 +128,20 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
         axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
     met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
-    size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
+    size = f"   ($Sz$ = {style.quantity(float(tallest), unit)})" if tallest else ""
     style.title(upper, f"assumptions met {met}{size}")
     return figure
 
 
-def _name_prunings(axes: Axes, curve: Provability) -> None:
+def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str = "") -> None:
+    """Draw values against the pruning, with a mark for each scope, named if `name` is given."""
+    axes.plot(curve.prune, values, "-", lw=0.9, color=FAINT, zorder=1)
+    for scope, (mark, colour) in SCOPES.items():
+        chosen = curve.scope == scope
+        if np.isfinite(values[chosen]).any():
+            said = f"{name}, proof: {scope}" if name else "_nothing"
+            axes.plot(curve.prune[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0,
+                      color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
     top = max(float(curve.prune[-1]), PRUNINGS[1])
     shown = [each for each in PRUNINGS if each <= top]
     axes.set_xlim(0.0, 1.02**2 * top)
@@ -166,43 +150,33 @@ def _name_prunings(axes: Axes, curve: Provability) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> None:
-    axes.plot(curve.prune, values, "-", lw=0.9, color=FAINT, zorder=1)
-    for scope, (mark, colour) in SCOPES.items():
-        chosen = curve.scope == scope
-        if chosen.any() and np.isfinite(values[chosen]).any():
-            said = f"{name}, proof: {scope}" if name else "_nothing"
-            axes.plot(curve.prune[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0,
-                      color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
-
-
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     figure, (axes,) = panels(SINGLE + 0.9, 4.1)
-    image, (length, z) = draw_surface(axes, surface), _measures(surface)
+    image, length, z = draw_surface(axes, surface)
     positions, handles, shown = length.of(summits.positions), [], f"{len(summits):,}"
     if contact is not None and contact.loads.any():
-        edge = _draw_contacts(axes, contact, length)
-        contacts = f"contacts ({np.count_nonzero(contact.loads):,})"
-        handles = [style.disc_handle(UNSURE, contacts)]
-        if Scale(contact).axes:
-            line = Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="smooth contact")
-            handles.append(line)
+        scale = Scale(contact)
+        edge = _draw_contacts(axes, scale, length)
+        handles = [style.disc_handle(UNSURE, f"contacts ({np.count_nonzero(contact.loads):,})")]
+        if scale.axes:
+            handles.append(Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="smooth contact"))
         positions = positions[np.abs(positions).max(axis=1) <= edge]
         if len(positions) < len(summits):
             shown = f"{len(positions):,} of {shown}"
         width, height = (min(edge, length.of(side / 2)) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
-    draw_summits(axes, positions)
+    size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
+    axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, rasterized=len(positions) > MANY)
     style.bar(axes, image, z.short("z"), above=True)
     handles.insert(0, style.disc_handle(SUMMIT, f"summits ({shown})"))
-    style.legend_outside(figure, handles, "lower center", 3)
+    style.legend(figure, "outside", handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
-def _draw_contacts(axes: Axes, contact: Contact, length: Measure) -> float:
+def _draw_contacts(axes: Axes, scale: Scale, length: style.Measure) -> float:
     """Draw contacts, smooth contact and most crowded pair; return half the width of the view."""
-    points, radii = length.of(contact.scene.contact_points), length.of(contact.contact_radii)
-    touching, scale = contact.loads > 0, Scale(contact)
+    contact, points = scale.contact, length.of(scale.points)
+    touching, radii = contact.loads > 0, length.of(contact.contact_radii)
     reach = np.abs(points - length.of(scale.centre)).max(axis=1) + radii
     edge = 1.2 * float(max(length.of(scale.typical), reach[touching].max()))
     least = edge * float(np.clip(0.1 / np.sqrt(touching.sum()), 0.002, 0.01))
@@ -217,12 +191,11 @@ def _draw_contacts(axes: Axes, contact: Contact, length: Measure) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    figure, (left, middle, right) = panels(DOUBLE, 2.7, 1, 3)
+    figure, (left, middle, right) = panels(style.DOUBLE, 2.7, 1, 3)
     moments, level = surface.moments, summits.origin.level
-    unit = measure(float(np.abs(maxima.heights - level).max()), surface.unit)
-    every, some = (unit.of(each.heights - level) for each in (maxima, summits))
-    edges = _bins(every)
-    _draw_both(left, edges, every, some)
+    unit = style.measure(float(np.abs(maxima.heights - level).max()), surface.unit)
+    edges = _bins(unit.of(maxima.heights - level))
+    _draw_both(left, edges, *(unit.of(each.heights - level) for each in (maxima, summits)))
     mean, spread = unit.of(moments.mean_height), unit.of(moments.height_std)
     if spread > 0:  # if 0, no Gaussian surface has these moments
         z = np.linspace(edges[0], edges[-1], 200)
@@ -230,26 +203,25 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
         expected = moments.density * summits.origin.area * (edges[1] - edges[0])
         left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
     left.xaxis.set_major_locator(style.round_ticks(4))
-    left.xaxis.get_offset_text().set_fontsize(TICK)
     style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
-    unit = measure(float(np.median(maxima.tip_radii)), surface.unit)
-    every, some = (unit.of(each.tip_radii) for each in (maxima, summits))
-    edges = 10 ** _bins(np.log10(every))
-    _draw_both(middle, edges, every, some)
+    unit = style.measure(float(np.median(maxima.tip_radii)), surface.unit)
+    edges = 10 ** _bins(np.log10(unit.of(maxima.tip_radii)))
+    _draw_both(middle, edges, *(unit.of(each.tip_radii) for each in (maxima, summits)))
     middle.set_xscale("log")
     middle.axvline(unit.of(1 / moments.mean_curvature), color=SMOOTH, ls="--", lw=1.1)
     span = edges[-1] / edges[0]
     powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
     middle.xaxis.set_major_locator(powers if span > 10 else style.round_ticks(4))
     middle.xaxis.set_major_formatter("{x:g}")
-    style.label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
     middle.xaxis.set_minor_formatter(NullFormatter())
+    style.label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
 
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
     right.set_xlim(0.0, 1.0)
     style.label(right, "eccentricity of the tip", "")
-    style.legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
+    handles = left.get_legend_handles_labels()[0]
+    style.legend(figure, "outside", handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 

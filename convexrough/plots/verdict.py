@@ -1,28 +1,31 @@
-"""The figure of a verdict: the map of asperities, with marks on wrong claims."""
+"""Figures of a verdict, a map with marks on wrong claims, and of comparisons, which show times."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
-from convexrough.arrays import Array
+from convexrough.compare import Comparison
+from convexrough.friction.side_by_side import PathComparison, PathEntry
 from convexrough.normal.claims import Claim
+from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
-from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figures, panels
-from convexrough.plots.style import DOUBLE, SINGLE, UNSURE
+from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, TICK, UNSURE
 
 #: The indices of at most this many suspects, the likeliest, are written.
 NUMBERED = 5
 
-#: Grey shade of each status.
-SHADES = {"open": "0.93", "contact": "0.72", "partial": "0.72", "sliding": "0.45"}
-NAMES = {"partial": "partial slip"}
-
-#: Marks of wrong claims, different in shape for print without colours.
-MARKS = ["o", "X"]
+#: Grey shade and label of each status.
+SHADES: maps.Looks = {
+    "open": ("0.93", "open"),
+    "contact": ("0.72", "contact"),
+    "partial": ("0.72", "partial slip"),
+    "sliding": ("0.45", "sliding"),
+}
 
 
 def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
@@ -34,40 +37,53 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     >>> print(*cr.plots.verdict_figures(cr.verify(scene, contact.loads, approach=5e-5)))
     verdict
     """
-    claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
-    width = SINGLE if len(claims) == 1 else DOUBLE
-    figure, maps = panels(width, 3.9, 1, len(claims))
-    for axes, claim in zip(maps, claims, strict=True):
+    claims = [verdict] if sheared is None else [verdict, sheared]
+    figure, places = panels(SINGLE if sheared is None else DOUBLE, 3.9, 1, len(claims))
+    for axes, claim in zip(places, claims, strict=True):
         draw_claim(axes, claim)
     return Figures({"verdict": figure})
 
 
 def draw_claim(axes: Axes, claim: Claim) -> None:
-    """Draw the map of one claim."""
+    """Draw the map of one claim; marks of wrong claims differ also without colours."""
     status, points = claim.status, claim.of.asperities.positions
-    length = measure(float(np.ptp(points)), claim.of.units.length)
-    size = even_radii(points, np.ones(len(points), dtype=bool))
-    layers = [
-        Layer(name, np.where(status == name, size, 0.0), shade)
-        for name, shade in SHADES.items()
-        if name in status
-    ]
-    draw_map(axes, points, layers, length)
-    said = [each.status for each in layers]
-    handles = [style.disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
-    marked = list(zip(MARKS, claim.wrong.items(), strict=True))
-    for mark, (what, those) in [*marked, ("^", ("undecided", claim.undecided))]:
+    length = style.measure(float(np.ptp(points)), claim.of.units.length)
+    size = maps.even_radii(points, np.ones(len(points), dtype=bool))
+    maps.draw_map(axes, style.Place(points, length), maps.status_layers(status, size, looks=SHADES))
+    handles = maps.status_handles(status, SHADES)
+    marked = {**claim.wrong, "undecided": claim.undecided}
+    for mark, (what, those) in zip("oX^", marked.items(), strict=True):
         if len(those):
-            handles.append(_mark(axes, length.of(points[those]), mark, f"{what} ({len(those):,})"))
+            ms = float(np.clip(120.0 / np.sqrt(len(those)), 2.5, 7.0))
+            handles += axes.plot(*length.of(points[those]).T, mark, mfc="white", mec=UNSURE,
+                                 mew=1.1, ms=ms, label=f"{what} ({len(those):,})",
+                                 rasterized=len(those) > maps.CROWDED)  # fmt: skip
     for i in claim.suspects[:NUMBERED]:
         style.write_beside(axes, str(i), length.of(points[i]))
     verdict = "holds" if claim.holds else "does not hold"
     style.title(axes, f"{claim.many}: the claim {verdict}")
-    style.legend_below(axes, handles=handles)
+    style.legend(axes, "below", handles=handles)
 
 
-def _mark(axes: Axes, points: Array, mark: str, what: str) -> Line2D:
-    size = float(np.clip(120.0 / np.sqrt(len(points)), 2.5, 7.0))
-    (line,) = axes.plot(*points.T, mark, ls="", mfc="white", mec=UNSURE, mew=1.1, ms=size,
-                        label=what, rasterized=len(points) > CROWDED)  # fmt: skip
-    return line
+def draw_times(axes: Axes, comparison: Comparison | PathComparison) -> None:
+    """Draw a dot at the time of each entry; one without a result has its outcome as text."""
+    names, times = list[str](), list[float]()
+    entry: Any
+    for place, entry in enumerate(comparison.entries):
+        way = isinstance(entry, PathEntry)
+        names.append(entry.way if way else entry.solver)
+        found = entry.path if way else entry.contact
+        if found is None:
+            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
+                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
+        else:
+            times.append(entry.seconds if way else found.seconds)
+            axes.plot(times[-1], place, "o", color=ROUGH, clip_on=False)
+    axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
+    axes.set_yticks(range(len(names)), names, fontsize=TICK)
+    if times := [seconds for seconds in times if seconds]:  # whole decades: the axis is short
+        powers = np.floor(np.log10(min(times))), np.ceil(np.log10(1.01 * max(times)))
+        axes.set_xlim(*(10.0**power for power in powers))
+        axes.xaxis.set_major_locator(LogLocator(numticks=4))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    style.label(axes, "time [s]", "")

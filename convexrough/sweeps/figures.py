@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from convexrough.arrays import Array
 from convexrough.plots.notebook import new_axes
-from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
+from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend
 from convexrough.sweeps.batch import Columns
 
 #: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
@@ -47,7 +47,7 @@ def draw_quantiles(
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
     _scale(axes, rows[over])
-    legend_above(axes, ncols=2)
+    legend(axes, "above", ncols=2)
     return axes
 
 

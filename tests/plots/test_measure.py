@@ -14,7 +14,7 @@ from scenes import PAPER_APPROACH, paper
 import convexrough as cr
 from convexrough import plots
 from convexrough.compare import compare
-from convexrough.plots.measure import quantity
+from convexrough.plots.style import quantity
 from convexrough.solvers import Newton
 
 

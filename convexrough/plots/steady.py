@@ -1,4 +1,4 @@
-"""Figures in the plane of the normal load P and T = Q / f, and figures of losses by phase.
+"""Figures of closed paths, in the plane of the loads P and T = Q / f, and of losses by phase.
 
 Q is the shear force and f the coefficient of friction.
 """
@@ -7,26 +7,22 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.path import LoadPath
 from convexrough.friction.phases import PhaseLosses
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
-from convexrough.plots.measure import Measure, Scale, measure, quantity
-from convexrough.plots.notebook import Figures, panels
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE
-from convexrough.scene.rings import evenly_chosen
-
-MOST_CURVES = 4
-
-#: Line patterns that tell memory curves apart even without colour.
-PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
+from convexrough.plots.notebook import Figure, Figures, panels
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, UNSURE, Scale
 
 #: Losses are drawn for at most this many factors (sizes of elliptic paths), the largest ones.
 MOST_FACTORS = 5
+
+#: Line patterns that tell curves apart even without colour.
+PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 
 
 def steady_figures(found: Cycle) -> Figures:
@@ -40,15 +36,13 @@ def steady_figures(found: Cycle) -> Figures:
     >>> print(*cr.plots.steady_figures(found))
     steady
     """
-    figure, (plane, place) = panels(DOUBLE, 3.5, 1, 2)
+    figure, (plane, chart) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
-    length = Scale(found.contact).length
-    layers = status_layers(found.status, found.contact.contact_radii)
-    draw_map(place, found.scene.contact_points, layers, length)
-    if handles := status_handles(np.unique(found.status)):
-        style.legend_outside(figure, handles, "lower center", len(handles))
-    lost = quantity(found.loss, found.scene.units.work)
-    style.title(place, f"each cycle after the first loses {lost}")
+    place = style.Place(found.scene.contact_points, Scale(found.contact).length)
+    draw_map(chart, place, status_layers(found.status, found.contact.contact_radii))
+    name_statuses(figure, found.status)
+    lost = style.quantity(found.loss, found.scene.units.work)
+    style.title(chart, f"each cycle after the first loses {lost}")
     return Figures({"steady": figure})
 
 
@@ -63,7 +57,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
     >>> print(*cr.plots.phase_figures(found))
     phase_losses
     """
-    figure, (axes,) = panels(SINGLE, 3.4)
+    figure, (axes,) = panels(style.SINGLE, 3.4)
     draw_losses(axes, found)
     return Figures({"phase_losses": figure})
 
@@ -73,7 +67,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
-    unit = measure(most, found.scene.units.work, "W_m")
+    unit = style.measure(most, found.scene.units.work, "W_m")
     for size, shade, pattern in zip(sizes, style.shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]
@@ -82,68 +76,70 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
         axes.plot(turns, rough, color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
         axes.plot(turns, smooth, color=SMOOTH, lw=0.7, ls=pattern)
     axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
-    style.legend_below(axes, 3, title="factor", title_fontsize=TICK)
+    style.legend(axes, "below", ncols=3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)
     style.label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
 
 
-def draw_path(axes: Axes, path: LoadPath) -> None:
-    """Draw the path, and the memory curve at some of its points."""
-    f = path.scene.friction or 1.0
-    unit = _plane(axes, float(path.loads.max()), path.scene.units.force)
-    P, T = unit.of(path.loads), unit.of(path.forces / f)
-    axes.plot(np.append(unit.of(path.start), P), np.append(0.0, T), color=FAINT, lw=0.9)
-    chosen = evenly_chosen(range(len(P)), MOST_CURVES)
-    for k, shade, pattern in zip(chosen, style.shades_of(len(chosen)), PATTERNS, strict=False):
-        s, heights = _vertices(path.curves[k], unit)
-        axes.plot(s, heights, color=shade, lw=1.5, ls=pattern, label=f"memory at {k + 1}")
-    style.mark_points(axes, P, T)
-    style.legend_below(axes, handlelength=2.2)
+def name_statuses(figure: Figure, status: NDArray[np.str_]) -> None:
+    """Add a legend of the statuses that occur."""
+    if handles := status_handles(status):
+        loc, count = "outside lower center", len(handles)
+        style.legend(figure, "outside", handles=handles, loc=loc, ncols=count)
 
 
 def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
     """Draw the vertices and the front of one memory curve."""
-    unit = _plane(axes, float(curve.load))
-    axes.plot(*_vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
+    unit = label_plane(axes, float(curve.load))
+    axes.plot(*vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
     if curve.front is None:
         return
     front = unit.of(float(curve.front))
     axes.axvline(front, color=UNSURE, lw=0.9, ls=DASHED)
-    side = -1 if curve.front > curve.load / 2 else 1
+    side, ha = (-1, "right") if curve.front > curve.load / 2 else (1, "left")
     axes.annotate("front", (front, 0.04), (3 * side, 0), xycoords=axes.get_xaxis_transform(),
-                  textcoords="offset points", fontsize=TICK, color=UNSURE,
-                  ha="left" if side > 0 else "right")  # fmt: skip
+                  textcoords="offset points", fontsize=TICK, color=UNSURE, ha=ha)  # fmt: skip
 
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
-    """Draw a closed path, and the two lines that cross at the point (L*, T*)."""
+    """Draw a closed path in the plane, and the two lines that cross at the point (L*, T*)."""
     f = found.scene.friction or 1.0
-    unit = _plane(axes, float(found.loads.max()), found.scene.units.force)
+    unit = label_plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
     level, height = found.level, found.force_level / f
-    ends = np.array([level, P.max()])
-    for sign in (1.0, -1.0):
-        axes.plot(unit.of(ends), unit.of(height + sign * (ends - level)), color=FAINT, lw=0.9,
-                  ls=DASHED)  # fmt: skip
+    _draw_cross(axes, unit, level, height, P.max(), FAINT, 0.9)
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
     axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
     style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
 
 
-def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
+def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
     """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
-    unit = measure(most, force_unit, "P_m")
-    for sign in (1.0, -1.0):
-        axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,
-                  ls=DASHED)  # fmt: skip
+    unit = style.measure(most, force_unit, "P_m")
+    _draw_cross(axes, unit, 0.0, 0.0, most, SMOOTH, 0.7)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
-    style.label(
-        axes, unit.label("P"), unit.short("T = Q/f" if unit.said and not unit.symbol else "T")
-    )
+    T = "T = Q/f" if unit.said and not unit.symbol else "T"
+    style.label(axes, unit.label("P"), unit.short(T))
     return unit
 
 
-def _vertices(curve: MemoryCurve, unit: Measure) -> tuple[Array, Array]:
+def _draw_cross(
+    axes: Axes,
+    unit: style.Measure,
+    level: float,
+    height: float,
+    most: float,
+    colour: str,
+    lw: float,
+) -> None:
+    """Draw the lines T = height +- (P - level) from P = level to P = most."""
+    P = np.array([level, most])
+    for sign in (1.0, -1.0):
+        T = height + sign * (P - level)
+        axes.plot(unit.of(P), unit.of(T), color=colour, lw=lw, ls=DASHED)
+
+
+def vertices(curve: MemoryCurve, unit: style.Measure) -> tuple[Array, Array]:
     levels, heights = (np.array(each, dtype=float) for each in (curve.levels, curve.heights))
     return unit.of(levels), unit.of(heights)
