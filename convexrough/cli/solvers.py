@@ -220,8 +220,8 @@ def paper(output: Output) -> int:
     Tables and figures go to the folder paper-results unless --out names another.
     """
     from convexrough.paper import example
+    from convexrough.paper.example import PaperStates
     from convexrough.paper.figures import figure_data, paper_figures
-    from convexrough.paper.states import PaperStates
     from convexrough.run.results import slider_page
 
     with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
