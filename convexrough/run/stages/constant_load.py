@@ -52,8 +52,8 @@ class ShearStage(Stage):
 
     def compute(self, contact: Contact) -> ShearResult:
         f_p = limit(contact)
-        states = (shear(contact, force=part * f_p) for part in self.fractions)
-        return ShearResult(self, contact, tuple(states))
+        states = tuple(shear(contact, force=part * f_p) for part in self.fractions)
+        return ShearResult(self, contact, states)
 
 
 class ShearResult(Result):
@@ -70,9 +70,8 @@ class ShearResult(Result):
 
     def tables(self) -> dict[str, Columns]:
         """The tables, with a row for each fraction and asperity."""
-        x, y = self.contact.scene.asperities.positions.T
         names = ("forces", "stick_radii", "slips", "displacements", "status")
-        each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
+        each = [self.at_asperities(state.columns(*names)) for state in self.found]
         return {"shear": self.stacked(each)}
 
     def figures(self) -> Mapping[str, Any]:
@@ -82,7 +81,7 @@ class ShearResult(Result):
 class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
-    minimum_fraction : the smallest force of each cycle; default: minus the largest force
+    minimum_fraction : default: minus the largest force
     loop_points : approximate number of points of a loop; the default is smaller for many
         asperities, and where order fails
     loop_asperities : indices of asperities whose loops are computed, or "all"; default: one
@@ -103,9 +102,8 @@ class CycleStage(Stage):
     @property
     def lowest(self) -> list[float]:
         """The minimum of each cycle, as a fraction of the friction limit."""
-        if self.minimum_fraction is not None:
-            return self.minimum_fraction
-        return [-value for value in self.maximum_fraction]
+        given = self.minimum_fraction
+        return [-value for value in self.maximum_fraction] if given is None else given
 
     @property
     def labels(self) -> Labels:
@@ -196,37 +194,32 @@ class CycleResult(Result):
         """The tables of cycles, of loops (in total and by asperity) and of fretting by asperity."""
         worn = self.stacked([fretting_columns([each]) for each in self.worn])
         del worn["maximum"], worn["minimum"]  # fractions replace forces, as in the other tables
-        curves = self.stacked([_curves(loop) for loop in self.loops])
+        curves = self.stacked([
+            {
+                "curve": np.repeat(["total", *it.asperities.astype(str)], len(it.forces)),
+                "force": np.concatenate([it.forces, *it.asperity_forces.T]),
+                "displacement": np.concatenate([it.displacements, *it.asperity_displacements.T]),
+            }
+            for it in self.loops
+        ])  # fmt: skip
         return {**super().tables(), "loop": curves, "fretting": worn}
 
-    @property
-    def smooth(self) -> bool:
-        """True if the energy scale W0 of a smooth sphere is known."""
-        return not math.isnan(self.known[0]["smooth_normalised"])
-
     def headings(self) -> Mapping[str, str]:
-        over = {key: it for key, it in self.printed.items() if not key.endswith("_normalised")}
-        return self.printed if self.smooth else over
+        """The headings, without those of W/W0 if the energy scale of a smooth sphere is unknown."""
+        known = not math.isnan(self.known[0]["smooth_normalised"])
+        return {key: it for key, it in self.printed.items() if known or "_normalised" not in key}
 
     def lines(self) -> list[str]:
+        if "loss_normalised" in self.headings():
+            return super().lines()
         bodies = "a flat or a cylinder has no smooth reference"
-        said = f"no W/W0: {bodies if self.contact.load else 'no asperity carries a load'}"
-        return [*super().lines(), *([] if self.smooth else [said])]
+        why = bodies if self.contact.load else "no asperity carries a load"
+        return [*super().lines(), f"no W/W0: {why}"]
 
     def figures(self) -> Mapping[str, Any]:
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
         figures = plots.cycle_figures(self.found, loops=self.loops)
         return {**figures, **plots.fretting_figures(widest)}
-
-
-def _curves(loop: Loop) -> Columns:
-    """Columns: the points of the loop of the whole contact, then those of each asperity."""
-    names = ["total", *loop.asperities.astype(str)]
-    return {
-        "curve": np.repeat(names, len(loop.forces)),
-        "force": np.concatenate([loop.forces, *loop.asperity_forces.T]),
-        "displacement": np.concatenate([loop.displacements, *loop.asperity_displacements.T]),
-    }
 
 
 class HistoryStage(Stage):

@@ -121,8 +121,7 @@ class GradientResult(Result):
         if not self.found:
             return {}
         (gradient,), by = self.found, self.stage.by
-        x, y = self.contact.scene.asperities.positions.T
-        columns = {"x": x, "y": y}
+        columns = self.at_asperities({})
         for name in ("heights", "tip_radii"):
             if name in by:
                 columns[f"by_{EACH[name]}"] = getattr(gradient, name)

@@ -68,11 +68,10 @@ class NormalResult(Result):
 
     def tables(self) -> dict[str, Columns]:
         contact, asperities = self.contact, self.contact.scene.asperities
-        x, y = asperities.positions.T
-        columns: Columns = {"x": x, "y": y}
-        columns |= {"height": asperities.heights, "tip_radius": asperities.tip_radii}
+        columns: Columns = {"height": asperities.heights, "tip_radius": asperities.tip_radii}
         columns |= contact.columns("loads", "contact_radii", "gaps", "status")
-        return {"asperities": columns | contact.certificate.columns("load_errors")}
+        columns |= contact.certificate.columns("load_errors")
+        return {"asperities": self.at_asperities(columns)}
 
     def doubts(self) -> Iterator[str]:
         return plausibility.doubts_of(self.contact)
@@ -126,8 +125,10 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     """
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
-    width = len(str(normal["asperities"]))
-    relative = _ratio(proof["load_error"], normal["largest_load"])
+    width, largest = len(str(normal["asperities"])), normal["largest_load"]
+    relative = ""
+    if largest and math.isfinite(proof["load_error"]):
+        relative = f"  ({bound(proof['load_error'] / largest)} of the largest load)"
     crowding = normal.get("crowding", 0.0)
     model = f" (but the model does not apply: crowding {crowding:.3g})" if crowding > 1 else ""
 
@@ -150,47 +151,28 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
-        beta, model_error = _neglected(normal), normal["model_error"]
+        unit, error = units.unit("pressure"), normal["model_error"]
+        pressure = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
+        if not normal["hardness"]:
+            pressure += "  (no hardness given: yield is not checked)"
+        geometry, change = normal["geometry"], normal["closest_change"] or 0.0
+        if change > DIFFERENT:
+            nearer = 'with "closest", nearer to boundary elements, loads change by up to about'
+            geometry += f": {nearer} {100 * change:.2g} %"
         lines += [
-            ("model error", f"about {model_error:.2g} of displacements  (due to point forces)"),
+            ("model error", f"about {error:.2g} of displacements  (due to point forces)"),
             ("crowding", f"{crowding:.3g}  (above 1 contact discs overlap)"),
-            *([("bodies", beta)] if beta else []),
+        ]
+        if beta := normal["mismatch"]:
+            tractions = f"shear tractions of about {abs(100 * beta):.2g} % of the pressure"
+            neglected = f"Dundurs' beta = {beta:.3g}, neglected: it causes {tractions}"
+            lines.append(("bodies", neglected))
+        lines += [
             ("contact area", f"{normal['area']:.4g} {unit_of('area', units)}".rstrip()),
-            ("mean pressure", _described_pressure(normal, units)),
-            ("geometry", _described_geometry(normal)),
+            ("mean pressure", pressure),
+            ("geometry", geometry),
             ("contact modulus", plausibility.described_modulus(normal["contact_modulus"], units)),
             ("solver", f"{normal['solver']}, {steps}"),
             ("influence", INFLUENCES[normal["influence"]]),
         ]
     return labelled(lines)
-
-
-def _neglected(normal: Summary) -> str:
-    if not (beta := normal["mismatch"]):
-        return ""
-    return (
-        f"Dundurs' beta = {beta:.3g}, neglected: it causes shear tractions of about "
-        f"{abs(100 * beta):.2g} % of the pressure"
-    )
-
-
-def _described_pressure(normal: Summary, units: UnitNames) -> str:
-    unit = units.unit("pressure")
-    known = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
-    return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
-
-
-def _described_geometry(normal: Summary) -> str:
-    change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
-    if change <= DIFFERENT:
-        return name
-    return (
-        f'{name}: with "closest", nearer to boundary elements, loads change by up to about '
-        f"{100 * change:.2g} %"
-    )
-
-
-def _ratio(error: float, largest: float) -> str:
-    if largest == 0 or not math.isfinite(error):
-        return ""
-    return f"  ({bound(error / largest)} of the largest load)"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,32 +11,14 @@ from pydantic import Field
 from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
-from convexrough.friction.fretting import Fretting, fretting, fretting_columns
+from convexrough.friction.fretting import fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
 from convexrough.friction.steady import steady
 from convexrough.record import rows_of
-from convexrough.run.stage import (
-    MOST_PRINTED,
-    STATUSES,
-    Columns,
-    Result,
-    Stage,
-    Steps,
-    Summary,
-    numbers_of,
-    plain,
-    same,
-)
-from convexrough.run.values import (
-    FileTable,
-    Finite,
-    Mistake,
-    NonNegative,
-    Phase,
-    Positive,
-    expected,
-)
+from convexrough.run import values
+from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, same
+from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
@@ -45,7 +26,7 @@ COUNTS = tuple(status for status in STATUSES if status != "contact")
 CHORDS_ERROR = 12
 
 
-class Ellipse(FileTable):
+class Ellipse(values.FileTable):
     """Chords of an elliptic path: normal load P + A cos t, shear force Q + B sin(t + phase).
 
     load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : number of chords
@@ -62,7 +43,7 @@ class Ellipse(FileTable):
 class _Points(Stage):
     """The points of a path, or an ellipse. All loads and forces are multiples of `reference`."""
 
-    loads: list[NonNegative] | None = None
+    loads: list[values.NonNegative] | None = None
     forces: list[Finite] | None = None
     ellipse: Ellipse | None = None
     reference: Positive = 1.0
@@ -80,15 +61,15 @@ class _Points(Stage):
 
     @property
     def highest_load(self) -> float:
-        it = self.ellipse
-        own = [it.load + abs(it.load_amplitude)] if it is not None else self.loads or [0.0]
-        return self.reference * max(own)
+        if (it := self.ellipse) is not None:
+            return self.reference * (it.load + abs(it.load_amplitude))
+        return self.reference * max(self.loads or [0.0])
 
     @property
     def highest_force(self) -> float:
-        it = self.ellipse
-        own = [abs(it.force) + abs(it.force_amplitude)] if it is not None else self.forces or [0.0]
-        return self.reference * max(map(abs, own))
+        if (it := self.ellipse) is not None:
+            return self.reference * (abs(it.force) + abs(it.force_amplitude))
+        return self.reference * max(map(abs, self.forces or [0.0]))
 
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
@@ -145,14 +126,13 @@ class PathResult(Steps):
         """A table of the points, and a table of all asperities at each point."""
         (path,) = self.found
         m, n = path.asperity_forces.shape
-        x, y = path.scene.asperities.positions.T
         names = ("asperity_loads", "asperity_forces", "asperity_force_errors",
                  "asperity_displacements", "drifts", "status")  # fmt: skip
-        each = {
-            name.removeprefix("asperity_"): it.ravel() for name, it in path.columns(*names).items()
-        }
-        places = {"point": np.repeat(np.arange(m), n), "x": np.tile(x, m), "y": np.tile(y, m)}
-        return {**super().tables(), "path_asperities": places | each}
+        each = {"point": np.repeat(np.arange(m), n)}
+        each |= {name: np.tile(it, m) for name, it in self.at_asperities({}).items()}
+        for name, rows in path.columns(*names).items():
+            each[name.removeprefix("asperity_")] = rows.ravel()
+        return {**super().tables(), "path_asperities": each}
 
 
 class SteadyStage(_Points):
@@ -180,26 +160,21 @@ class SteadyStage(_Points):
     def compute(self, contact: Contact) -> SteadyResult:
         scene, influence = contact.scene, contact.influence
         with blamed_on(f"[{self.name}]"):
-            found = [steady(scene, **self.points(contact), influence=influence)]
-            return SteadyResult(self, contact, (*found, *self._losses(contact)))
-
-    def _losses(self, contact: Contact) -> Iterator[PhaseLosses]:
-        if self.phases and self.ellipse is not None:
-            shape = self.ellipse.model_dump(exclude={"phase", "chords"})
-            yield phase_losses(
-                contact.scene,
-                **{name: self.reference * size for name, size in shape.items()},
-                phases=self.phases,
-                factors=self.factors,
-                chords=self.ellipse.chords,
-                influence=contact.influence,
-            )
+            found: list[Any] = [steady(scene, **self.points(contact), influence=influence)]
+            if self.phases and self.ellipse is not None:
+                shape = self.ellipse.model_dump(exclude={"phase", "chords"})
+                how = {name: self.reference * size for name, size in shape.items()}
+                how |= {"chords": self.ellipse.chords, "influence": influence}
+                losses = phase_losses(scene, phases=self.phases, factors=self.factors, **how)
+                found.append(losses)
+            return SteadyResult(self, contact, tuple(found))
 
 
 class SteadyResult(Result):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     stage: SteadyStage
+    most = Steps.most
     printed: ClassVar[Mapping[str, str]] = {
         "level": "stuck below load",
         "loss": "loss",
@@ -207,27 +182,17 @@ class SteadyResult(Result):
         **same("partial", "sliding", "intermittent"),
     }
 
-    def rows(self) -> list[Summary]:
-        return [numbers_of(self.found[0], self.stage.numbers)]
-
     def summary(self) -> Summary:
         found = self.found[0]
         said = self.known[0] | {"order": found.order, "presses": found.presses}
         for losses in self.found[1:]:
-            lists = {name: plain(values) for name, values in _by_phase(losses).items()}
+            lists = {name: it.tolist() for name, it in _by_phase(losses).items()}
             said |= {"phase_losses": lists | {"order": losses.order}}
         return said
 
-    @cached_property
-    def worn(self) -> Fretting:
-        """The slip, losses and tractions of each asperity in the steady cycle."""
-        return fretting(self.found[0])
-
     def tables(self) -> dict[str, Columns]:
-        x, y = self.contact.scene.asperities.positions.T
-        columns = self.found[0].columns("slips", "stick_radii", "status")
-        worn = fretting_columns([self.worn])
-        tables = {"steady": {"x": x, "y": y, **columns}, "steady_fretting": worn}
+        columns = self.at_asperities(self.found[0].columns("slips", "stick_radii", "status"))
+        tables = {"steady": columns, "steady_fretting": fretting_columns([fretting(self.found[0])])}
         for losses in self.found[1:]:
             tables["phase_losses"] = _by_phase(losses)
         return tables
@@ -237,7 +202,7 @@ class SteadyResult(Result):
         for losses in self.found[1:]:
             printed = {**same("phase", "factor", "loss"), "smooth": "smooth sphere"}
             rows, title = rows_of(_by_phase(losses)), "loss against phase"
-            said += ["", *self.printed_table("phase_losses", rows, printed, title, MOST_PRINTED)]
+            said += ["", *self.printed_table("phase_losses", rows, printed, title)]
         return said
 
     def figures(self) -> Mapping[str, Any]:

@@ -79,16 +79,13 @@ class ShakedownResult(Result):
 
     def summary(self) -> Summary:
         (found,) = self.found
-        return {"kind": found.kind, **self.known[0], "limited_by": found.limited_by} | {
-            "proved": found.proved,
-            "order": found.order,
-        }
+        said = {name: getattr(found, name) for name in ("limited_by", "proved", "order")}
+        return {"kind": found.kind, **self.known[0], **said}
 
     def tables(self) -> dict[str, Columns]:
         """The tables of the residual state and the mechanism, by vertex and component."""
         (found,) = self.found
-        x, y = found.scene.asperities.positions.T
-        columns = {"x": x, "y": y, "factor": found.factors}
+        columns = self.at_asperities({"factor": found.factors})
         if found.kind != "vector":
             return {self.name: columns | {"witness": found.witness, "slip": found.mechanism}}
         columns |= {f"witness_{name}": found.witness[:, k] for k, name in enumerate("xy")}
