@@ -27,11 +27,6 @@ MOST_NAMED = 5
 ROUNDED = 1e-3
 
 
-def unknown(column: str) -> bool:
-    """True if a column may contain heights: its header is not a number, an index or a result."""
-    return not (column.isdecimal() or is_index(column) or bare(column).lower() in RESULTS)
-
-
 def read_summits(
     path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
 ) -> Asperities:
@@ -43,9 +38,14 @@ def read_summits(
     """
     table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
     columns = table.columns
-    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
-    if "height" not in columns and unread:
-        some = [shortened(it) for it in unread[:MOST_NAMED]]
+    unread = [
+        shortened(name)
+        for name, cells in table.others.items()
+        if cells.dtype.kind == "f"
+        and not (name.isdecimal() or is_index(name) or bare(name).lower() in RESULTS)
+    ]
+    if "height" not in columns and unread:  # one of them may contain heights
+        some = unread[:MOST_NAMED]
         named = 'columns = {height = "' + some[0] + '"} in [asperities], or no such column'
         if "depth" in some[0].lower():
             named = "which grows towards the sphere: write depths as negative heights"

@@ -61,13 +61,8 @@ class Task(Record):
 
     def problem(self) -> NormalProblem:
         """The normal contact problem, which solvers take. Raises InputError."""
-        return NormalProblem.assemble(
-            self.scene,
-            approach=self.approach,
-            load=self.load,
-            influence=self.influence,
-            highest=self.highest_approach,
-        )
+        how: Any = {"influence": self.influence, "highest": self.highest_approach}
+        return NormalProblem.assemble(self.scene, approach=self.approach, load=self.load, **how)
 
     def press(self) -> Contact:
         """The contact under the prescribed approach or load, as found by `solver`.
@@ -235,12 +230,10 @@ def task_of(
     summits: Callable[..., Asperities] = read_summits,
     lattice: Callable[..., Asperities] = regular,
 ) -> Task:
-    """The scene and the stages described by tables that have been checked.
+    """The scene and the stages described by the checked tables of the scene file at `path`.
 
-    path    : the scene file, for messages; paths in the tables are relative to its folder
     asperities : asperities that replace those of the tables
-    summits, lattice : functions that make the asperities, with the arguments of `read_summits` and
-        `regular`
+    summits, lattice : functions like `read_summits` and `regular`, which make the asperities
 
     Raises InputError for mistakes that the tables alone do not show.
     """
@@ -293,34 +286,33 @@ def _lattice(
     The pattern extends to the distance `within` or, without this key, to all asperities that could
     touch at the approach or load in [normal], or at the largest load in another table.
     """
-    tips = layout.tip_radius
+    tips, deviation, variation = layout.tip_radius, layout.height_std, layout.tip_radius_cv
+    rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": layout.seed}
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:
         asperities = lattice(layout.pattern, layout.spacing, tip_radius, within)
-        rough = asperities.roughened(
-            height_std=layout.height_std, tip_radius_cv=layout.tip_radius_cv, seed=layout.seed
-        )
-        return press_on(rough)
+        return press_on(asperities.roughened(**rough))
 
     def farthest(approach: float) -> float:
         return reach(
             approach,
             sphere_radius=checked(study.sphere.radius),
-            tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
-            height=CUT_DEVIATIONS * layout.height_std,
+            tip_radius=largest_tip_radius(tips, variation),
+            height=CUT_DEVIATIONS * deviation,
             geometry=layout.geometry,
         )
 
     if layout.within is not None:
         return scene(layout.within), None
     approach, load = study.normal.approach, study.normal.load or 0.0
-    found: list[tuple[Scene, float | None]] = []
+    found: tuple[Scene, float | None]
     if approach is not None:
-        found.append((scene(farthest(approach)), None))
+        found = scene(farthest(approach)), None
     else:
-        found.append(all_that_could_touch(scene, farthest, load))
-    most = max((stage.highest_load for stage in study.stages.values()), default=0.0)
+        found = all_that_could_touch(scene, farthest, load)
+    most = max(stage.highest_load for stage in study.stages.values())
     if most > load:
-        found.append((all_that_could_touch(scene, farthest, most)[0], None))
-    return max(found, key=lambda each: len(each[0]))
+        larger, _ = all_that_could_touch(scene, farthest, most)
+        found = (larger, None) if len(larger) > len(found[0]) else found
+    return found

@@ -46,7 +46,10 @@ def draw_quantiles(
         axis.get_offset_text().set_fontsize(TICK)
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
-    _scale(axes, rows[over])
+    x = rows[over]
+    if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
+        axes.set_xscale("log")
+    axes.margins(x=0.02)
     legend_above(axes, ncols=2)
     return axes
 
@@ -54,19 +57,17 @@ def draw_quantiles(
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
     usual = "median, 25 to 75 %, 5 to 95 %"
     if others:
+        keys = [key.partition(".")[2] for key in others]
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)
         if len(different) <= MOST_BANDS:
             for values in different:
                 some = (rows == values).all(axis=1)
-                name = ", ".join(
-                    f"{key.partition('.')[2]} {_short(value)}"
-                    for key, value in zip(others, values, strict=True)
-                )
+                said = (f"{it:g}" if isinstance(it, float) else str(it) for it in values)
+                name = ", ".join(map(" ".join, zip(keys, said, strict=True)))
                 yield name, {key: column[some] for key, column in columns.items()}
             return
-        every = ", ".join(key.partition(".")[2] for key in others)
-        usual += f"\nall {every}: {len(different)} combinations"
+        usual += f"\nall {', '.join(keys)}: {len(different)} combinations"
     yield usual, columns
 
 
@@ -91,13 +92,3 @@ def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
         return different, [y[back == i] for i in range(len(different))]
     bins = np.array_split(np.argsort(x), BINS)
     return np.array([np.median(x[each]) for each in bins]), [y[each] for each in bins]
-
-
-def _scale(axes: Axes, x: Any) -> None:
-    if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
-        axes.set_xscale("log")
-    axes.margins(x=0.02)
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -50,9 +50,7 @@ class Plan:
 
 
 def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file, after a check of the file.
-
-    measure : names of numbers to measure in place of those in the file
+    """The plan of a sweep file; `measure` replaces its list of numbers.
 
     Raises FileError if the file cannot be read or is not TOML, and the errors of `plan_of`.
     """
@@ -64,9 +62,7 @@ def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = Non
 def plan_of(
     contents: Mapping[str, Any], path: Path, measure: Sequence[str] | None = None, text: str = ""
 ) -> Plan:
-    """The plan of a sweep, from the tables of a sweep file.
-
-    path : the sweep file, for messages; paths in the tables are relative to its folder
+    """The plan of a sweep, from the tables of the sweep file at `path`.
 
     Raises SceneFileError, which lists every mistake; InputError for an unknown measure; and the
     error of the last scene tried if the first `TRIED` scenes fail.
@@ -102,8 +98,7 @@ def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
     table = table_in(contents, "sweep")
     given = {*table_in(contents, "asperities")}
     given |= {key.removeprefix("asperities.") for _, key in swept(table)}
-    rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
-    if "seeds" in table and not table.get("draw") and not rough:
+    if "seeds" in table and not table.get("draw") and not given & {"height_std", "tip_radius_cv"}:
         yield (
             "[sweep] seeds: nothing is random: expected height_std or tip_radius_cv in "
             "[asperities], or a table [sweep.draw]"
@@ -165,8 +160,8 @@ def plan_of_scenes(
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
     mistakes: list[str] = []
-    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
+    models: list[tuple[type[Stage], str, Sequence[float]]]
+    models = [(ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle)]
     for model, key, values in models:
         checks.sequence(model.name, values, "a list of fractions of f P")
         if len(values):
@@ -181,19 +176,12 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
 
 
 def _planned(
-    source: Source,
-    measures: Sequence[str],
-    said: Mapping[str, Any],
-    units: UnitNames,
-    **given: Any,
+    source: Source, measures: Sequence[str], said: Mapping[str, Any], units: UnitNames, **given: Any
 ) -> Plan:
     """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version
-
-    Raises InputError for an unknown measure. If the first `TRIED` scenes all fail, raises the error
-    of the last of them.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     with blamed_on(said["source"], unless_known=True):
@@ -208,7 +196,7 @@ def _planned(
                     raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
-    text = json.dumps(contents, sort_keys=True, default=repr)
+    inputs = hashlib.sha256(json.dumps(contents, sort_keys=True, default=repr).encode())
     grid = source.grid if isinstance(source, Tables) else None
     labels = list(source.labels(range(0)))
     numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
@@ -216,9 +204,7 @@ def _planned(
     manifest = {
         "schema": 2,
         "version": __version__,
-        "sweep": hashlib.sha256(
-            text.encode()
-        ).hexdigest(),  # hash of all input on which the numbers depend
+        "sweep": inputs.hexdigest(),
         "scenes": source.count,
         "each": grid.each if grid else 1,  # number of scenes that differ only in the seed
         "batch": max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few)),

@@ -8,15 +8,8 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import islice
@@ -35,11 +28,10 @@ MOST_LOST = 64
 
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
-    """Yield the rows of batches, in order of completion.
+    """Yield the rows of batches, in order of completion; lost ones again at the end, one by one.
 
-    A batch is lost if its worker dies. Lost batches are computed again after all others, one by
-    one. Raises WorkerError if a batch is lost twice, if more than 64 batches are lost, if a worker
-    has other versions of packages, or if the executor is broken or cancels a batch.
+    Raises WorkerError if a batch is lost twice, if more than `MOST_LOST` batches are lost, if a
+    worker has other versions of packages, or if the executor is broken or cancels a batch.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -57,38 +49,34 @@ def _together(
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[Any], Batch] = {}
     lost: list[Batch] = []
+    dask = sys.modules.get("distributed")
+    killed = (dask.KilledWorker,) if dask else ()
     try:
         while True:
             for batch in islice(batches, most - len(pending)):
                 pending[executor.submit(compute, batch)] = batch
             if not pending:
                 return lost
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            for future in futures.wait(pending, return_when=futures.FIRST_COMPLETED).done:
                 batch = pending.pop(future)
                 try:
                     columns, versions = future.result()
-                except _lost() as error:
+                except (BrokenExecutor, *killed) as error:
                     lost.append(batch)
                     if len(lost) > MOST_LOST:
-                        raise WorkerError(
-                            f"workers died in more than {MOST_LOST} batches: {error}"
-                        ) from error
+                        said = f"workers died in more than {MOST_LOST} batches: {error}"
+                        raise WorkerError(said) from error
                     continue
                 if other := different(versions):
                     raise WorkerError(f"a worker has other versions: {other}")
                 yield columns
     except BrokenExecutor as error:  # only the caller can restart this executor
         raise WorkerError(f"the executor is broken: {error}") from error
-    except CancelledError as error:
+    except futures.CancelledError as error:
         raise WorkerError("a batch was cancelled: check that the scheduler runs") from error
     finally:
         for future in pending:
             future.cancel()
-
-
-def _lost() -> tuple[type[BaseException], ...]:
-    distributed = sys.modules.get("distributed")
-    return (BrokenExecutor, *((distributed.KilledWorker,) if distributed else ()))
 
 
 class Processes(Executor):
@@ -100,8 +88,8 @@ class Processes(Executor):
         self._held, self._leash = self._context.Pipe(duplex=False)
         self._pool = self._begun()
 
-    def _begun(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(
+    def _begun(self) -> futures.ProcessPoolExecutor:
+        return futures.ProcessPoolExecutor(
             self.workers, self._context, initializer=_end_with, initargs=(self._held,)
         )
 

@@ -25,16 +25,10 @@ AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 def summarise(table: SweepTable, **did: Any) -> Summary:
     """What `--json` prints: the state of the table, and `did`, the second result of `run`."""
-    said = {
-        "folder": str(table.folder.path) if table.folder else None,
-        "hash": table.manifest["sweep"],
-        "scenes": table.scenes,
-        "rows": len(table),
-        **table.counts(),
-        "not_measured": table.manifest["not_measured"],
-        **did,
-    }
-    return headed(sweep=said)
+    folder = str(table.folder.path) if table.folder else None
+    said = {"folder": folder, "hash": table.manifest["sweep"], "scenes": table.scenes}
+    said |= {"rows": len(table), **table.counts(), "not_measured": table.manifest["not_measured"]}
+    return headed(sweep=said | did)
 
 
 def describe(summary: Summary) -> list[str]:

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -82,24 +83,20 @@ def sweep(
         expected = "the folder of an earlier sweep, as resume and overwrite need one"
         raise InputError("out", found="none", expected=expected)
     given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
-    if isinstance(what, (str, os.PathLike, Mapping)):
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(name, found="given", expected="none: the sweep tables state it")
-        if isinstance(what, Mapping):
-            plan = plan_of(what, Path("sweep"), measure)
-        else:
-            plan = read_sweep(what, measure)
-    else:
+    if not isinstance(what, (str, os.PathLike, Mapping)):
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
-    asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part)
+    elif name := next((name for name, value in given.items() if value is not None), ""):
+        raise InputError(name, found="given", expected="none: the sweep tables state it")
+    elif isinstance(what, Mapping):
+        plan = plan_of(what, Path("sweep"), measure)
+    else:
+        plan = read_sweep(what, measure)
     if executor is not None:
         checks.instance("executor", executor, Executor)
-        return run(plan, executor, **asked)[0]
-    if workers is not None:
+    elif workers is not None:
         checks.whole("workers", workers)
-    with Processes(workers) as mine:
-        return run(plan, mine, **asked)[0]
+    with nullcontext(executor) if executor is not None else Processes(workers) as mine:
+        return run(plan, mine, out=out, resume=resume, overwrite=overwrite, part=part)[0]
 
 
 def run(
@@ -113,8 +110,8 @@ def run(
 ) -> tuple[SweepTable, dict[str, Any]]:
     """Compute the missing rows of the table of a plan; arguments as for `sweep`.
 
-    Returns the table, and a dictionary: `found` is a message about rows that existed already,
-    `computed` the number of scenes that this call computed, and `seconds` its time.
+    Returns the table, and by name: a message about rows that are `found`, the number of scenes
+    that are `computed`, and `seconds`.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
@@ -132,18 +129,16 @@ def run(
     did = {"found": found, "computed": count, "seconds": time.monotonic() - began}
     if folder is not None:
         return SweepTable(folder.manifest, folder), did
-    joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
-    order = np.argsort(joined["scene"])
-    rows = {name: values[order] for name, values in joined.items()}
+    parts.sort(key=lambda each: each["scene"][0] if len(each["scene"]) else -1)
+    rows = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     return SweepTable(plan.manifest, None, rows), did
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     """The parts (ranges of scenes) in share k of n shares, for `part` = (k, n); all for None."""
-    given: Any = (1, 1) if part is None else part
-    if not isinstance(given, tuple) or len(given) != 2:
+    if part is not None and not (isinstance(part, tuple) and len(part) == 2):
         raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")
-    k, n = given
+    k, n = part or (1, 1)
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     size = plan.manifest["batch"]

@@ -15,7 +15,7 @@ from convexrough.errors import InputError, SolverError
 from convexrough.gradients.gradient import Holding
 from convexrough.gradients.objective import NUMBERS, gradient_of
 from convexrough.run.stage import Columns, Result, Stage, Summary, limit
-from convexrough.run.values import Mistake, Share, expected
+from convexrough.run.values import Mistake, Share, expected, one_of
 from convexrough.tabular.columns import bound, labelled
 
 #: Results whose gradient a scene file may request, and their symbols.
@@ -41,7 +41,7 @@ class GradientStage(Stage):
 
     name = "gradient"
 
-    of: Annotated[str, expected(f"one of: {', '.join(LETTERS)}", LETTERS.__contains__)]
+    of: Annotated[str, one_of(LETTERS)]
     fraction: Share | None = None
     by: Annotated[
         list[str],
