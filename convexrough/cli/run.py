@@ -130,9 +130,8 @@ def _swept(
     **options: Any,
 ) -> int:
     from convexrough.sweeps.plan import read_sweep
-    from convexrough.sweeps.pool import Processes, dask
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
-    from convexrough.sweeps.sweep import run
+    from convexrough.sweeps.sweep import Processes, dask, run
 
     folder = output.out or Path(f"{sweep.stem}-sweep")
     with progress("reading the first scene"):

@@ -7,7 +7,7 @@ result.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, cast
@@ -131,6 +131,12 @@ def number(found: Any, name: str) -> Any:
     return getattr(found if hasattr(found, name) else found.certificate, name)
 
 
+def numbers(found: Any, names: Iterable[str]) -> Summary:
+    """For each of these names the result of `number`, as a Python number or text."""
+    values = ((name, number(found, name)) for name in names)
+    return {name: it.item() if isinstance(it, np.generic) else it for name, it in values}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Record):
     """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
@@ -163,8 +169,7 @@ class Result(Record):
         """Rows of numbers and texts by key, one for each object in `found`; one without labels."""
         labels, names = self.stage.labels, self.stage.numbers
         return [
-            {name: values[k] for name, values in labels.items()}
-            | {name: plain(number(each, name)) for name in names}
+            {name: values[k] for name, values in labels.items()} | numbers(each, names)
             for k, each in enumerate(self.found if labels else self.found[:1])
         ]
 
@@ -284,11 +289,6 @@ class Steps(Result):
         """Each number of the stage as a list with an entry for each step."""
         lists = {key: [row[key] for row in self.known] for key in self.known[0]}
         return lists | {"order": self.found[0].order}
-
-
-def plain(value: Any) -> Any:
-    """The value; a NumPy number as a Python number, an array as a list."""
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def unit_of(name: str, units: UnitNames) -> str:

@@ -73,7 +73,7 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
         if name in wanted or name == "normal":
             cautions += stage.cautions(contact)
             result = stage.compute(contact)
-            found |= dict(_numbers(result.summary(), name, "", [*stage.labels]))
+            found |= _numbers(result.summary(), name, "", [*stage.labels])
             doubts += result.doubts()
     if ONSET in wanted:
         which = np.flatnonzero(contact.loads)

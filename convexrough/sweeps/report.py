@@ -34,8 +34,8 @@ def summarise(table: SweepTable, **did: Any) -> Summary:
 def describe(summary: Summary) -> list[str]:
     """The printed report of a sweep, from its summary."""
     it = summary["sweep"]
-    lines = [("scenes", f"{it['scenes']:,}"), ("rows", f"{it['rows']:,}")]
-    lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
+    names = ("scenes", "rows", "  certified", "  undecided", "  failed")
+    lines = [(name, f"{it[name.strip()]:,}") for name in names]
     if "computed" in it:
         rate = it["computed"] / it["seconds"]
         said = f"{it['computed']:,} scenes in {it['seconds']:,.0f} s, {rate:,.3g} per second"

@@ -14,16 +14,14 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact, closest_changes
 from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
-from convexrough.run.stage import Columns, Result, Stage, Summary, unit_of
+from convexrough.run.stage import Columns, Result, Stage, Summary, numbers, unit_of
 from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: `closest_change` considers only loads of at least this fraction of the largest load.
-HEAVY = 0.1
-
-#: The report mentions `closest_change` if it is larger than this.
-DIFFERENT = 0.01
+#: `closest_change` considers only loads of at least HEAVY of the largest load; the report mentions
+#: it above DIFFERENT.
+HEAVY, DIFFERENT = 0.1, 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
 COUNTS = ("contact", "open", "undecided")
@@ -62,9 +60,8 @@ class NormalResult(Result):
 
     def rows(self) -> list[Summary]:
         contact = self.contact
-        found = {name: getattr(contact, name) for name in FOUND}
         judged = judged_loads(contact.certificate, contact.loads)
-        return [judged | found | limits_of(contact)]
+        return [judged | numbers(contact, FOUND) | limits_of(contact)]
 
     def tables(self) -> dict[str, Columns]:
         contact, asperities = self.contact, self.contact.scene.asperities
@@ -91,22 +88,18 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
     """The summary of the certificate of loads (n,) [force]."""
     return {
         "asperities": len(loads),
-        **{status: int((certificate.status == status).sum()) for status in COUNTS},
-        "approach": certificate.approach,
-        "approach_error": certificate.approach_error,
+        **numbers(certificate, (*COUNTS, "approach", "approach_error")),
         "load": float(loads.sum()),
         "largest_load": float(loads.max()),
-        "certificate": {name: getattr(certificate, name) for name in PROOF},
+        "certificate": numbers(certificate, PROOF),
     }
 
 
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of` and two others.
 
-    geometry        : where asperities meet the sphere: "summit" or "closest"
-    closest_change  : largest relative change of loads of at least a tenth of the largest load if
-        the geometry becomes "closest"; None if it is "closest" already, if nothing touches, or if
-        the change is not known
+    closest_change : largest relative change of loads of at least `HEAVY` of the largest load if the
+        geometry becomes "closest"; None if it is so already, if nothing touches, or if not known
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
