@@ -205,10 +205,8 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
         placed[:-1] -= close / 2
         placed[1:] += close / 2
     for k, y in zip(order, placed, strict=True):
-        where: dict[str, Any] = {"textcoords": "offset points", "xytext": (6, 0)}
-        axes.annotate(
-            names[k], (1.0, y), fontsize=TICK, va="center", annotation_clip=False, **where
-        )
+        axes.annotate(names[k], (1.0, y), xytext=(6, 0), textcoords="offset points", va="center",
+                      fontsize=TICK, annotation_clip=False)  # fmt: skip
 
 
 def _loss_figure(found: PaperStates, scale: Scale) -> Figure:

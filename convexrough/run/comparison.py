@@ -96,11 +96,9 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
         )
     for row in rows:
         if count := row["different_contacts"]:
-            limits = (
-                f"more than {CARRIES:g} of the largest load, the other less than {CARRIES / 10:g}"
-            )
             differ = f"{count} contacts differ from those of {rows[0]['solver']}"
-            yield f"{row['solver']}: {differ}: one solver gives them {limits}"
+            most = f"one solver gives them more than {CARRIES:g} of the largest load"
+            yield f"{row['solver']}: {differ}: {most}, the other less than {CARRIES / 10:g}"
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):

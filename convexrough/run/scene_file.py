@@ -32,17 +32,12 @@ if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
     from convexrough.run.study import LatticeTable, Study
 
-#: Largest number of mistakes in a scene file that are listed; the other mistakes are counted.
-MOST_MISTAKES = 50
-
-#: [bytes] size of the largest accepted scene file.
-MOST_BYTES = 2**25
+#: Largest number of mistakes in a scene file that are listed, largest size of the file in bytes,
+#: and largest number of parts of a dotted key: time and memory of tomllib grow with its square.
+MOST_MISTAKES, MOST_BYTES, MOST_PARTS = 50, 2**25, 100
 
 #: Columns of a file of asperities, unless the scene file names others.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
-
-#: Largest number of parts of a dotted key: time and memory of tomllib grow with its square.
-MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
@@ -214,9 +209,7 @@ def has_sweep(path: Path) -> bool:
     return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in tables_of(path, text)
 
 
-def regular(
-    pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
-) -> Asperities:
+def regular(pattern: str, spacing: float, tip_radius: Any, within: float) -> Asperities:
     """Asperities in the pattern "hexagonal" or "square", without random heights or tip radii."""
     make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
@@ -237,31 +230,23 @@ def task_of(
 
     Raises InputError for mistakes that the tables alone do not show.
     """
+    layout, units, highest = study.asperities, study.units, None
     with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
+    how: Any = {"friction": study.friction.coefficient if study.friction else None}
+    how |= {"geometry": layout.geometry, "units": units.names}
 
     def press_on(asperities: Asperities) -> Scene:
-        return Scene(
-            checked(study.sphere.radius),
-            asperities,
-            stuff,
-            friction=study.friction.coefficient if study.friction else None,
-            geometry=study.asperities.geometry,
-            units=study.units.names,
-        )
+        return Scene(checked(study.sphere.radius), asperities, stuff, **how)
 
-    layout, highest = study.asperities, None
     with blamed_on(path, "asperities", unless_known=True):
         if asperities is not None:
             scene = press_on(asperities)
         elif layout.pattern == "file":
-            how = Reading(
-                columns=named_columns("columns", layout.columns, SUMMIT_COLUMNS),
-                units=study.units.names,
-                convert=study.units.convert,
-            )
+            columns = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
+            manner = Reading(columns=columns, units=units.names, convert=units.convert)
             place = path.parent / layout.path
-            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=how))
+            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=manner))
         else:
             scene, highest = _lattice(layout, study, press_on, lattice)
     return Task(

@@ -119,9 +119,10 @@ def limit(contact: Contact) -> float:
     return checks.friction(contact.scene.friction) * contact.load
 
 
-def same(*names: str) -> dict[str, str]:
-    """Headings of printed columns: for each number its own name."""
-    return {name: name for name in names}
+def heads(columns: str) -> Mapping[str, str]:
+    """Headings of printed columns by key, from a text such as "fraction: Q/(fP), force"."""
+    parts = (column.partition(": ") for column in columns.split(", "))
+    return {name: heading or name for name, _, heading in parts}
 
 
 def number(found: Any, name: str) -> Any:

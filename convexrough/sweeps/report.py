@@ -18,8 +18,7 @@ from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: The quantiles that are printed, and the largest numbers of printed rows, printed failures and
-#: drawn figures.
+#: The printed quantiles; the largest numbers of printed rows, printed failures and drawn figures.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from convexrough.friction.loop import Loop
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
-from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit, same
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, heads, limit
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -60,10 +60,7 @@ class ShearResult(Result):
     """The result of [shear]: a friction state for each fraction."""
 
     stage: ShearStage
-    printed: ClassVar[Mapping[str, str]] = {
-        "fraction": "Q/(fP)",
-        **same("force", "displacement", "sliding", "partial", "undecided"),
-    }
+    printed = heads("fraction: Q/(fP), force, displacement, sliding, partial, undecided")
 
     def proved_forces(self) -> Iterator[float]:
         return (abs(state.force) for state in self.found)
@@ -142,18 +139,11 @@ class CycleResult(Result):
         "W0: six times a smooth sphere's W at the onset of gross sliding"
     )
     digits = 6
-    printed: ClassVar[Mapping[str, str]] = {
-        "maximum_fraction": "max/(fP)",
-        "minimum_fraction": "min/(fP)",
-        "force_amplitude": "Qa",
-        "displacement_amplitude": "Xa",
-        "secant_stiffness": "Qa/Xa",
-        "loss": "W",
-        "loss_factor": "W/(pi Qa Xa)",
-        "loss_normalised": "W/W0",
-        "smooth_normalised": "smooth W/W0",
-        "sliding": "sliding",
-    }
+    printed = heads(
+        "maximum_fraction: max/(fP), minimum_fraction: min/(fP), force_amplitude: Qa, "
+        "displacement_amplitude: Xa, secant_stiffness: Qa/Xa, loss: W, loss_factor: W/(pi Qa Xa), "
+        "loss_normalised: W/W0, smooth_normalised: smooth W/W0, sliding"
+    )
 
     def rows(self) -> list[Summary]:
         return [
@@ -243,4 +233,4 @@ class HistoryResult(Steps):
     """The result of [history]: the state after each force."""
 
     stage: HistoryStage
-    printed: ClassVar[Mapping[str, str]] = {"fraction": "Q/(fP)", **same("displacement", "loss")}
+    printed = heads("fraction: Q/(fP), displacement, loss")

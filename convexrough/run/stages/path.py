@@ -1,4 +1,4 @@
-"""[path] and [steady]: paths of normal load and shear force, followed once or repeated."""
+"""Paths of load and shear force: [path], once; [steady], repeated; [shakedown], scaled."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from convexrough.friction.fretting import fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
 from convexrough.friction.steady import steady
+from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.record import rows_of
 from convexrough.run import values
-from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, same
+from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, heads
 from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
@@ -109,11 +110,7 @@ class PathResult(Steps):
 
     stage: PathStage
     title = "load path"
-    printed: ClassVar[Mapping[str, str]] = {
-        "load": "P",
-        "force": "Q",
-        **same("displacement", "loss", "stuck", "partial", "sliding"),
-    }
+    printed = heads("load: P, force: Q, displacement, loss, stuck, partial, sliding")
 
     def lines(self) -> list[str]:
         return [*super().lines(), *self.stage.chords()]
@@ -175,12 +172,9 @@ class SteadyResult(Result):
 
     stage: SteadyStage
     most = Steps.most
-    printed: ClassVar[Mapping[str, str]] = {
-        "level": "stuck below load",
-        "loss": "loss",
-        "loss_error": "error",
-        **same("partial", "sliding", "intermittent"),
-    }
+    printed = heads(
+        "level: stuck below load, loss, loss_error: error, partial, sliding, intermittent"
+    )
 
     def summary(self) -> Summary:
         found = self.found[0]
@@ -200,7 +194,7 @@ class SteadyResult(Result):
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
         for losses in self.found[1:]:
-            printed = {**same("phase", "factor", "loss"), "smooth": "smooth sphere"}
+            printed = heads("phase, factor, loss, smooth: smooth sphere")
             rows, title = rows_of(_by_phase(losses)), "loss against phase"
             said += ["", *self.printed_table("phase_losses", rows, printed, title)]
         return said
@@ -215,3 +209,93 @@ class SteadyResult(Result):
 def _by_phase(losses: PhaseLosses) -> Columns:
     names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
     return losses.columns(*names)
+
+
+class ShakedownStage(Stage):
+    """Mean load and shear force, and amplitudes that are scaled, all divided by `reference`.
+
+    kind : "exact" (default), "elastic", or "vector": then forces are pairs [x, y]
+    """
+
+    name = "shakedown"
+    numbers = ("factor", "lower", "upper", "gross")
+
+    load: Positive
+    force: values.Force = 0.0
+    load_amplitudes: list[Finite] | None = None
+    force_amplitudes: list[values.Force]
+    kind: Annotated[Theory, expected('"exact", "elastic" or "vector"')] = "exact"
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
+            found = f"found {len(self.load_amplitudes)} values"
+            yield "load_amplitudes", f"{found}, expected {len(self.force_amplitudes)}"
+        pairs = self.kind == "vector"
+        expected = 'a pair [x, y] with kind = "vector"' if pairs else values.NUMBER_OR_PAIR
+        if isinstance(self.force, list) != pairs and self.force != 0.0:
+            yield "force", f"found {self.force}, expected {expected}"
+        for i, force in enumerate(self.force_amplitudes):
+            if isinstance(force, list) != pairs:
+                yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
+
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load of the path with the factor 1."""
+        return self.reference * (self.load + max([0.0, *(self.load_amplitudes or [])]))
+
+    def compute(self, contact: Contact) -> ShakedownResult:
+        swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
+        with blamed_on(f"[{self.name}]"):
+            found = shakedown(
+                contact.scene,
+                load=self.reference * self.load,
+                force=self.reference * np.array(self.force),
+                load_amplitudes=self.reference * np.array(swings),
+                force_amplitudes=self.reference * np.array(self.force_amplitudes),
+                kind=self.kind,
+                influence=contact.influence,
+            )
+        return ShakedownResult(self, contact, (found,))
+
+
+class ShakedownResult(Result):
+    """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
+
+    stage: ShakedownStage
+    digits = 12
+    printed = heads("factor, lower: lower bound, upper: upper bound, gross: gross sliding")
+
+    def summary(self) -> Summary:
+        (found,) = self.found
+        said = {name: getattr(found, name) for name in ("limited_by", "proved", "order")}
+        return {"kind": found.kind, **self.known[0], **said}
+
+    def tables(self) -> dict[str, Columns]:
+        """The tables of the residual state and the mechanism, by vertex and component."""
+        (found,) = self.found
+        columns = self.at_asperities({"factor": found.factors})
+        if found.kind != "vector":
+            return {self.name: columns | {"witness": found.witness, "slip": found.mechanism}}
+        columns |= {f"witness_{name}": found.witness[:, k] for k, name in enumerate("xy")}
+        for v, slips in enumerate(found.mechanism):
+            columns |= {f"slip_{v}_{name}": slips[:, k] for k, name in enumerate("xy")}
+        return {self.name: columns}
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        if not self.found[0].proved:
+            yield "not proved: bounds on the limit of [shakedown]"
+
+    def lines(self) -> list[str]:
+        _, *table = super().lines()
+        (found,) = self.found
+        above = {
+            "sliding": "above the factor an asperity slides in every cycle",
+            "opening": "above the factor an asperity opens in every cycle, and need not slide",
+            None: "sliding dies out at every factor",
+        }
+        return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
+
+    def figures(self) -> Mapping[str, Any]:
+        return plots.shakedown_figures(self.found[0])
