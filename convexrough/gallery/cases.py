@@ -193,20 +193,14 @@ def case(name: str) -> HardCase:
         expected = f"the name of a case; {checks.nearest(str(name), stored())}"
         raise InputError("name", found=repr(name), expected=expected)
     data = stored()[name]
-    answer = data["answer"]
+    answer, turns = data["answer"], np.array(_reversals(data["reversals"]))
+    known: dict[str, Any] = {each: data[each] for each in ("family", "why", "shear_force")}
+    known |= {each: data["prescribed"].get(each) for each in ("approach", "load")}
+    known |= {f"exact_{each}": answer[each] for each in ("approach", "load")}
+    known |= {each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")}
+    known |= {"displacement": answer["displacement"]}
     return HardCase(
-        name=name,
-        family=data["family"],
-        why=data["why"],
-        scene=scene_of(data),
-        approach=data["prescribed"].get("approach"),
-        load=data["prescribed"].get("load"),
-        exact_approach=answer["approach"],
-        exact_load=answer["load"],
-        displacement=answer["displacement"],
-        shear_force=data["shear_force"],
-        history=frozen(np.array(_reversals(data["reversals"])) * data["shear_force"]),
-        **{each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")},
+        name, scene=scene_of(data), history=frozen(turns * data["shear_force"]), **known
     )
 
 

@@ -43,14 +43,11 @@ READ_CROSSING = 0.37
 class PaperStates:
     """The results that the paper's figures, their tables and the comparison of numbers show.
 
-    limit  : [force] friction limit f P
-    named  : indices of touching asperities by the letter of their ring, from the axis outwards; the
-        outermost ring has the letter A;  firsts : the first of each ring
+    named  : indices of touching asperities by the letter of their ring, from the axis outwards to
+        ring A;  firsts : the first of each ring
     onsets : (n,) Q / (f P) at which each asperity starts to slide
-    half   : state at half of the limit;  steady, loop : cycle between plus and minus half of the
-        limit, and its loop
-    path   : loading from rest through Q / (f P) = `fractions`, which include the onsets of all
-        rings
+    half, steady, loop : state at half of the limit f P; cycle to plus and minus that; its loop
+    path   : loading from rest through Q / (f P) = `fractions`, with the onsets of all rings
     cycles : steady cycles at `AMPLITUDES`;  crossing : amplitude Q / (f P) above which the rough
         contact loses more per cycle than a smooth one
     """

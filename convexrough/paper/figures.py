@@ -30,17 +30,7 @@ from convexrough.sphere.smooth import smooth
 def paper_figures(found: PaperStates) -> Figures:
     """The figures of the paper's example, for asperities in at most 26 rings, without units.
 
-    "fig3_pressure"   : contact pressure
-    "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the force at
-        which the first asperity of each ring starts to slide
-    "fig5_traction"   : shear traction at Q / (f P) = 0.5, of all asperities and on the central one
-    "fig6_section"    : traction and f * pressure along y = 0, also of the smooth sphere
-    "fig7_asperities" : force and displacement of an asperity of each ring from Q = 0 to f P
-    "fig8_loops"      : hysteresis loops between -0.5 f P and 0.5 f P: rough and smooth contact,
-        single asperities
-    "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and their crossing
-
-    Rings have letters as in the paper: A is the outermost.
+    Rings have letters as in the paper: A is the outermost. States are those at Q / (f P) = 0.5.
     """
     scale, loops = Scale(found.contact), ([found.steady], [*found.firsts.values()])
     return Figures(
@@ -55,6 +45,7 @@ def paper_figures(found: PaperStates) -> Figures:
 
 
 def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Rings; those that slide; the forces at which the first asperity of each starts to slide."""
     contact, named, onsets = found.contact, found.named, found.onsets
     how = {"width_ratios": [1.0, 0.9], "gridspec_kw": {"wspace": 0.06}}
     figure, (chart, bars) = panels(DOUBLE, 3.4, 1, 2, **how)
@@ -97,6 +88,7 @@ def _tractions(scale: Scale) -> tuple[float, Measure]:
 
 
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Shear traction of all asperities, and on the central one."""
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     centre = next(iter(found.firsts.values()))
     figure, (chart, profile) = map_and_profile()
@@ -136,6 +128,7 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 
 
 def _section_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Traction and f * pressure along y = 0, also of the smooth sphere."""
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     sphere = smooth(contact.scene, load=contact.load)
     figure, (axes,) = panels(DOUBLE, 2.9)
@@ -164,7 +157,7 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
 
 
 def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
-    """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
+    """Force and displacement of the first asperity of each ring, for Q = 0 to f P."""
     figure, (left, right) = panels(DOUBLE, 3.2, 1, 2, gridspec_kw={"wspace": 0.06})
     firsts, path, share = found.firsts, found.path, found.fractions
     force = 100.0 * path.asperity_forces / found.limit
@@ -210,7 +203,7 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
 
 
 def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
-    """The figure of energy per cycle against amplitude, rough and smooth, with a zoom."""
+    """Energy per cycle against amplitude, rough and smooth, with a zoom on their crossing."""
     figure, (whole, zoom) = panels(DOUBLE, 3.0, 1, 2, gridspec_kw={"wspace": 0.06})
     energy = scale.energy(max(each.loss for each in found.cycles))
     rough = np.array([energy.of(each.loss) for each in found.cycles])

@@ -268,8 +268,8 @@ def _lattice(
 ) -> tuple[Scene, float | None]:
     """The scene with asperities in a pattern, and `highest_approach` of the task.
 
-    The pattern extends to the distance `within` or, without this key, to all asperities that could
-    touch at the approach or load in [normal], or at the largest load in another table.
+    Without the key `within`, the pattern has all asperities that could touch at the approach or
+    load in [normal], or at the largest load in another table.
     """
     tips, deviation, variation = layout.tip_radius, layout.height_std, layout.tip_radius_cv
     rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": layout.seed}

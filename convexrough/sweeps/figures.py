@@ -33,9 +33,8 @@ def draw_quantiles(
 ) -> Axes:
     """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail.
 
-    columns : the columns `measured`, `over`, `status` and those of `others`
-    others  : other swept keys that are not random. Up to four combinations of their values have
-        bands of their own; otherwise the legend states the keys and the number of combinations
+    others : other swept keys that are not random. Up to `MOST_BANDS` combinations of their values
+        have bands of their own; otherwise the legend states the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
     good = columns["status"] != "failed"

@@ -48,7 +48,6 @@ class Folder:
         return [part_from(self.manifest, first) for first in firsts]
 
     def file(self, first: int) -> Path:
-        """The file of the part that begins with scene `first`."""
         return self.path / PARTS / f"{first:012d}.parquet"
 
     def write(self, columns: Columns) -> None:
@@ -59,10 +58,7 @@ class Folder:
         write_text(self.file(int(columns["scene"][0])), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
-        """Some columns of a part, by default all.
-
-        Raises FileError if the part is damaged, or if it contains other scenes than its name says.
-        """
+        """Some columns of a part, by default all. Raises FileError if the part is damaged."""
         pyarrow, parquet = arrow()
         path = self.file(part.start)
         wanted = list(self.manifest["columns"] if names is None else names)
@@ -84,8 +80,7 @@ class Folder:
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
         """The parts of `wanted` that are not yet computed, and a message on what was found.
 
-        Damaged parts and unfinished files of these parts are removed. Raises FileError if some of
-        `wanted` exist and `resume` is false.
+        Damaged parts and unfinished files are removed. Raises FileError if a part must not exist.
         """
         known = {part.start for part in self.parts()}
         there = [part for part in wanted if part.start in known]

@@ -64,8 +64,7 @@ def plan_of(
 ) -> Plan:
     """The plan of a sweep, from the tables of the sweep file at `path`.
 
-    Raises SceneFileError, which lists every mistake; InputError for an unknown measure; and the
-    error of the last scene tried if the first `TRIED` scenes fail.
+    Raises SceneFileError, InputError, and the last error if the first `TRIED` scenes fail.
     """
     tables = {name: table for name, table in contents.items() if name != "sweep"}
     table = contents.get("sweep")
@@ -145,8 +144,8 @@ def plan_of_scenes(
         layout, material = scene.asperities, scene.material
         for values in (layout.positions, layout.tip_radii, layout.heights):
             content.update(values.tobytes())
-        content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
-        content.update(f"{scene.geometry} {len(scene)}".encode())
+        numbers = (scene.sphere_radius, material, scene.friction)
+        content.update(f"{numbers}{scene.geometry} {len(scene)}".encode())
     given = {"scenes": content.hexdigest(), name: controls, "stages": repr(stages)}
     common: Any = {"approach": None, "load": None, "stages": stages, "solver": Newton()}
     tasks = {

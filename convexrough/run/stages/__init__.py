@@ -1,4 +1,4 @@
-"""The stages of a run. Each has a module of its own and an entry in `STAGES`."""
+"""The stages of a run. Each has an entry in `STAGES`."""
 
 from __future__ import annotations
 

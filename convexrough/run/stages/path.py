@@ -18,7 +18,7 @@ from convexrough.friction.steady import steady
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.record import rows_of
 from convexrough.run import values
-from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, heads
+from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, heads, numbers
 from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
@@ -116,8 +116,7 @@ class PathResult(Steps):
         return [*super().lines(), *self.stage.chords()]
 
     def summary(self) -> Summary:
-        (path,) = self.found
-        return super().summary() | {"presses": path.presses}
+        return super().summary() | numbers(self.found[0], ("presses",))
 
     def tables(self) -> dict[str, Columns]:
         """A table of the points, and a table of all asperities at each point."""
@@ -177,8 +176,7 @@ class SteadyResult(Result):
     )
 
     def summary(self) -> Summary:
-        found = self.found[0]
-        said = self.known[0] | {"order": found.order, "presses": found.presses}
+        said = self.known[0] | numbers(self.found[0], ("order", "presses"))
         for losses in self.found[1:]:
             lists = {name: it.tolist() for name, it in _by_phase(losses).items()}
             said |= {"phase_losses": lists | {"order": losses.order}}
@@ -268,8 +266,8 @@ class ShakedownResult(Result):
 
     def summary(self) -> Summary:
         (found,) = self.found
-        said = {name: getattr(found, name) for name in ("limited_by", "proved", "order")}
-        return {"kind": found.kind, **self.known[0], **said}
+        more = numbers(found, ("limited_by", "proved", "order"))
+        return {"kind": found.kind, **self.known[0], **more}
 
     def tables(self) -> dict[str, Columns]:
         """The tables of the residual state and the mechanism, by vertex and component."""
