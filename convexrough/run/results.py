@@ -36,11 +36,9 @@ if TYPE_CHECKING:
 
     from convexrough.proof import Proof
 
-#: Version of the keys of summary.json and of the columns of tables.
-SCHEMA = 2
-
-#: Tables with more rows than this are written as .npz.
-MOST_CSV_ROWS = 100_000
+#: Version of the keys of summary.json and of the columns of tables; the largest number of rows of a
+#: table that is not written as .npz.
+SCHEMA, MOST_CSV_ROWS = 2, 100_000
 
 #: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
@@ -249,16 +247,6 @@ def origin(source: SceneFile) -> Summary:
 def versions() -> dict[str, str]:
     """The versions of the packages in `NUMERICAL`, by name."""
     return {name: metadata.version(name) for name in NUMERICAL}
-
-
-def slider_page(pressed: Result) -> str:
-    """An HTML page with a slider for the shear force, and the friction states computed for it.
-
-    Raises InputError if the scene has no friction, or another shape than a sphere.
-    """
-    from convexrough.plots.slider import slider_html  # imported only if a page is requested
-
-    return slider_html(pressed.contact, pressed.lines())
 
 
 def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> Path:

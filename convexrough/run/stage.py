@@ -161,11 +161,6 @@ class Result(Record):
         """Name of the table in the scene file, of the key in summary.json, and of the CSV file."""
         return self.stage.name
 
-    @property
-    def units(self) -> UnitNames:
-        """The names of the scene's units."""
-        return self.contact.scene.units
-
     def rows(self) -> list[Summary]:
         """Rows of numbers and texts by key, one for each object in `found`; one without labels."""
         labels, names = self.stage.labels, self.stage.numbers
@@ -243,7 +238,7 @@ class Result(Record):
     ) -> list[str]:
         """The lines of the last rows of a table, with a title and units."""
         units = (f"{it} {unit}" for key, it in printed.items()
-                 if (unit := unit_of(key, self.units)))  # fmt: skip
+                 if (unit := unit_of(key, self.contact.scene.units)))  # fmt: skip
         named, cut = ", ".join(units), rows[-(self.most or len(rows)) :]
         said = [f"{title or name}  ({named})" if named else title or name]
         if len(cut) < len(rows):

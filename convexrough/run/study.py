@@ -37,8 +37,6 @@ class SphereTable(FileTable):
 
 
 class MaterialTable(FileTable):
-    """The table of the material of both bodies."""
-
     alternatives = ("contact_modulus", "youngs_modulus")
     contact_modulus: Positive | None = None
     youngs_modulus: Positive | None = None
@@ -62,8 +60,6 @@ class BodyTable(FileTable):
 
 
 class BodiesTable(FileTable):
-    """The table of two bodies of different materials."""
-
     elsewhere = ("two bodies", frozenset(MaterialTable.model_fields))
     sphere: BodyTable
     base: BodyTable
@@ -77,8 +73,6 @@ LATTICE = frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed")
 
 
 class SummitsTable(FileTable):
-    """The table of asperities that are read from a file."""
-
     elsewhere = ("this pattern", LATTICE)
     pattern: Literal["file"]
     path: Text
@@ -88,8 +82,6 @@ class SummitsTable(FileTable):
 
 
 class LatticeTable(FileTable):
-    """The table of asperities in a pattern."""
-
     needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
     elsewhere = ("this pattern", frozenset(SummitsTable.model_fields))
     pattern: Pattern

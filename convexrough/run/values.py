@@ -48,7 +48,8 @@ def one_of(names: Collection[str]) -> pydantic.WrapValidator:
 
 
 #: The type of a value in the file, "(list)" or "(number)"; messages omit tags in brackets.
-NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
+_EITHER = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
+_ONE, _LIST = Tag("(number)"), Tag("(list)")
 
 _SIZED = expected(SIZED, is_sized)
 
@@ -67,26 +68,18 @@ Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1",
 Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
 Text = Annotated[str, expected("text in quotes", bool)]
 Switch = Annotated[bool, expected("true or false")]
-TipRadius = Annotated[
-    Annotated[Positive, Tag("(number)")] | Annotated[list[Positive], Tag("(list)")], NUMBER_OR_LIST
-]
+TipRadius = Annotated[Annotated[Positive, _ONE] | Annotated[list[Positive], _LIST], _EITHER]
 _Length = Annotated[
     float,
     Field(allow_inf_nan=True),
     expected("a positive number, or inf where it is flat", lambda value: value > 0),
     expected(SIZED, lambda value: value == math.inf or is_sized(value)),
 ]
-_TwoLengths = Annotated[
-    list[_Length], expected("two radii, along x and along y", lambda value: len(value) == 2)
-]
-Radius = Annotated[
-    Annotated[_Length, Tag("(number)")] | Annotated[_TwoLengths, Tag("(list)")], NUMBER_OR_LIST
-]
+_Two = expected("two radii, along x and along y", lambda value: len(value) == 2)
+Radius = Annotated[Annotated[_Length, _ONE] | Annotated[list[_Length], _Two, _LIST], _EITHER]
 NUMBER_OR_PAIR = 'a finite number, or with kind = "vector" a pair [x, y] of finite numbers'
 _Pair = Annotated[list[Finite], expected(NUMBER_OR_PAIR, lambda value: len(value) == 2)]
-Force = Annotated[
-    Annotated[Finite, Tag("(number)")] | Annotated[_Pair, Tag("(list)")], NUMBER_OR_LIST
-]
+Force = Annotated[Annotated[Finite, _ONE] | Annotated[_Pair, _LIST], _EITHER]
 
 
 class FileTable(pydantic.BaseModel):

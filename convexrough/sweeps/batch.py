@@ -24,11 +24,9 @@ from convexrough.version import __version__
 #: Versions of the packages on which the last bits of rows depend.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
-#: Number of layouts (exact positions) of asperities that the cache keeps.
-KEPT = 8
-
-#: The entry of the column `seed` if nothing is random.
-NO_SEED = -1
+#: Number of layouts (exact positions) of asperities that the cache keeps; the entry of the column
+#: `seed` if nothing is random.
+KEPT, NO_SEED = 8, -1
 
 
 @dataclass(frozen=True)

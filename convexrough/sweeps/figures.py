@@ -17,12 +17,9 @@ from convexrough.sweeps.batch import Columns
 #: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Largest number of combinations of other swept keys that have bands of their own. If there are
-#: more, all rows share one pair of bands.
-MOST_BANDS = 4
-
-#: Number of bins of x, if x has many values.
-BINS = 20
+#: Largest number of combinations of other swept keys that have bands of their own: if there are
+#: more, all rows share one pair of bands. Number of bins of x, if x has many values.
+MOST_BANDS, BINS = 4, 20
 
 #: Colour, line and marker of each band; all differ also in grey.
 LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f", "-.", "D"))

@@ -49,23 +49,22 @@ class Plan:
         return Batch(self.source.part(part), self.columns, part)
 
 
-def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file; `measure` replaces its list of numbers.
-
-    Raises FileError if the file cannot be read or is not TOML, and the errors of `plan_of`.
-    """
-    path = Path(path)
-    text = read_text(path)
-    return plan_of(tables_of(path, text), path, measure, text)
-
-
 def plan_of(
-    contents: Mapping[str, Any], path: Path, measure: Sequence[str] | None = None, text: str = ""
+    what: Mapping[str, Any] | str | os.PathLike[str],
+    path: Path = Path("sweep"),
+    measure: Sequence[str] | None = None,
 ) -> Plan:
-    """The plan of a sweep, from the tables of the sweep file at `path`.
+    """The plan of a sweep file, or of the tables of the sweep file at `path`.
 
-    Raises SceneFileError, InputError, and the last error if the first `TRIED` scenes fail.
+    measure : replaces the list of numbers in the file
+
+    Raises FileError, SceneFileError, InputError; and the last error if `TRIED` scenes all fail.
     """
+    contents, text = what, ""
+    if not isinstance(contents, Mapping):
+        path = Path(contents)
+        text = read_text(path)
+        contents = tables_of(path, text)
     tables = {name: table for name, table in contents.items() if name != "sweep"}
     table = contents.get("sweep")
     if table is None:

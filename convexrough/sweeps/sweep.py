@@ -27,7 +27,7 @@ from convexrough.progress import LOGGER
 from convexrough.scene.scene import Scene
 from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.sweeps.folder import make_folder, part_from
-from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes, read_sweep
+from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes
 from convexrough.sweeps.table import SweepTable
 from convexrough.threads import cores
 
@@ -98,10 +98,8 @@ def sweep(
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
     elif name := next((name for name, value in given.items() if value is not None), ""):
         raise InputError(name, found="given", expected="none: the sweep tables state it")
-    elif isinstance(what, Mapping):
-        plan = plan_of(what, Path("sweep"), measure)
     else:
-        plan = read_sweep(what, measure)
+        plan = plan_of(what, measure=measure)
     if executor is not None:
         checks.instance("executor", executor, Executor)
     elif workers is not None:

@@ -57,8 +57,6 @@ class ShearStage(Stage):
 
 
 class ShearResult(Result):
-    """The result of [shear]: a friction state for each fraction."""
-
     stage: ShearStage
     printed = heads("fraction: Q/(fP), force, displacement, sliding, partial, undecided")
 
@@ -131,8 +129,6 @@ class CycleStage(Stage):
 
 
 class CycleResult(Result):
-    """The result of [cycle]: the steady cycles."""
-
     stage: CycleStage
     title = (
         "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W; "
@@ -230,7 +226,5 @@ class HistoryStage(Stage):
 
 
 class HistoryResult(Steps):
-    """The result of [history]: the state after each force."""
-
     stage: HistoryStage
     printed = heads("fraction: Q/(fP), displacement, loss")

@@ -56,8 +56,6 @@ class NormalStage(Stage):
 
 
 class NormalResult(Result):
-    """The result of [normal]: the pressed contact."""
-
     def rows(self) -> list[Summary]:
         contact = self.contact
         judged = judged_loads(contact.certificate, contact.loads)
@@ -75,13 +73,13 @@ class NormalResult(Result):
 
     def cautions(self) -> Iterator[str]:
         yield from plausibility.wrong_loads(self.contact)
-        yield from plausibility.cautions(self.known[0], self.units)
+        yield from plausibility.cautions(self.known[0], self.contact.scene.units)
 
     def figures(self) -> Mapping[str, Any]:
         return plots.press_figures(self.contact)
 
     def lines(self) -> list[str]:
-        return describe(self.known[0], self.units)
+        return describe(self.known[0], self.contact.scene.units)
 
 
 def judged_loads(certificate: Certificate, loads: Array) -> Summary:

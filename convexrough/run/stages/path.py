@@ -106,8 +106,6 @@ class PathStage(_Points):
 
 
 class PathResult(Steps):
-    """The result of [path]: the friction states at the points."""
-
     stage: PathStage
     title = "load path"
     printed = heads("load: P, force: Q, displacement, loss, stuck, partial, sliding")
@@ -167,8 +165,6 @@ class SteadyStage(_Points):
 
 
 class SteadyResult(Result):
-    """The result of [steady]: the steady cycle, and losses at other phases if requested."""
-
     stage: SteadyStage
     most = Steps.most
     printed = heads(
@@ -258,8 +254,6 @@ class ShakedownStage(Stage):
 
 
 class ShakedownResult(Result):
-    """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
-
     stage: ShakedownStage
     digits = 12
     printed = heads("factor, lower: lower bound, upper: upper bound, gross: gross sliding")
