@@ -17,12 +17,10 @@ from convexrough.progress import LOGGER
 from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
 
-#: Number of bristles (springs) of each asperity; its smallest value; and the number of variables
-#: above which fewer bristles are used. These heuristics keep files small.
-BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
-
-#: Largest number of asperities of a cone program that is also written as CBF.
-SMALL = 20
+#: Number of bristles (springs) of each asperity; its smallest value; the number of variables above
+#: which fewer bristles are used; and the largest number of asperities of a cone program that is
+#: also written as CBF. These heuristics keep files small.
+BRISTLES, FEWEST_BRISTLES, VARIABLES, SMALL = 64, 8, 520, 20
 
 HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
 HEADING += ["spread", "proved"]

@@ -153,6 +153,10 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     failed scene contains the message of its error.
     """
     wanted = {column.stage for column in batch.columns}
+
+    def alone(asked: Task) -> Measured:
+        return measured(asked.press(), asked.stages, wanted)
+
     with one_thread():
         ask = batch.source.opened()
         found: dict[int, Any] = {number: _attempt(ask, number) for number in batch.numbers}
@@ -160,18 +164,14 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
         found |= (together := measured_together(tasks, batch.columns))
         for number, task in tasks.items():
             if number not in together:
-                found[number] = _attempt(_measured_alone, task, wanted)
+                found[number] = _attempt(alone, task)
     return batch.table(list(found.values())), VERSIONS
 
 
-def _measured_alone(asked: Task, wanted: set[str]) -> Measured:
-    return measured(asked.press(), asked.stages, wanted)
-
-
-def _attempt(work: Callable[..., Any], *given: Any) -> Any:
+def _attempt(work: Callable[[Any], Any], given: Any) -> Any:
     """The result of `work`, or the message of an error that means that one scene failed."""
     try:
-        return work(*given)
+        return work(given)
     except FAILURES as error:
         return "; ".join(str(error).splitlines()) or type(error).__name__
 

@@ -27,11 +27,9 @@ from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes.
-MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
-
-#: At most this many scenes are tried to find out which numbers can be measured.
-TRIED = 5
+#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes are tried to find
+#: out which numbers can be measured.
+MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 
 @dataclass(frozen=True)
@@ -199,6 +197,10 @@ def _planned(
     labels = list(source.labels(range(0)))
     numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
     used = {"normal", *(column.stage for column in columns)}
+    own_loads = []  # tables with loads of their own that do not vary, although [normal] does
+    if grid and {"normal.load", "normal.approach"} & {*labels}:
+        own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
+        own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
         "schema": 2,
         "version": __version__,
@@ -209,17 +211,9 @@ def _planned(
         "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
         "drawn": [*grid.draw] if grid else [],
         "not_measured": [name for name in asked.stages if name not in used],
-        "own_loads": _own_loads(asked.stages, used, labels) if grid else [],
+        "own_loads": own_loads,
         "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
         **said,
         "versions": VERSIONS,
     }
     return Plan(source, columns, manifest)
-
-
-def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables with loads of their own that are not swept, although [normal] is."""
-    if not {"normal.load", "normal.approach"} & {*swept}:
-        return []
-    own = [name for name, stage in stages.items() if name in used and stage.highest_load]
-    return [name for name in own if not any(key.startswith(f"{name}.") for key in swept)]

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from convexrough import plots
 from convexrough.contact import Contact
@@ -142,15 +141,13 @@ class CycleResult(Result):
     )
 
     def rows(self) -> list[Summary]:
-        return [
-            {
-                **row,
-                "loss_over_smooth": cycle.loss_normalised / (cycle.smooth_normalised or math.nan),
-                "partial_slip_loss": float(cycle.partial_slip_losses.sum()),
-                "sliding_loss": float(cycle.sliding_losses.sum()),
-            }
-            for row, cycle in zip(super().rows(), self.found, strict=True)
-        ]
+        rows = super().rows()
+        for row, cycle in zip(rows, self.found, strict=True):
+            smooth = cycle.smooth_normalised or math.nan
+            row["loss_over_smooth"] = cycle.loss_normalised / smooth
+            row["partial_slip_loss"] = float(cycle.partial_slip_losses.sum())
+            row["sliding_loss"] = float(cycle.sliding_losses.sum())
+        return rows
 
     def proved_forces(self) -> Iterator[float]:
         return ((cycle.maximum - cycle.minimum) / 2 for cycle in self.found)
@@ -163,13 +160,12 @@ class CycleResult(Result):
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
         if any(each.order == "fails" for each in self.found):  # a general step for each point
             affordable = LEAST_POINTS
-        chosen: ArrayLike | None = None  # None means all
-        if stage.loop_asperities is None:
+        chosen = stage.loop_asperities
+        if chosen is None:
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
-        elif stage.loop_asperities != "all":
-            chosen = stage.loop_asperities
-        return loops(self.found, stage.loop_points or affordable, chosen)
+        points = stage.loop_points or affordable
+        return loops(self.found, points, None if chosen == "all" else chosen)
 
     @cached_property
     def worn(self) -> list[Fretting]:

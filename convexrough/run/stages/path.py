@@ -173,23 +173,28 @@ class SteadyResult(Result):
 
     def summary(self) -> Summary:
         said = self.known[0] | numbers(self.found[0], ("order", "presses"))
-        for losses in self.found[1:]:
-            lists = {name: it.tolist() for name, it in _by_phase(losses).items()}
+        for losses, columns in self.by_phase:
+            lists = {name: it.tolist() for name, it in columns.items()}
             said |= {"phase_losses": lists | {"order": losses.order}}
         return said
 
+    @property
+    def by_phase(self) -> list[tuple[PhaseLosses, Columns]]:
+        """The losses at other phases, if requested, and their table."""
+        names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
+        return [(losses, losses.columns(*names)) for losses in self.found[1:]]
+
     def tables(self) -> dict[str, Columns]:
         columns = self.at_asperities(self.found[0].columns("slips", "stick_radii", "status"))
-        tables = {"steady": columns, "steady_fretting": fretting_columns([fretting(self.found[0])])}
-        for losses in self.found[1:]:
-            tables["phase_losses"] = _by_phase(losses)
-        return tables
+        worn = fretting_columns([fretting(self.found[0])])
+        more = [("phase_losses", columns) for _, columns in self.by_phase]
+        return {"steady": columns, "steady_fretting": worn, **dict(more)}
 
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
-        for losses in self.found[1:]:
+        for _, columns in self.by_phase:
             printed = heads("phase, factor, loss, smooth: smooth sphere")
-            rows, title = rows_of(_by_phase(losses)), "loss against phase"
+            rows, title = rows_of(columns), "loss against phase"
             said += ["", *self.printed_table("phase_losses", rows, printed, title)]
         return said
 
@@ -198,11 +203,6 @@ class SteadyResult(Result):
         for losses in self.found[1:]:
             figures |= plots.phase_figures(losses)
         return figures
-
-
-def _by_phase(losses: PhaseLosses) -> Columns:
-    names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
-    return losses.columns(*names)
 
 
 class ShakedownStage(Stage):
@@ -239,17 +239,15 @@ class ShakedownStage(Stage):
         return self.reference * (self.load + max([0.0, *(self.load_amplitudes or [])]))
 
     def compute(self, contact: Contact) -> ShakedownResult:
-        swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
+        forces = {
+            "load": self.load,
+            "force": self.force,
+            "load_amplitudes": self.load_amplitudes or [0.0] * len(self.force_amplitudes),
+            "force_amplitudes": self.force_amplitudes,
+        }
+        given: Any = {name: self.reference * np.array(it) for name, it in forces.items()}
         with blamed_on(f"[{self.name}]"):
-            found = shakedown(
-                contact.scene,
-                load=self.reference * self.load,
-                force=self.reference * np.array(self.force),
-                load_amplitudes=self.reference * np.array(swings),
-                force_amplitudes=self.reference * np.array(self.force_amplitudes),
-                kind=self.kind,
-                influence=contact.influence,
-            )
+            found = shakedown(contact.scene, **given, kind=self.kind, influence=contact.influence)
         return ShakedownResult(self, contact, (found,))
 
 
