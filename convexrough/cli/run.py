@@ -164,8 +164,8 @@ def _say_summary(folder: Path, output: Output) -> int:
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
     if output.out is not None:
         with progress("writing results"), output.folder(output.out) as new:
-            report.write_summary(new, table, found)
-        lines += [*written(new), *report.figures_left_out(table)]
+            left_out = report.write_summary(new, table, found)
+        lines += [*written(new), *left_out]
     output.say({**said, "quantiles": rows_of(found)}, lines)
     return _status(said)
 

@@ -80,17 +80,14 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
             yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
-def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
-    """Write quantiles.csv, and figures of measured numbers against swept keys."""
-    pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
+def write_summary(new: Writer, table: SweepTable, found: Columns) -> list[str]:
+    """Write quantiles.csv and figures; a line tells how many figures are left out, if any are."""
+    pairs = [(name, key) for key in table.swept for name in table.measured]
     new.tables({"quantiles": found})
-    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure
+                    for name, key in pairs[:MOST_FIGURES]}  # fmt: skip
     new.figures(figures)
-
-
-def figures_left_out(table: SweepTable) -> list[str]:
-    """A line with the number of figures that `write_summary` leaves out; [] if it draws all."""
-    more = len(table.swept) * len(table.measured) - MOST_FIGURES
+    more = len(pairs) - MOST_FIGURES
     advice = "cr.open_sweep(DIR).plot(quantity, key) draws each in Python"
     return [f"not drawn: {more} more figures; {advice}"] if more > 0 else []
 

@@ -19,8 +19,7 @@ from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: `closest_change` considers only loads of at least HEAVY of the largest load; the report mentions
-#: it above DIFFERENT.
+#: `closest_change` is that of loads of at least HEAVY times the largest, reported above DIFFERENT.
 HEAVY, DIFFERENT = 0.1, 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
